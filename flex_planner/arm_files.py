@@ -1,0 +1,205 @@
+"""
+Arm files: YAML in physical quantities, read strictly.
+
+An unknown key is an error, so that a misspelt quantity is never silently left out. The presets
+lie in ``config/arms``.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+import math
+import os
+from pathlib import Path
+import sys
+from typing import Any
+
+from flex_planner.arm import Arm, Joint, Link, Motor, Node
+from flex_planner.errors import FlexPlannerError, InvalidValueError
+import yaml
+
+_MAX_BYTES = 1_000_000
+
+
+class ArmFileError(FlexPlannerError):
+    """An arm file cannot be found, read or understood; the message names file and field."""
+
+
+def config_folders() -> list[Path]:
+    """Return where presets are looked for: ROS shares, the source tree, the Python prefix."""
+    prefixes = [Path(entry) for entry in os.environ.get('AMENT_PREFIX_PATH', '').split(':')
+                if entry]
+    shares = [prefix / 'share' / 'flex_planner' / 'config'
+              for prefix in (*prefixes, Path(sys.prefix))]
+    return [Path(__file__).parents[1] / 'config', *shares]
+
+
+def find_arm_file(name: str) -> Path:
+    """
+    Return the file of a preset or, if it is a path, the path.
+
+    Raises
+    ------
+    ArmFileError
+        If there is none; the message lists the presets.
+
+    """
+    if name.endswith(('.yaml', '.yml')) or os.sep in name:
+        path = Path(name)
+        if not path.is_file():
+            raise ArmFileError(f'arm file {name!r} does not exist')
+        return path
+    found = preset_files()
+    if name not in found:
+        raise ArmFileError(f'arm {name!r} is neither a path ending in .yaml nor one of the '
+                           f'presets {sorted(found)}')
+    return found[name]
+
+
+def preset_files() -> dict[str, Path]:
+    """Return the arm files shipped with flex_planner, by name."""
+    files = [path for folder in config_folders() for path in (folder / 'arms').glob('*.yaml')]
+    return {path.stem: path for path in reversed(files)}
+
+
+def load_arm(name: str) -> Arm:
+    """
+    Return the arm described by a preset or a file.
+
+    Parameters
+    ----------
+    name : str
+        Name of a preset in ``config/arms``, or path of a YAML file.
+
+    Raises
+    ------
+    ArmFileError
+        If the file is missing, is no YAML, or a field is unknown, missing or out of bounds.
+
+    """
+    path = find_arm_file(name)
+    try:
+        if path.stat().st_size > _MAX_BYTES:
+            raise ArmFileError(f'{path}: the file is larger than {_MAX_BYTES} bytes')
+        content = yaml.safe_load(path.read_text(encoding='utf-8'))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise ArmFileError(f'{path}: cannot be read: {error}') from None
+    try:
+        return arm_from_mapping(content)
+    except InvalidValueError as error:
+        raise ArmFileError(f'{path}: {error}') from error
+
+
+def arm_from_mapping(content: object) -> Arm:
+    """
+    Return the arm described by the content of an arm file.
+
+    Raises
+    ------
+    InvalidValueError
+        Naming the field by its path in the file, e.g. ``links[1].length``.
+
+    """
+    top = _Section('', content)
+    arm_fields = dict(
+        name=top.text('name'), source=top.text('source', ''),
+        links=tuple(_link(section) for section in top.sections('links')),
+        joints=tuple(_joint(section) for section in top.sections('joints')),
+        nodes=tuple(_node(section) for section in top.sections('nodes', optional=True)))
+    gravity = top.take('gravity', (0.0, 0.0))
+    top.finish()
+    return Arm(gravity=gravity, **arm_fields)
+
+
+class _Section:
+    """A mapping of an arm file that knows its path and which keys were read."""
+
+    def __init__(self, path: str, content: object) -> None:
+        if not isinstance(content, Mapping):
+            raise InvalidValueError(path or 'the file', content, 'a mapping of fields')
+        self.path = path
+        self._left: dict[Any, Any] = dict(content)
+
+    def name(self, key: str) -> str:
+        """Return the path of a field."""
+        return f'{self.path}.{key}' if self.path else key
+
+    def has(self, key: str) -> bool:
+        """Return whether a field is given."""
+        return key in self._left
+
+    def take(self, key: str, default: Any = None) -> Any:
+        """Return a field; without a default it must be there."""
+        if key not in self._left and default is None:
+            raise InvalidValueError(self.name(key), None, 'given')
+        return self._left.pop(key, default)
+
+    def text(self, key: str, default: str | None = None) -> str:
+        """Return a text field."""
+        value = self.take(key, default)
+        if not isinstance(value, str):
+            raise InvalidValueError(self.name(key), value, 'text')
+        return value
+
+    def sections(self, key: str, optional: bool = False) -> Iterator[_Section]:
+        """Return the entries of a list of mappings."""
+        entries = self.take(key, () if optional else None)
+        if not isinstance(entries, Sequence) or isinstance(entries, str):
+            raise InvalidValueError(self.name(key), entries, 'a list')
+        return (_Section(f'{self.name(key)}[{i}]', entry) for i, entry in enumerate(entries))
+
+    def finish(self) -> None:
+        """Refuse fields that nobody read."""
+        for key in self._left:
+            raise InvalidValueError(self.name(str(key)), self._left[key],
+                                    'left out: there is no such field')
+
+    def build(self, kind: Any, **values: Any) -> Any:
+        """Construct a part; its errors name the field by its path."""
+        self.finish()
+        try:
+            return kind(**values)
+        except InvalidValueError as error:
+            raise InvalidValueError(self.name(error.field), error.value, error.bound) from None
+
+
+def _link(section: _Section) -> Link:
+    length = section.take('length')
+    if section.has('mass') == section.has('linear_density'):
+        given = 'given with linear_density' if section.has('mass') else None
+        raise InvalidValueError(section.name('mass'), given,
+                                'given, or linear_density in its place')
+    density = section.take('linear_density', math.nan)
+    if section.has('mass'):
+        density = _ratio(section, section.take('mass'), length)
+    modes = section.take('modes', 0)
+    link: Link = section.build(
+        Link, length=length, linear_density=density, modes=modes,
+        flexural_rigidity=section.take('flexural_rigidity', math.inf),
+        mode_family=section.take('mode_family', 'pinned_pinned'))
+    return link
+
+
+def _ratio(section: _Section, mass: object, length: object) -> float:
+    """Return mass over length; nonsense becomes NaN, which `Link` refuses by name."""
+    if isinstance(mass, (int, float)) and isinstance(length, (int, float)) and length:
+        return mass / length
+    raise InvalidValueError(section.name('mass'), mass, 'a finite number > 0 kg')
+
+
+def _joint(section: _Section) -> Joint:
+    motor = Motor()
+    if section.has('motor'):
+        part = _Section(section.name('motor'), section.take('motor'))
+        motor = part.build(Motor, stall_torque=part.take('stall_torque'),
+                           no_load_speed=part.take('no_load_speed', math.inf))
+    joint: Joint = section.build(Joint, motor=motor,
+                                 viscous_friction=section.take('viscous_friction', 0.0))
+    return joint
+
+
+def _node(section: _Section) -> Node:
+    node: Node = section.build(Node, mass=section.take('mass', 0.0),
+                               inertia=section.take('inertia', 0.0))
+    return node

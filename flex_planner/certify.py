@@ -1,0 +1,95 @@
+"""Every plan is checked by means that did not produce it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+from flex_planner.collocation import CollocationResult, CollocationSolution
+from flex_planner.kinematics import tip_position
+from flex_planner.motion import MotionProblem
+from flex_planner.plan import Certificate
+from flex_planner.simulation import PiecewisePolynomial, simulate
+from flex_planner.statics import residual_vibration
+from flex_planner.validation import Array
+import numpy as np
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CertificateLimits:
+    """
+    What a certificate must not exceed, entry by entry, to be passed.
+
+    The collocation residual has no limit here: the solver's tolerance is one already.
+
+    """
+
+    boundary_error: float = 1e-3
+    hamiltonian_drift: float = 0.02
+    tip_error: float = 1e-5
+    residual_vibration: float = 1e-4
+
+    def violations(self, certificate: Certificate) -> list[str]:
+        """Return a sentence for each limit that is not met."""
+        pairs = ((entry.name, getattr(certificate, entry.name), getattr(self, entry.name))
+                 for entry in fields(self))
+        return [f'{name.replace("_", " ")} is {value:.3g}, but must be <= {limit:g}'
+                for name, value, limit in pairs if not value <= limit]
+
+
+def certify(problem: MotionProblem, result: CollocationResult) -> Certificate:
+    """
+    Return the certificate of a solution.
+
+    The planned torque is applied to the original dynamics, from the start, by an integrator of
+    another kind; H is evaluated between the collocation points.
+
+    """
+    final = simulate(problem.model, problem.p, problem.start,
+                     torque_polynomial(problem, result.solution), problem.task.duration)
+    if not np.isfinite(final).all():
+        return Certificate(collocation_residual=result.residual)
+    arm, n_t = problem.model.arm, problem.model.arm.n_coordinates
+    miss = final - problem.goal
+    tips = tip_position(arm, np.stack([final[:n_t], problem.goal[:n_t]]))
+    return Certificate(
+        collocation_residual=result.residual, boundary_error=float(miss @ miss / 2),
+        hamiltonian_drift=hamiltonian_drift(problem, result.solution),
+        tip_error=float(np.linalg.norm(tips[0] - tips[1])),
+        residual_vibration=residual_vibration(problem.model, final, problem.goal[:n_t],
+                                              problem.p))
+
+
+def torque_polynomial(problem: MotionProblem,
+                      solution: CollocationSolution) -> PiecewisePolynomial:
+    """Return the planned torque as a polynomial in every interval of the mesh."""
+    theta = np.concatenate([[0.0], solution.rule.nodes, [1.0]])
+    times = solution.mesh[:-1, None] + solution.steps[:, None] * theta
+    torque = problem.model.controls(solution(times.ravel()), problem.p).torque
+    values = torque.reshape(solution.intervals, theta.size, -1)
+    return PiecewisePolynomial.through(solution.mesh, theta, values)
+
+
+def hamiltonian_drift(problem: MotionProblem, solution: CollocationSolution) -> float:
+    """Return the spread of H over the motion relative to the size of its terms."""
+    times = np.linspace(0, problem.task.duration, 4 * solution.intervals + 1)
+    z = solution(times)
+    controls = problem.model.controls(z, problem.p)
+    half = z.shape[1] // 2
+    powers = np.abs(z[:, half:] * problem.rate(times, z)[:, :half]).max(axis=1)
+    size = max(float(np.max(controls.cost_rate)), float(np.max(powers)), np.finfo(float).tiny)
+    return float(np.ptp(controls.hamiltonian)) / size
+
+
+def totals(problem: MotionProblem, solution: CollocationSolution) -> dict[str, float]:
+    """Return cost J, effort and energy, by Gauss quadrature on the mesh."""
+    n, n_t = problem.model.arm.n_joints, problem.model.arm.n_coordinates
+    z = solution.stage_values().reshape(-1, problem.size)
+    controls = problem.model.controls(z, problem.p)
+    weights = (solution.steps[:, None] * solution.rule.weights).ravel()
+
+    def integral(values: Array) -> float:
+        return float(weights @ values)
+
+    power = np.abs(controls.torque * z[:, n_t:n_t + n]).sum(axis=1)
+    return {'cost': integral(controls.cost_rate),
+            'effort': integral((controls.torque ** 2).sum(axis=1)), 'energy': integral(power)}

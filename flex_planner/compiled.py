@@ -1,0 +1,292 @@
+"""
+CasADi functions compiled to machine code, kept on disk, called for many points at once.
+
+A library is found again by a key that its builder computes without CasADi, so a warm start
+neither imports CasADi nor runs a compiler. The calls go through ctypes, which releases the
+interpreter lock. Without a C compiler CasADi's virtual machine evaluates the same functions.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+import ctypes
+from dataclasses import asdict, dataclass
+import hashlib
+import json
+import logging
+import os
+from pathlib import Path
+import platform
+import shutil
+import subprocess
+import tempfile
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Builder = Callable[[], Mapping[str, tuple[Any, int]]]
+
+_LOG = logging.getLogger(__name__)
+_FLAGS = ('-O1', '-fPIC', '-shared')
+_POINTERS = ctypes.POINTER(ctypes.c_void_p)
+
+
+@dataclass(frozen=True, slots=True)
+class Signature:
+    """Shapes of a function: entries of each input, (rows, columns) of each output."""
+
+    batched: int
+    inputs: tuple[int, ...]
+    outputs: tuple[tuple[int, int], ...]
+
+    @classmethod
+    def of(cls, function: Any, batched: int) -> Signature:
+        """Read the signature of a CasADi function."""
+        inputs = tuple(int(function.numel_in(i)) for i in range(function.n_in()))
+        outputs = tuple((int(function.size1_out(i)), int(function.size2_out(i)))
+                        for i in range(function.n_out()))
+        return cls(batched, inputs, outputs)
+
+    def prepare(self, inputs: Sequence[Array]) -> tuple[list[Array], list[Array]]:
+        """Return contiguous inputs and empty outputs, after a check of the shapes."""
+        arrays = [np.ascontiguousarray(values, dtype=float) for values in inputs]
+        count = arrays[0].shape[0]
+        shapes = [(count, size) for size in self.inputs[:self.batched]]
+        shapes += [(size,) for size in self.inputs[self.batched:]]  # type: ignore[misc]
+        given = [array.shape for array in arrays]
+        if given != shapes:
+            raise ValueError(f'inputs have shapes {given}, expected {shapes}')
+        # a matrix comes transposed from CasADi's column order, so rows and columns swap
+        outputs = [np.empty((count, rows) if columns == 1 else (count, columns, rows))
+                   for rows, columns in self.outputs]
+        return arrays, outputs
+
+
+class BatchFunction(Protocol):
+    """
+    A function of points: the first inputs are stacked point by point, the others shared.
+
+    Inputs of shape ``(k, size)`` or ``(size,)`` give outputs of shape ``(k, rows)`` or
+    ``(k, columns, rows)``: a matrix output arrives transposed.
+
+    """
+
+    def __call__(self, *inputs: Array) -> tuple[Array, ...]:
+        """Evaluate all points."""
+
+    def repeated(self, inputs: Sequence[Array], outputs: Sequence[Array]) -> Callable[[], None]:
+        """
+        Return a call that reads and writes the same arrays every time.
+
+        For loops over single points, where creating arrays would cost more than the function.
+        The arrays must be contiguous and of the shapes of ``__call__``.
+
+        """
+
+
+class _NativeFunction:
+    """A function of a compiled library."""
+
+    def __init__(self, library: ctypes.CDLL, name: str, signature: Signature) -> None:
+        self._call = getattr(library, f'{name}_batch')
+        self._call.argtypes = (ctypes.c_longlong, _POINTERS, _POINTERS)
+        self._call.restype = ctypes.c_int
+        self._signature = signature
+
+    def __call__(self, *inputs: Array) -> tuple[Array, ...]:
+        arrays, outputs = self._signature.prepare(inputs)
+        if self._call(len(arrays[0]), _pointers(arrays), _pointers(outputs)):
+            raise MemoryError('no memory to evaluate a compiled function')
+        return tuple(outputs)
+
+    def repeated(self, inputs: Sequence[Array], outputs: Sequence[Array]) -> Callable[[], None]:
+        count = len(inputs[0])
+        sources, targets, call = _pointers(inputs), _pointers(outputs), self._call
+        kept = (inputs, outputs)  # the addresses are good only while the arrays live
+
+        def run() -> None:
+            if call(count, sources, targets) or not kept:
+                raise MemoryError('no memory to evaluate a compiled function')
+
+        return run
+
+
+def _pointers(arrays: Sequence[Array]) -> ctypes.Array[ctypes.c_void_p]:
+    """Return the addresses of arrays as a C array."""
+    return (ctypes.c_void_p * len(arrays))(*(array.ctypes.data for array in arrays))
+
+
+class _InterpretedFunction:
+    """A function evaluated by CasADi's virtual machine."""
+
+    def __init__(self, function: Any, signature: Signature) -> None:
+        self._function = function
+        self._signature = signature
+
+    def __call__(self, *inputs: Array) -> tuple[Array, ...]:
+        arrays, outputs = self._signature.prepare(inputs)
+        batched = self._signature.batched
+        for point in range(len(arrays[0])):
+            row = [array[point] for array in arrays[:batched]] + arrays[batched:]
+            results = self._function.call(row)
+            for output, result in zip(outputs, results, strict=True):
+                output[point] = np.asarray(result.T).reshape(output[point].shape)
+        return tuple(outputs)
+
+    def repeated(self, inputs: Sequence[Array], outputs: Sequence[Array]) -> Callable[[], None]:
+        def run() -> None:
+            for target, result in zip(outputs, self(*inputs), strict=True):
+                target[...] = result
+
+        return run
+
+
+def cache_folder() -> Path:
+    """Return where compiled functions are kept: ``$XDG_CACHE_HOME/flex_planner``."""
+    root = os.environ.get('XDG_CACHE_HOME') or os.path.join(os.path.expanduser('~'), '.cache')
+    return Path(root) / 'flex_planner'
+
+
+def content_key(*parts: str | bytes) -> str:
+    """Return a short digest of what a library is made of, for its name on disk."""
+    digest = hashlib.sha256()
+    for part in (*parts, ' '.join(_FLAGS), platform.machine(), platform.system()):
+        data = part.encode() if isinstance(part, str) else part
+        digest.update(len(data).to_bytes(8, 'little') + data)
+    return digest.hexdigest()[:24]
+
+
+def load_functions(key: str, build: Builder) -> dict[str, BatchFunction]:
+    """
+    Return compiled functions: from the disk if they are there, else built and kept.
+
+    Parameters
+    ----------
+    key : str
+        From :func:`content_key`; equal keys mean equal functions.
+    build : callable
+        Returns the CasADi functions and the number of batched inputs of each, by name.
+
+    """
+    functions = _load(key)
+    if functions is not None:
+        return functions
+    built = build()
+    compiler = _compiler()
+    if compiler is None:
+        _LOG.warning('no C compiler (cc, gcc or clang) found: functions are interpreted, '
+                     'which makes a plan 10 to 50 times slower')
+        return {name: _InterpretedFunction(f, Signature.of(f, batched))
+                for name, (f, batched) in built.items()}
+    signatures = {name: Signature.of(f, batched) for name, (f, batched) in built.items()}
+    library = _compile(compiler, key, _source(built), signatures)
+    return _bind(library, signatures)
+
+
+def _compiler() -> str | None:
+    """Return the C compiler: ``$CC``, else the usual names."""
+    names = [os.environ.get('CC', ''), 'cc', 'gcc', 'clang']
+    return next((path for name in names if name and (path := shutil.which(name))), None)
+
+
+def _source(built: Mapping[str, tuple[Any, int]]) -> str:
+    """Return the C source of all functions with a loop over points around each."""
+    import casadi as ca
+
+    generator = ca.CodeGenerator('functions', {'with_header': False})
+    for function, _ in built.values():
+        generator.add(function)
+    loops = (_loop(name, function, batched) for name, (function, batched) in built.items())
+    return '\n'.join([str(generator.dump()), '#include <stdlib.h>', *loops])
+
+
+def _loop(name: str, function: Any, batched: int) -> str:
+    """Return C code that evaluates a function at n points; 1 means out of memory."""
+    signature = Signature.of(function, batched)
+    arguments = ''.join(
+        f'    arg[{i}] = in[{i}]' + (f' + k*{size}' if i < batched else '') + ';\n'
+        for i, size in enumerate(signature.inputs))
+    results = ''.join(f'    res[{i}] = out[{i}] + k*{rows * columns};\n'
+                      for i, (rows, columns) in enumerate(signature.outputs))
+    return f"""
+int {name}_batch(long long n, const double *const *in, double *const *out) {{
+  const double *arg[{function.sz_arg() + 1}];
+  double *res[{function.sz_res() + 1}];
+  long long iw[{function.sz_iw() + 1}];
+  double *w = malloc(sizeof(double) * {function.sz_w() + 1});
+  if (!w) return 1;
+  for (long long k = 0; k < n; ++k) {{
+{arguments}{results}    {name}(arg, res, iw, w, 0);
+  }}
+  free(w);
+  return 0;
+}}
+"""
+
+
+def _compile(compiler: str, key: str, source: str, signatures: Mapping[str, Signature]) -> Path:
+    """Compile in a private folder and put the result where `_load` finds it."""
+    folder = _writable_cache()
+    with tempfile.TemporaryDirectory(dir=folder, prefix='build-') as scratch:
+        code, library = Path(scratch, 'functions.c'), Path(scratch, 'functions.so')
+        code.write_text(source)
+        subprocess.run([compiler, *_FLAGS, str(code), '-o', str(library), '-lm'],
+                       check=True, capture_output=True)
+        digest = _digest(library)
+        # named by its content: two processes that build at once never mix their files
+        target = folder / f'{key}-{digest[:16]}.so'
+        os.replace(library, target)
+        record = {'library': target.name, 'sha256': digest,
+                  'functions': {name: asdict(s) for name, s in signatures.items()}}
+        entry = Path(scratch, 'entry.json')
+        entry.write_text(json.dumps(record))
+        os.replace(entry, folder / f'{key}.json')
+    return target
+
+
+def _writable_cache() -> Path:
+    """Return the cache folder, or a temporary one where it cannot be written."""
+    folder = cache_folder()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return folder
+    except OSError as error:
+        _LOG.warning('cannot keep compiled functions in %s (%s): they are built again at the '
+                     'next start', folder, error)
+        return Path(tempfile.mkdtemp(prefix='flex_planner-'))
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _load(key: str) -> dict[str, BatchFunction] | None:
+    """Return the functions kept under a key, or None if any part is missing or damaged."""
+    folder = cache_folder()
+    try:
+        record = json.loads((folder / f'{key}.json').read_text())
+        library = folder / record['library']
+        # a damaged library would end the process when loaded, so it is read first
+        if _digest(library) != record['sha256']:
+            raise ValueError('wrong checksum')
+        signatures = {
+            name: Signature(entry['batched'], tuple(entry['inputs']),
+                            tuple((rows, columns) for rows, columns in entry['outputs']))
+            for name, entry in record['functions'].items()}
+        return _bind(library, signatures)
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        _LOG.warning('compiled functions %s are damaged (%s) and are built again', key, error)
+        return None
+
+
+def _bind(library: Path, signatures: Mapping[str, Signature]) -> dict[str, BatchFunction]:
+    """Load a library."""
+    handle = ctypes.CDLL(str(library))
+    return {name: _NativeFunction(handle, name, signature)
+            for name, signature in signatures.items()}

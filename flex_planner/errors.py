@@ -1,0 +1,54 @@
+"""
+Exceptions that flex_planner raises.
+
+Bad input raises; a numerical failure does not: it is a status of the plan.
+
+"""
+
+from __future__ import annotations
+
+
+class FlexPlannerError(Exception):
+    """Base of every exception that flex_planner raises on purpose."""
+
+
+class InvalidValueError(FlexPlannerError, ValueError):
+    """
+    A value in an arm, a task or a setting breaks its bound.
+
+    Parameters
+    ----------
+    field : str
+        Name of the field, as the user wrote it.
+    value : object
+        What was given.
+    bound : str
+        What was expected, in words, e.g. ``'> 0 m'``.
+
+    """
+
+    def __init__(self, field: str, value: object, bound: str) -> None:
+        self.field = field
+        self.value = value
+        self.bound = bound
+        super().__init__(f'{field} is {value!r}, but must be {bound}')
+
+
+class InvalidSizeError(InvalidValueError):
+    """A list has the wrong number of entries."""
+
+
+class NotFiniteError(InvalidValueError):
+    """A number is infinite or NaN where it must be finite."""
+
+
+class UnreachableError(FlexPlannerError):
+    """The arm cannot place its tip at a point: condition (I) of the paper, first part."""
+
+
+class SingularError(FlexPlannerError):
+    """The arm loses a direction of motion at a point: condition (I), second part."""
+
+
+class RecordingError(FlexPlannerError):
+    """A recording cannot be written or read."""

@@ -1,0 +1,83 @@
+"""How long work reports where it is, and how it is told to stop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+import math
+import time
+
+
+class StopReason(Enum):
+    """Why work was stopped from outside; the value is shown to people."""
+
+    CANCELED = 'canceled'
+    TIMEOUT = 'time limit reached'
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Progress:
+    """
+    One line of progress.
+
+    Attributes
+    ----------
+    phase : str
+        What is being solved.
+    iteration : int
+        Newton iterations so far.
+    residual : float
+        Size of the last Newton correction relative to the unknowns.
+    intervals : int
+        Intervals of the mesh.
+
+    """
+
+    phase: str
+    iteration: int
+    residual: float
+    intervals: int
+
+
+@dataclass(slots=True, kw_only=True)
+class Monitor:
+    """
+    Watches work: receives its progress, and asks it to stop.
+
+    Parameters
+    ----------
+    time_limit : float
+        From creation [s].
+    canceled : callable
+        Returns True once the work should stop; called from the working thread.
+    report : callable
+        Receives a `Progress` per iteration; called from the working thread.
+
+    """
+
+    time_limit: float = math.inf
+    canceled: Callable[[], bool] = lambda: False
+    report: Callable[[Progress], None] = lambda progress: None
+    phase: str = ''
+    iteration: int = 0
+    started: float = field(default_factory=time.monotonic)
+
+    @property
+    def elapsed(self) -> float:
+        """Time since creation [s]."""
+        return time.monotonic() - self.started
+
+    def stop_reason(self) -> StopReason | None:
+        """Return why to stop now, or None to go on."""
+        if self.canceled():
+            return StopReason.CANCELED
+        if self.elapsed > self.time_limit:
+            return StopReason.TIMEOUT
+        return None
+
+    def step(self, residual: float, intervals: int) -> None:
+        """Count and report an iteration."""
+        self.iteration += 1
+        self.report(Progress(phase=self.phase, iteration=self.iteration, residual=residual,
+                             intervals=intervals))

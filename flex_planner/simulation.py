@@ -1,0 +1,80 @@
+"""Integration of the arm's motion under given torques, independent of the collocation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from flex_planner.model import ArmModel
+from flex_planner.validation import Array
+import numpy as np
+from scipy.integrate import solve_ivp
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PiecewisePolynomial:
+    """
+    A vector function of time, quick to evaluate at one time.
+
+    Attributes
+    ----------
+    breaks : numpy.ndarray, shape (N + 1,)
+        Increasing.
+    coefficients : numpy.ndarray, shape (N, d + 1, k)
+        Lowest power first, of the time since the interval's start over its length.
+
+    """
+
+    breaks: Array
+    coefficients: Array
+
+    @classmethod
+    def through(cls, breaks: Array, theta: Array, values: Array) -> PiecewisePolynomial:
+        """Interpolate values (N, d + 1, k) at positions theta (d + 1,) in each interval."""
+        powers = np.vander(theta, increasing=True)
+        return cls(breaks, np.linalg.solve(powers[None], values))
+
+    def __call__(self, time: float) -> Array:
+        """Return the value at one time, shape (k,)."""
+        last = self.breaks.size - 2
+        k = min(max(int(self.breaks.searchsorted(time, 'right')) - 1, 0), last)
+        start, end = self.breaks[k], self.breaks[k + 1]
+        theta = (time - start) / (end - start)
+        pieces = self.coefficients[k]
+        value: Array = pieces[-1]
+        for coefficient in pieces[-2::-1]:
+            value = value * theta + coefficient
+        return value
+
+
+def simulate(model: ArmModel, p: Array, state: Array, torque: Callable[[float], Array],
+             duration: float, *, rtol: float = 1e-9, atol: float = 1e-11) -> Array:
+    """
+    Return the state after a time under open-loop torques, by SciPy's DOP853.
+
+    Parameters
+    ----------
+    model : ArmModel
+        n joints, n_t coordinates.
+    p : numpy.ndarray
+        Stacked `Parameters` of the plant; its motor limits are not applied.
+    state : numpy.ndarray, shape (2 n_t,)
+        At time 0.
+    torque : callable
+        Time [s] to torques (n,) [N m].
+    duration : float
+        [s].
+    rtol, atol : float
+        Of the integrator.
+
+    Returns
+    -------
+    numpy.ndarray, shape (2 n_t,)
+        NaN if the integration failed.
+
+    """
+    rate = model.state_rate(p)
+    result = solve_ivp(lambda t, x: rate(x, torque(t)).copy(), (0.0, duration), state,
+                       method='DOP853', rtol=rtol, atol=atol)
+    final: Array = result.y[:, -1] if result.success else np.full_like(state, np.nan)
+    return final

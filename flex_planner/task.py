@@ -1,0 +1,114 @@
+"""What is asked of the planner: a point-to-point motion and how to judge it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from flex_planner.arm import Arm
+from flex_planner.errors import InvalidValueError
+from flex_planner.kinematics import inverse_kinematics
+from flex_planner.validation import Array, number, vector
+import numpy as np
+from numpy.typing import ArrayLike
+
+MAX_JOINT_ANGLE = 100.0
+MAX_DURATION = 1000.0
+MAX_PAYLOAD = 1e6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Task:
+    """
+    A rest-to-rest motion between two postures, with the weights of eq. (7).
+
+    Parameters
+    ----------
+    arm : Arm
+        n joints, n_t coordinates.
+    start_positions, goal_positions : array_like, shape (n,)
+        Joint angles, within +-100 rad.
+    duration : float
+        t_f, > 0 and at most 1000 [s].
+    payload_mass : float
+        m_p, >= 0 and at most 1e6 [kg].
+    effort_weights : array_like, shape (n,)
+        Diagonal of R, > 0; empty for ones.
+    position_weights, velocity_weights : array_like, shape (n,) or (n_t,)
+        Diagonals of W_1 and W_2, >= 0; empty for zeros, n entries for the joints alone.
+    tolerance : float
+        eps of eq. (17) with W_p = W_v = 1, > 0 and at most 1.
+
+    Raises
+    ------
+    InvalidValueError
+        Naming field, value and bound.
+
+    """
+
+    arm: Arm
+    start_positions: Array
+    goal_positions: Array
+    duration: float
+    payload_mass: float = 0.0
+    effort_weights: Array = field(default_factory=lambda: np.zeros(0))
+    position_weights: Array = field(default_factory=lambda: np.zeros(0))
+    velocity_weights: Array = field(default_factory=lambda: np.zeros(0))
+    tolerance: float = 1e-3
+
+    def __post_init__(self) -> None:
+        n, n_t = self.arm.n_joints, self.arm.n_coordinates
+        for name in ('start_positions', 'goal_positions'):
+            self._set(name, vector(name, getattr(self, name), n, at_least=-MAX_JOINT_ANGLE,
+                                   at_most=MAX_JOINT_ANGLE, unit='rad'))
+        number('duration', self.duration, above=0, at_most=MAX_DURATION, unit='s')
+        number('payload_mass', self.payload_mass, at_least=0, at_most=MAX_PAYLOAD, unit='kg')
+        number('tolerance', self.tolerance, above=0, at_most=1)
+        effort = vector('effort_weights', self.effort_weights, (0, n), above=0)
+        self._set('effort_weights', effort if effort.size else vector('', np.ones(n), n))
+        for name in ('position_weights', 'velocity_weights'):
+            given = vector(name, getattr(self, name), (0, n, n_t), at_least=0)
+            padded = np.concatenate([given, np.zeros(n_t - given.size)])
+            self._set(name, vector(name, padded, n_t))
+
+    def _set(self, name: str, value: Array) -> None:
+        object.__setattr__(self, name, value)
+
+
+def postures_from_points(arm: Arm, start: ArrayLike, goal: ArrayLike,
+                         elbow: int) -> tuple[Array, Array]:
+    """
+    Return start and goal joint angles of a motion between two points of the tip.
+
+    The goal's first angle is the one nearest to the start's, so that the arm does not make a
+    needless full turn.
+
+    Parameters
+    ----------
+    start, goal : array_like, shape (2,)
+        Tip positions in the base frame [m].
+    elbow : int
+        Sign of the second joint angle, +1 or -1.
+
+    Returns
+    -------
+    tuple of numpy.ndarray, shape (n,)
+        [rad].
+
+    Raises
+    ------
+    UnreachableError, SingularError, InvalidValueError
+        See :func:`flex_planner.kinematics.inverse_kinematics`; the message says which point.
+
+    """
+    postures = []
+    for name, point in (('start_point', start), ('goal_point', goal)):
+        checked = vector(name, point, 2, unit='m')
+        try:
+            postures.append(inverse_kinematics(arm, checked, elbow))
+        except InvalidValueError:
+            raise
+        except Exception as error:
+            raise type(error)(f'{name}: {error}') from None
+    first, last = postures
+    last[0] += 2 * np.pi * np.round((first[0] - last[0]) / (2 * np.pi))
+    return first, last
