@@ -56,7 +56,7 @@ class Link:
         integer('modes', self.modes, at_least=0, at_most=MAX_MODES)
         number('flexural_rigidity', self.flexural_rigidity, above=0, infinite=self.modes == 0,
                unit='N m^2 (needed for a link with modes)')
-        if self.mode_family not in FAMILIES:
+        if self.mode_family not in list(FAMILIES):
             raise InvalidValueError('mode_family', self.mode_family, f'one of {list(FAMILIES)}')
 
     @property

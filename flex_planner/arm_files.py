@@ -17,6 +17,7 @@ from typing import Any
 
 from flex_planner.arm import Arm, Joint, Link, Motor, Node
 from flex_planner.errors import FlexPlannerError, InvalidValueError
+from flex_planner.validation import number
 import yaml
 
 _MAX_BYTES = 1_000_000
@@ -83,7 +84,7 @@ def load_arm(name: str) -> Arm:
         if path.stat().st_size > _MAX_BYTES:
             raise ArmFileError(f'{path}: the file is larger than {_MAX_BYTES} bytes')
         content = yaml.safe_load(path.read_text(encoding='utf-8'))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+    except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
         raise ArmFileError(f'{path}: cannot be read: {error}') from None
     try:
         return arm_from_mapping(content)
@@ -182,10 +183,9 @@ def _link(section: _Section) -> Link:
 
 
 def _ratio(section: _Section, mass: object, length: object) -> float:
-    """Return mass over length; nonsense becomes NaN, which `Link` refuses by name."""
-    if isinstance(mass, (int, float)) and isinstance(length, (int, float)) and length:
-        return mass / length
-    raise InvalidValueError(section.name('mass'), mass, 'a finite number > 0 kg')
+    """Return mass over length, both checked under the names that the file gives them."""
+    return (number(section.name('mass'), mass, above=0, unit='kg')
+            / number(section.name('length'), length, above=0, unit='m'))
 
 
 def _joint(section: _Section) -> Joint:

@@ -42,6 +42,10 @@ class NotFiniteError(InvalidValueError):
     """A number is infinite or NaN where it must be finite."""
 
 
+class InvalidTaskError(FlexPlannerError):
+    """The parts of a task do not go together, or not with the arm."""
+
+
 class UnreachableError(FlexPlannerError):
     """The arm cannot place its tip at a point: condition (I) of the paper, first part."""
 

@@ -9,7 +9,12 @@ check the other.
 from __future__ import annotations
 
 from flex_planner.arm import Arm
-from flex_planner.errors import InvalidValueError, SingularError, UnreachableError
+from flex_planner.errors import (
+    InvalidTaskError,
+    InvalidValueError,
+    SingularError,
+    UnreachableError,
+)
 from flex_planner.validation import Array
 import numpy as np
 from numpy.typing import ArrayLike
@@ -141,13 +146,15 @@ def inverse_kinematics(arm: Arm, point: ArrayLike, elbow: int) -> Array:
         If the point is out of the workspace.
     SingularError
         If the arm is stretched out or folded there.
+    InvalidTaskError
+        If the arm has not two links.
     InvalidValueError
-        If the arm has not two links or `elbow` is not +1 or -1.
+        If `elbow` is not +1 or -1.
 
     """
     if arm.n_joints != 2:
-        raise InvalidValueError('number of links', arm.n_joints,
-                                '2 for a goal in Cartesian space; give joint angles instead')
+        raise InvalidTaskError(f'the arm has {arm.n_joints} links; points of the tip determine '
+                               'the joint angles of two links only: give joint angles instead')
     if elbow not in (-1, 1):
         raise InvalidValueError('elbow', elbow, '+1 or -1')
     x, y = np.asarray(point, dtype=float)

@@ -41,14 +41,12 @@ class PiecewisePolynomial:
         start, end = self.breaks[k], self.breaks[k + 1]
         theta = (time - start) / (end - start)
         pieces = self.coefficients[k]
-        value: Array = pieces[-1]
-        for coefficient in pieces[-2::-1]:
-            value = value * theta + coefficient
+        value: Array = theta ** np.arange(len(pieces)) @ pieces
         return value
 
 
 def simulate(model: ArmModel, p: Array, state: Array, torque: Callable[[float], Array],
-             duration: float, *, rtol: float = 1e-9, atol: float = 1e-11) -> Array:
+             duration: float, *, rtol: float = 1e-8, atol: float = 1e-10) -> Array:
     """
     Return the state after a time under open-loop torques, by SciPy's DOP853.
 

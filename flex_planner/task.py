@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from flex_planner.arm import Arm
-from flex_planner.errors import InvalidValueError
+from flex_planner.errors import SingularError, UnreachableError
 from flex_planner.kinematics import inverse_kinematics
 from flex_planner.validation import Array, number, vector
 import numpy as np
@@ -96,7 +96,7 @@ def postures_from_points(arm: Arm, start: ArrayLike, goal: ArrayLike,
 
     Raises
     ------
-    UnreachableError, SingularError, InvalidValueError
+    UnreachableError, SingularError, InvalidTaskError, InvalidValueError
         See :func:`flex_planner.kinematics.inverse_kinematics`; the message says which point.
 
     """
@@ -105,9 +105,7 @@ def postures_from_points(arm: Arm, start: ArrayLike, goal: ArrayLike,
         checked = vector(name, point, 2, unit='m')
         try:
             postures.append(inverse_kinematics(arm, checked, elbow))
-        except InvalidValueError:
-            raise
-        except Exception as error:
+        except (UnreachableError, SingularError) as error:
             raise type(error)(f'{name}: {error}') from None
     first, last = postures
     last[0] += 2 * np.pi * np.round((first[0] - last[0]) / (2 * np.pi))

@@ -47,7 +47,10 @@ def number(
     bound = _bound(above, at_least, at_most, unit)
     if isinstance(value, bool) or not isinstance(value, (int, float, np.floating, np.integer)):
         raise InvalidValueError(field, value, f'a number {bound}'.rstrip())
-    result = float(value)
+    try:
+        result = float(value)
+    except OverflowError:  # an integer beyond every float
+        result = math.inf
     if math.isnan(result) or (math.isinf(result) and not infinite):
         raise NotFiniteError(field, result, f'a finite number {bound}'.rstrip())
     if not above < result or not at_least <= result <= at_most:
@@ -117,7 +120,7 @@ def vector(
     wanted = ' or '.join(str(entry) for entry in sizes)
     try:
         array = np.array(values, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InvalidValueError(field, values, f'a list of {wanted} numbers') from None
     if array.ndim != 1 or array.size not in sizes:
         given = f'{array.size} numbers' if array.ndim == 1 else f'an array of shape {array.shape}'

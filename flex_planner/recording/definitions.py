@@ -1,0 +1,227 @@
+"""
+Definitions of message types, and the encoding of messages that follows from them.
+
+The standard types of ROS 2 Jazzy come with rosbags; our own are read from their .msg files. CDR
+is produced here because rclpy's ``serialize_message`` leaves the padding uninitialised.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+import os
+from pathlib import Path
+import struct
+import sys
+from typing import Any, cast, Final
+
+from flex_planner.errors import RecordingError
+from flex_planner.recording.conversion import convert_message
+from rosbags.interfaces import Nodetype
+from rosbags.interfaces.typing import FieldDesc, Typesdict
+from rosbags.serde import SerdeError
+from rosbags.typesys import get_types_from_msg, get_typestore, Stores, TypesysError
+from rosbags.typesys.store import Typestore
+
+SEPARATOR: Final = 80 * '='
+
+
+def definition_folder(package: str, environment: Mapping[str, str] | None = None) -> Path:
+    """
+    Find the folder that holds a package's ``msg/`` folder, without importing ROS.
+
+    The prefixes in AMENT_PREFIX_PATH come first, then Python's own prefix (wheels), then the
+    folder that a source checkout has beside ``flex_planner``.
+
+    Parameters
+    ----------
+    package : str
+        Name of the interface package.
+    environment : mapping, optional
+        Environment variables; default ``os.environ``.
+
+    Raises
+    ------
+    RecordingError
+        If none of these places has it.
+
+    """
+    variables = os.environ if environment is None else environment
+    prefixes = [p for p in variables.get('AMENT_PREFIX_PATH', '').split(os.pathsep) if p]
+    places = [Path(prefix) / 'share' / package for prefix in [*prefixes, sys.prefix]]
+    places.append(Path(__file__).resolve().parents[2] / package)
+    for place in places:
+        if (place / 'msg').is_dir():
+            return place
+    raise RecordingError(f'no definitions of {package} in {", ".join(map(str, places))}')
+
+
+class MessageTypes:
+    """
+    The message types that a recording can hold.
+
+    Parameters
+    ----------
+    store : Typestore
+        Definitions and classes.
+    texts : mapping of str to str
+        Text of the .msg file of a type, where known: it goes into the schema with its comments,
+        so that a recording explains its units.
+
+    """
+
+    def __init__(self, store: Typestore, texts: Mapping[str, str]) -> None:
+        self._store = store
+        self._texts = dict(texts)
+
+    @classmethod
+    def load(cls, definition_folders: Iterable[Path | str] = ()) -> MessageTypes:
+        """
+        Return the standard types together with those of interface packages.
+
+        Parameters
+        ----------
+        definition_folders : iterable of path
+            Folders ``<package>/`` that contain ``msg/*.msg``, e.g. ``share/<package>``. Services
+            and actions are not topics and are left out.
+
+        Raises
+        ------
+        RecordingError
+            If a folder has no definitions, or one is malformed, contradicts a standard type or
+            uses an unknown one.
+
+        """
+        store = get_typestore(Stores.ROS2_JAZZY)
+        texts: dict[str, str] = {}
+        for folder in definition_folders:
+            texts.update(_read_texts(Path(folder)))
+        _register(store, texts)
+        for name, (constants, fields) in store.fielddefs.items():
+            store.fielddefs[name] = (constants, [(f, _without_char(d)) for f, d in fields])
+        types = cls(store, texts)
+        for name in texts:
+            list(types._dependencies(name))
+        return types
+
+    def __contains__(self, type_name: str) -> bool:
+        """Return whether a type is known."""
+        return type_name in self._store.fielddefs
+
+    def message_class(self, type_name: str) -> type:
+        """Return a dataclass for messages of a type, for use without ROS."""
+        self._require(type_name)
+        return self._store.types[type_name]
+
+    def type_hash(self, type_name: str) -> str:
+        """Return the RIHS01 hash of a type (REP-2016)."""
+        self._require(type_name)
+        return self._store.hash_rihs01(type_name)
+
+    def schema(self, type_name: str) -> str:
+        """Return the definition of a type and of all types within it, encoding ``ros2msg``."""
+        parts = [self._text(type_name)]
+        for name in dict.fromkeys(self._dependencies(type_name)):
+            parts.append(f'{SEPARATOR}\nMSG: {name.replace("/msg/", "/")}\n{self._text(name)}')
+        return ''.join(parts)
+
+    def encode(self, type_name: str, message: object) -> bytes:
+        """
+        Return a message in CDR, little endian, padded with zeros.
+
+        Raises
+        ------
+        InvalidValueError
+            If a field is missing or its value does not fit its type.
+
+        """
+        self._require(type_name)
+        path = type_name.rpartition('/')[2]
+        converted = convert_message(self._store, type_name, message, path)
+        return bytes(self._store.serialize_cdr(converted, type_name, little_endian=True))
+
+    def decode(self, type_name: str, data: bytes) -> Any:
+        """
+        Return the message that CDR bytes stand for.
+
+        Spare bytes at the end are tolerated: rclpy leaves them behind an empty sequence, and
+        ``ros2 bag record`` keeps them.
+
+        Raises
+        ------
+        RecordingError
+            If the bytes are not a message of this type.
+
+        """
+        self._require(type_name)
+        definition = self._store.get_msgdef(type_name)
+        if data[:2] not in (b'\x00\x00', b'\x00\x01'):
+            raise RecordingError(f'a {type_name} starts with {data[:4]!r}, which is not CDR')
+        little = definition.deserialize_cdr_le
+        decoder = little if data[1] else definition.deserialize_cdr_be
+        try:
+            return decoder(data[4:], 0, definition.cls, self._store)[0]
+        except (SerdeError, struct.error, ValueError) as error:
+            raise RecordingError(f'{len(data)} bytes are not a {type_name}: {error}') from error
+
+    def _require(self, type_name: str) -> None:
+        """Raise if a type is unknown."""
+        if type_name not in self:
+            raise RecordingError(f'unknown message type {type_name}')
+
+    def _text(self, type_name: str) -> str:
+        """Return the definition of one type, ending in a newline."""
+        self._require(type_name)
+        if type_name in self._texts:
+            return self._texts[type_name]
+        return self._store.gendefhash(type_name, {}, ros_version=2)[0]
+
+    def _dependencies(self, type_name: str) -> Iterator[str]:
+        """Yield the types within a type, depth first; some of them more than once."""
+        self._require(type_name)
+        for _, description in self._store.fielddefs[type_name][1]:
+            nested = _nested_type(description)
+            if nested is not None:
+                yield nested
+                yield from self._dependencies(nested)
+
+
+def _read_texts(folder: Path) -> dict[str, str]:
+    """Return the text of every .msg file of a package by the name of its type."""
+    files = sorted((folder / 'msg').glob('*.msg'))
+    if not files:
+        raise RecordingError(f'no .msg files in {folder / "msg"}')
+    try:
+        texts = {file.stem: file.read_text(encoding='utf-8') for file in files}
+    except (OSError, UnicodeDecodeError) as error:
+        raise RecordingError(f'cannot read the definitions in {folder}: {error}') from error
+    return {f'{folder.name}/msg/{stem}': f'{text.rstrip()}\n' for stem, text in texts.items()}
+
+
+def _register(store: Typestore, texts: Mapping[str, str]) -> None:
+    """Add types to a store."""
+    definitions: Typesdict = {}
+    for name, text in texts.items():
+        try:
+            definitions.update(get_types_from_msg(text, name))
+            store.register({name: definitions[name]})
+        except TypesysError as error:
+            raise RecordingError(f'cannot use the definition of {name}: {error}') from error
+
+
+def _nested_type(description: FieldDesc) -> str | None:
+    """Return the message type of a field, if it is one or a sequence of one."""
+    kind, detail = description
+    if kind in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+        kind, detail = cast(FieldDesc, detail[0])
+    return cast(str, detail) if kind == Nodetype.NAME else None
+
+
+def _without_char(description: FieldDesc) -> FieldDesc:
+    """Return a description with uint8 for char: in ROS 2 they are one type, also in the hash."""
+    kind, detail = description
+    if kind == Nodetype.BASE and detail[0] == 'char':
+        return cast(FieldDesc, (kind, ('uint8', 0)))
+    if kind in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+        return cast(FieldDesc, (kind, (_without_char(cast(FieldDesc, detail[0])), detail[1])))
+    return description

@@ -1,0 +1,138 @@
+"""What a recording holds: rosbag2's metadata.yaml, version 9."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+from flex_planner.errors import InvalidValueError
+from flex_planner.recording.topics import Topic
+import yaml
+
+METADATA_VERSION: Final = 9
+ROS_DISTRO: Final = 'jazzy'
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TopicSummary:
+    """
+    A topic with the number of its messages.
+
+    Parameters
+    ----------
+    topic : Topic
+        Name, type and quality of service.
+    type_hash : str
+        RIHS01 hash of the type's definition (REP-2016).
+    message_count : int
+        Number of messages.
+
+    """
+
+    topic: Topic
+    type_hash: str
+    message_count: int
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the entry of ``topics_with_message_count``."""
+        return {
+            'topic_metadata': {
+                'name': self.topic.name,
+                'type': self.topic.type_name,
+                'serialization_format': 'cdr',
+                'offered_qos_profiles': [self.topic.qos.to_dict()],
+                'type_description_hash': self.type_hash,
+            },
+            'message_count': self.message_count,
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecordingMetadata:
+    """
+    Summary of a recording.
+
+    Parameters
+    ----------
+    file_name : str
+        Name of the MCAP file.
+    start_ns, end_ns : int
+        Log time of the first and the last message [ns].
+    topics : tuple of TopicSummary
+        Topics in the order of their first message.
+    custom_data : mapping of str to str
+        Free text of the writer, e.g. the version of the planner.
+
+    """
+
+    file_name: str
+    start_ns: int
+    end_ns: int
+    topics: tuple[TopicSummary, ...]
+    custom_data: Mapping[str, str]
+
+    def __post_init__(self) -> None:
+        """Check and copy the custom data."""
+        object.__setattr__(self, 'custom_data', checked_custom_data(self.custom_data))
+
+    @property
+    def message_count(self) -> int:
+        """Return the number of messages on all topics."""
+        return sum(topic.message_count for topic in self.topics)
+
+    @property
+    def duration_ns(self) -> int:
+        """Return the time from the first to the last message [ns]."""
+        return self.end_ns - self.start_ns
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the mapping that rosbag2 reads; at version 9 every key is mandatory."""
+        return {
+            'version': METADATA_VERSION,
+            'storage_identifier': 'mcap',
+            **self._extent(),
+            'topics_with_message_count': [topic.to_dict() for topic in self.topics],
+            'compression_format': '',
+            'compression_mode': '',
+            'relative_file_paths': [self.file_name],
+            'files': [{'path': self.file_name, **self._extent()}],
+            'custom_data': dict(self.custom_data),
+            'ros_distro': ROS_DISTRO,
+        }
+
+    def to_record(self) -> str:
+        """Return the text of the MCAP metadata record ``rosbag2``."""
+        return _dump(self.to_dict())
+
+    def to_file(self) -> str:
+        """Return the text of metadata.yaml."""
+        return _dump({'rosbag2_bagfile_information': self.to_dict()})
+
+    def _extent(self) -> dict[str, object]:
+        """Return duration, start and count; a new object, else YAML would write an alias."""
+        return {
+            'duration': {'nanoseconds': self.duration_ns},
+            'starting_time': {'nanoseconds_since_epoch': self.start_ns},
+            'message_count': self.message_count,
+        }
+
+
+def checked_custom_data(custom_data: Mapping[str, str]) -> Mapping[str, str]:
+    """Return a read-only copy of custom data, which rosbag2 reads as strings only."""
+    for key, value in custom_data.items():
+        if not _is_text(key) or not _is_text(value):
+            raise InvalidValueError(f'custom_data[{key!r}]', value, 'a string under a string')
+    return MappingProxyType(dict(custom_data))
+
+
+def _is_text(value: object) -> bool:
+    """Return whether a value is a string that UTF-8 can hold."""
+    return isinstance(value, str) and value == value.encode(errors='ignore').decode()
+
+
+def _dump(content: dict[str, object]) -> str:
+    """Return the YAML text of a mapping, in the order given."""
+    text: str = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=1000)
+    return text

@@ -1,0 +1,1 @@
+"""The ROS 2 nodes: callbacks convert, the core computes, results are converted back."""

@@ -1,0 +1,133 @@
+"""The planner node: a service that plans, topics that carry the plan to controllers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from flex_planner.arm_files import load_arm
+from flex_planner.model import ArmModel
+from flex_planner.ros.parameters import declare, judge_changes, validated_changes
+from flex_planner.ros.planning import busy, Outcome, Planning, unknown_failure
+from flex_planner.ros.recorder import OutcomeRecorder
+from flex_planner.ros.running import run_node
+from flex_planner.ros.settings import PlannerSettings
+from flex_planner.ros.worker import Worker
+from flex_planner_interfaces.msg import FlexibleTrajectory
+from flex_planner_interfaces.srv import PlanPath
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.task import Future
+from trajectory_msgs.msg import JointTrajectory
+
+LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
+                     durability=DurabilityPolicy.TRANSIENT_LOCAL)
+_STOP_TIMEOUT = 0.5
+
+
+class PlannerNode(Node):  # type: ignore[misc]
+    """
+    Plans motions of one arm on request.
+
+    Services
+    --------
+    ~/plan_path : flex_planner_interfaces/srv/PlanPath
+
+    Topics published
+    ----------------
+    ~/joint_trajectory : trajectory_msgs/msg/JointTrajectory, latched
+    ~/flexible_trajectory : flex_planner_interfaces/msg/FlexibleTrajectory, latched
+
+    Raises
+    ------
+    FlexPlannerError
+        If a parameter or the arm's file is wrong.
+
+    """
+
+    def __init__(self) -> None:
+        super().__init__('flex_planner')
+        arm = load_arm(self._arm_parameter())
+        self._settings = declare(self, PlannerSettings.for_arm(arm))
+        self.add_on_set_parameters_callback(self._judge_parameters)
+        self.add_post_set_parameters_callback(self._apply_parameters)
+        self.get_logger().info(f'preparing the dynamics of {arm.name}')
+        self._planning = Planning(ArmModel(arm),
+                                  OutcomeRecorder(arm, self.get_fully_qualified_name()))
+        self._worker = Worker(self._settings.queue_length)
+        self._joints = self.create_publisher(JointTrajectory, '~/joint_trajectory', LATCHED)
+        self._flexible = self.create_publisher(
+            FlexibleTrajectory, '~/flexible_trajectory', LATCHED)
+        self.create_service(PlanPath, '~/plan_path', self._on_plan_path)
+        self.get_logger().info(f'ready to plan for {arm.name}')
+
+    def _arm_parameter(self) -> str:
+        description = ParameterDescriptor(
+            description='Name of a preset in config/arms, or path of an arm file.',
+            read_only=True)
+        value = self.declare_parameter('arm', 'korayem_ei50', description).value
+        return str(value)
+
+    def _judge_parameters(self, changes: list[Parameter]) -> SetParametersResult:
+        return judge_changes(self._settings, changes)
+
+    def _apply_parameters(self, changes: list[Parameter]) -> None:
+        self._settings = validated_changes(self._settings, changes)
+
+    async def _on_plan_path(self, request: PlanPath.Request,
+                            response: PlanPath.Response) -> PlanPath.Response:
+        """Answer a request: an exception here would end the node."""
+        try:
+            outcome = await self._outcome(request)
+            if request.task.publish and outcome.publishable:
+                self._publish(outcome)
+        except Exception as error:
+            self.get_logger().error(f'plan_path failed: {type(error).__name__}: {error}')
+            outcome = unknown_failure(error)
+        self._log(outcome)
+        response.report, response.trajectory = outcome.report, outcome.trajectory
+        return response
+
+    def _outcome(self, request: PlanPath.Request) -> Future:
+        """Hand a request to the worker and return what it will lead to."""
+        executor, settings = self.executor, self._settings
+        future = Future(executor=executor)
+
+        def job() -> None:
+            future.set_result(self._planning.plan(request.task, settings,
+                                                  lambda: self._worker.stopping))
+            # a future that another thread completes does not wake the executor by itself
+            executor.wake()
+
+        if not self._worker.submit(job):
+            future.set_result(busy(settings.queue_length))
+        return future
+
+    def _publish(self, outcome: Outcome) -> None:
+        self._joints.publish(outcome.trajectory.joint_trajectory)
+        self._flexible.publish(outcome.trajectory)
+
+    def _log(self, outcome: Outcome) -> None:
+        report = outcome.report
+        seconds = report.planning_time.sec + report.planning_time.nanosec * 1e-9
+        if outcome.publishable:
+            self.get_logger().info(
+                f'planned in {seconds:.2f} s ({report.strategy}): J = {report.cost:.6g}, tip '
+                f'error {report.tip_error * 1e3:.2g} mm, recorded in {report.recording or "-"}')
+        else:
+            self.get_logger().warning(f'error {report.error_code}: {report.error_msg}')
+
+    def destroy_node(self) -> Any:
+        """Stop the worker, then the node."""
+        self._worker.stop(_STOP_TIMEOUT)
+        return super().destroy_node()
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the planner node until it is told to stop."""
+    run_node(PlannerNode, 'flex_planner', args)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,63 @@
+"""Nodes in processes of their own, started and ended by whoever uses them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import signal
+import subprocess
+import sys
+from types import TracebackType
+
+_PATIENCE = 5.0
+
+
+class NodeProcess:
+    """
+    A node running in its own process, for a with block.
+
+    Parameters
+    ----------
+    module : str
+        Module that runs the node, e.g. ``flex_planner.ros.planner_node``.
+    parameters : mapping
+        Node parameters; lists and texts in YAML notation are taken as they are.
+    remappings : mapping of str to str
+        Names to be replaced.
+
+    """
+
+    def __init__(self, module: str, parameters: Mapping[str, object] | None = None,
+                 remappings: Mapping[str, str] | None = None) -> None:
+        pairs = [f'{name}:={_yaml(value)}' for name, value in (parameters or {}).items()]
+        rules = [f'{name}:={target}' for name, target in (remappings or {}).items()]
+        arguments = [word for pair in pairs for word in ('-p', pair)]
+        arguments += [word for rule in rules for word in ('-r', rule)]
+        # a session of its own: Ctrl-C in the terminal reaches the node through stop() only
+        self.process = subprocess.Popen(
+            [sys.executable, '-m', module, '--ros-args', *arguments], start_new_session=True)
+
+    def stop(self, number: signal.Signals = signal.SIGINT) -> int:
+        """End the process by a signal, by force after 5 s, and return its exit code."""
+        if self.process.poll() is None:
+            self.process.send_signal(number)
+        try:
+            return self.process.wait(_PATIENCE)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            return self.process.wait()
+
+    def __enter__(self) -> NodeProcess:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        self.stop()
+
+
+def _yaml(value: object) -> str:
+    """Return a parameter value in the notation of --ros-args."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, (list, tuple)):
+        return f'[{", ".join(_yaml(entry) for entry in value)}]'
+    return str(value)

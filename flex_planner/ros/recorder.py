@@ -1,0 +1,112 @@
+"""What the planner node puts into a recording of one request."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from datetime import datetime, timezone
+import itertools
+from pathlib import Path
+
+from flex_planner import __version__
+from flex_planner.arm import Arm
+from flex_planner.plan import Plan
+from flex_planner.recording import (
+    DEFAULT,
+    definition_folder,
+    LATCHED,
+    MessageTypes,
+    Recording,
+    Topic,
+)
+from flex_planner.reference import Reference
+from flex_planner.ros.conversions import reference_state
+from flex_planner.ros.parameters import as_mapping
+from flex_planner.ros.settings import PlannerSettings
+from flex_planner_interfaces.msg import FlexibleTrajectory, MotionTask, PlanReport
+import yaml
+
+
+class OutcomeRecorder:
+    """
+    Writes one recording a request.
+
+    The request comes first, at the time it was accepted; report and trajectories follow when
+    they were ready, then the samples at the times a controller would reach them.
+
+    Parameters
+    ----------
+    arm : Arm
+        Described in an attachment.
+    namespace : str
+        Full name of the node, which the topics start with.
+
+    """
+
+    def __init__(self, arm: Arm, namespace: str) -> None:
+        self._arm = arm
+        self._types = MessageTypes.load([definition_folder('flex_planner_interfaces')])
+        self._numbers = itertools.count(1)
+        interfaces = 'flex_planner_interfaces/msg/'
+        self._task = Topic(f'{namespace}/motion_task', f'{interfaces}MotionTask')
+        self._report = Topic(f'{namespace}/plan_report', f'{interfaces}PlanReport')
+        self._joints = Topic(f'{namespace}/joint_trajectory',
+                             'trajectory_msgs/msg/JointTrajectory', LATCHED)
+        self._flexible = Topic(f'{namespace}/flexible_trajectory',
+                               f'{interfaces}FlexibleTrajectory', LATCHED)
+        self._states = Topic(f'{namespace}/reference_states', 'sensor_msgs/msg/JointState',
+                             DEFAULT)
+
+    def write(self, settings: PlannerSettings, stamp: int, task: MotionTask, report: PlanReport,
+              trajectory: FlexibleTrajectory, plan: Plan | None,
+              reference: Reference | None) -> Path:
+        """
+        Write a recording and return its folder.
+
+        Parameters
+        ----------
+        settings : PlannerSettings
+            Parameters at the request, kept in an attachment.
+        stamp : int
+            When the request was accepted [ns since 1970].
+
+        Raises
+        ------
+        RecordingError
+            If it cannot be written; nothing is left behind then.
+
+        """
+        ready = stamp + report.planning_time.sec * 10**9 + report.planning_time.nanosec
+        path = settings.output_folder() / self._name(stamp)
+        report.recording = str(path)
+        with Recording.create(path.parent, path.name, self._types,
+                              custom_data={'flex_planner': __version__}) as recording:
+            recording.attach('scenario.yaml', self._scenario(settings).encode(),
+                             media_type='application/yaml', time_ns=stamp)
+            recording.write(self._task, task, stamp)
+            recording.write(self._report, report, ready)
+            if plan is not None and reference is not None:
+                recording.write(self._joints, trajectory.joint_trajectory, ready)
+                recording.write(self._flexible, trajectory, ready)
+                self._write_states(recording, settings, plan, reference, ready)
+        return path
+
+    def _write_states(self, recording: Recording, settings: PlannerSettings, plan: Plan,
+                      reference: Reference, ready: int) -> None:
+        names = [*settings.joint_names, *plan.arm.modal_names]
+        for k, time in enumerate(reference.times_ns):
+            stamp = ready + int(time)
+            message = reference_state(plan, reference.samples, k, names, stamp)
+            recording.write(self._states, message, stamp)
+
+    def _name(self, stamp: int) -> str:
+        """Return a name that sorts by time and is not used twice."""
+        moment = datetime.fromtimestamp(stamp // 10**9, timezone.utc)
+        return f'plan_path_{moment:%Y%m%dT%H%M%S}_{stamp % 10**9:09d}_{next(self._numbers):04d}'
+
+    def _scenario(self, settings: PlannerSettings) -> str:
+        """Return arm and parameters as YAML."""
+        arm = asdict(self._arm)
+        arm['gravity'] = self._arm.gravity.tolist()
+        text: str = yaml.safe_dump({'arm': arm, 'parameters': dict(as_mapping(settings))},
+                                   sort_keys=False)
+        return text

@@ -1,0 +1,96 @@
+"""Parameters of the planner node."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+import os
+from pathlib import Path
+
+from flex_planner.arm import Arm
+from flex_planner.collocation import Settings
+from flex_planner.reference import SamplingSettings
+from flex_planner.ros.parameters import described
+from flex_planner.validation import vector
+from flex_planner.errors import InvalidValueError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlannerSettings:
+    """
+    A snapshot of the node's parameters; each request is served with the one at its arrival.
+
+    Raises
+    ------
+    InvalidValueError
+        If a value breaks a bound that a parameter's range cannot express.
+
+    """
+
+    elbow: int = described(
+        -1, 'Sign of the second joint angle, +1 or -1, where a request leaves elbow at 0.',
+        lowest=-1, highest=1)
+    tolerance: float = described(
+        1e-3, 'eps of eq. (17): largest half squared error of the final state.',
+        lowest=1e-9, highest=1.0)
+    allowed_planning_time: float = described(
+        30.0, 'Time limit of a request that sets none [s].', lowest=1e-3, highest=3600.0)
+    effort_weights: list[float] = described(
+        [1.0], 'Diagonal of R where a request gives none: one entry a joint.')
+    joint_names: list[str] = described(
+        ['joint1'], 'Names of the joints in trajectories, from the base outwards.',
+        read_only=True)
+    base_frame: str = described('base_link', 'Frame of tip paths.', read_only=True)
+    stages: int = described(
+        3, 'Gauss points in a mesh interval; the order is twice that.', lowest=2, highest=8)
+    intervals: int = described(60, 'Intervals of the first mesh.', lowest=4, highest=20000)
+    max_intervals: int = described(
+        1000, 'Most intervals of a mesh.', lowest=4, highest=20000)
+    max_iterations: int = described(
+        60, 'Newton iterations on one mesh.', lowest=1, highest=1000)
+    defect_tolerance: float = described(
+        0.05, 'Largest defect of a mesh interval relative to the unknowns.',
+        lowest=1e-9, highest=1.0)
+    sampling_step: float = described(
+        0.01, 'Longest time between published samples [s].', lowest=2.5e-4, highest=1.0)
+    torque_tolerance: float = described(
+        0.02, 'Samples get closer until linear interpolation of the torque is this exact [N m].',
+        lowest=1e-6, highest=1e6)
+    queue_length: int = described(
+        8, 'Requests that may wait; more are answered BUSY.', lowest=1, highest=1000,
+        read_only=True)
+    recording_folder: str = described(
+        '', 'Folder of the recordings; empty for $ROS_HOME/flex_planner.', read_only=True)
+    record: bool = described(True, 'Whether to record every request with its outcome.')
+
+    def __post_init__(self) -> None:
+        if self.elbow not in (-1, 1):
+            raise InvalidValueError('elbow', self.elbow, '+1 or -1')
+        vector('effort_weights', self.effort_weights, len(self.joint_names), above=0)
+        if len(set(self.joint_names)) != len(self.joint_names) or '' in self.joint_names:
+            raise InvalidValueError('joint_names', self.joint_names, 'different names')
+        self.solver()
+        self.sampling()
+
+    @classmethod
+    def for_arm(cls, arm: Arm) -> PlannerSettings:
+        """Return the defaults for an arm."""
+        names = [f'joint{i}' for i in range(1, arm.n_joints + 1)]
+        return replace(cls(), joint_names=names, effort_weights=[1.0] * arm.n_joints)
+
+    def solver(self) -> Settings:
+        """Return the settings of the boundary-value solver."""
+        return Settings(stages=self.stages, intervals=self.intervals,
+                        max_intervals=self.max_intervals, max_iterations=self.max_iterations,
+                        defect_tolerance=self.defect_tolerance)
+
+    def sampling(self) -> SamplingSettings:
+        """Return how trajectories are sampled."""
+        return SamplingSettings(longest_step=self.sampling_step,
+                                torque_tolerance=self.torque_tolerance)
+
+    def output_folder(self) -> Path:
+        """Return where recordings go."""
+        if self.recording_folder:
+            return Path(self.recording_folder)
+        home = os.environ.get('ROS_HOME') or os.path.join(os.path.expanduser('~'), '.ros')
+        return Path(home) / 'flex_planner'

@@ -1,0 +1,42 @@
+from glob import glob
+
+from setuptools import find_packages, setup
+
+package_name = 'flex_planner'
+
+setup(
+    name=package_name,
+    version='0.1.0',
+    description='Trajectory planning for flexible-link manipulators',
+    maintainer='The flex_planner maintainers',
+    maintainer_email='maintainers@flexplanner.example',
+    license='Apache-2.0',
+    python_requires='>=3.10',
+    packages=find_packages(include=['flex_planner', 'flex_planner.*']),
+    package_data={'flex_planner': ['py.typed']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
+        (f'share/{package_name}', ['package.xml']),
+        (f'share/{package_name}/config', glob('config/*.yaml')),
+        (f'share/{package_name}/config/arms', glob('config/arms/*.yaml')),
+        (f'share/{package_name}/launch', glob('launch/*.py')),
+    ],
+    install_requires=[
+        'casadi>=3.6.7',
+        'matplotlib>=3.6',
+        'mcap>=1.1',
+        'numpy>=1.26',
+        'pyyaml>=6.0',
+        'rosbags>=0.11',
+        'scipy>=1.11',
+    ],
+    extras_require={'test': ['hypothesis', 'mcap-ros2-support', 'pytest', 'pytest-timeout']},
+    zip_safe=True,
+    entry_points={
+        'console_scripts': [
+            'planner = flex_planner.ros.planner_node:main',
+            'arm_simulator = flex_planner.ros.arm_simulator:main',
+            'flex-planner = flex_planner.cli:main',
+        ],
+    },
+)

@@ -1,0 +1,112 @@
+"""
+Arms, models and tasks that several test files share.
+
+Compiling an arm costs seconds and reading it back milliseconds: models live for the session, and
+the compiled functions stay in the user's cache folder.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from flex_planner.arm import Arm, Joint, Link, Motor, Node
+from flex_planner.arm_files import load_arm
+from flex_planner.model import ArmModel
+from flex_planner.task import postures_from_points, Task
+from hypothesis import settings
+import pytest
+
+# the machine may be busy, and the same examples every time keep a failure repeatable
+settings.register_profile('repository', deadline=None, derandomize=True)
+settings.load_profile('repository')
+
+TaskFactory = Callable[..., Task]
+
+
+@pytest.fixture(scope='session')
+def rigid_arm() -> Arm:
+    return load_arm('korayem_rigid')
+
+
+@pytest.fixture(scope='session')
+def ei50_arm() -> Arm:
+    return load_arm('korayem_ei50')
+
+
+@pytest.fixture(scope='session')
+def ei5_arm() -> Arm:
+    return load_arm('korayem_ei5')
+
+
+@pytest.fixture(scope='session')
+def single_mode_arm(ei50_arm: Arm) -> Arm:
+    """The paper's arm with one mode a link."""
+    link = Link(length=0.5, linear_density=6.0, flexural_rigidity=50.0, modes=1)
+    return Arm(name='single mode', links=(link, link), joints=ei50_arm.joints)
+
+
+@pytest.fixture(scope='session')
+def uneven_arm() -> Arm:
+    """The arm of the paper's appendix, with links that cannot be mistaken for one another."""
+    first = Link(length=0.6, linear_density=6.0, flexural_rigidity=50.0, modes=2)
+    second = Link(length=0.35, linear_density=6.0, flexural_rigidity=20.0, modes=2)
+    return Arm(name='uneven', links=(first, second), joints=(Joint(), Joint()))
+
+
+@pytest.fixture(scope='session')
+def workshop_arm() -> Arm:
+    """An arm that has everything: gravity, friction, nodes, motors, unlike links."""
+    links = (Link(length=0.6, linear_density=4.0, flexural_rigidity=30.0, modes=1),
+             Link(length=0.4, linear_density=2.5, flexural_rigidity=12.0, modes=2))
+    joints = (Joint(motor=Motor(stall_torque=9.0, no_load_speed=4.0), viscous_friction=0.3),
+              Joint(motor=Motor(stall_torque=5.0, no_load_speed=6.0), viscous_friction=0.1))
+    nodes = (Node(mass=2.0, inertia=0.05), Node(mass=1.5, inertia=0.02),
+             Node(mass=0.4, inertia=0.01))
+    return Arm(name='workshop', links=links, joints=joints, nodes=nodes, gravity=[1.3, -9.81])
+
+
+@pytest.fixture(scope='session')
+def rigid_model(rigid_arm: Arm) -> ArmModel:
+    return ArmModel(rigid_arm)
+
+
+@pytest.fixture(scope='session')
+def ei50_model(ei50_arm: Arm) -> ArmModel:
+    return ArmModel(ei50_arm)
+
+
+@pytest.fixture(scope='session')
+def ei5_model(ei5_arm: Arm) -> ArmModel:
+    return ArmModel(ei5_arm)
+
+
+@pytest.fixture(scope='session')
+def single_mode_model(single_mode_arm: Arm) -> ArmModel:
+    return ArmModel(single_mode_arm)
+
+
+@pytest.fixture(scope='session')
+def uneven_model(uneven_arm: Arm) -> ArmModel:
+    return ArmModel(uneven_arm)
+
+
+@pytest.fixture(scope='session')
+def workshop_model(workshop_arm: Arm) -> ArmModel:
+    return ArmModel(workshop_arm)
+
+
+@pytest.fixture(scope='session')
+def paper_task() -> TaskFactory:
+    """Build the motion of sections 5.2 and 5.3 for an arm; w_2 weighs the joint speeds."""
+
+    def build(arm: Arm, payload_mass: float = 1.0, w_2: float = 0.0, **changes: Any) -> Task:
+        start, goal = postures_from_points(arm, (0.5, 0.0), (0.5, 0.5), elbow=-1)
+        values: dict[str, Any] = {
+            'start_positions': start, 'goal_positions': goal, 'duration': 1.0,
+            'payload_mass': payload_mass, 'effort_weights': [1 / 8, 1 / 8],
+            'velocity_weights': [w_2, w_2]}
+        return Task(arm=arm, **{**values, **changes})
+
+    return build

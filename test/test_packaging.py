@@ -1,0 +1,102 @@
+"""Package descriptions, entry points and installed files agree with one another."""
+
+import ast
+from importlib import metadata
+from pathlib import Path
+import re
+import xml.etree.ElementTree as ElementTree
+
+from ament_index_python.packages import get_package_share_directory
+from catkin_pkg.package import parse_package
+import flex_planner
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGES = [ROOT, ROOT / 'flex_planner_interfaces']
+LAUNCH_FILE = ROOT / 'launch' / 'planner.launch.py'
+
+
+def setup_keyword(name):
+    """Return a literal keyword argument of the call of ``setup``."""
+    for node in ast.walk(ast.parse((ROOT / 'setup.py').read_text())):
+        if isinstance(node, ast.keyword) and node.arg == name:
+            return ast.literal_eval(node.value)
+    raise LookupError(name)
+
+
+def console_scripts():
+    return dict(re.split(r'\s*=\s*', line)
+                for line in setup_keyword('entry_points')['console_scripts'])
+
+
+def launch_calls(function):
+    """Return the keyword arguments and first literal of every call of a function."""
+    calls = []
+    for node in ast.walk(ast.parse(LAUNCH_FILE.read_text())):
+        if isinstance(node, ast.Call) and getattr(node.func, 'id', None) == function:
+            literals = [a.value for a in node.args if isinstance(a, ast.Constant)]
+            keywords = {k.arg: k.value.value for k in node.keywords
+                        if isinstance(k.value, ast.Constant)}
+            calls.append((literals, keywords))
+    return calls
+
+
+@pytest.mark.parametrize('folder', PACKAGES, ids=lambda folder: folder.name)
+def test_package_xml_is_valid(folder):
+    warnings = []
+    package = parse_package(str(folder / 'package.xml'), warnings=warnings)
+    package.validate(warnings=warnings)
+    assert not warnings
+
+
+def test_versions_agree():
+    versions = {ElementTree.parse(folder / 'package.xml').findtext('version')
+                for folder in PACKAGES}
+    versions |= {flex_planner.__version__, setup_keyword('version'),
+                 metadata.version('flex_planner')}
+    assert len(versions) == 1
+
+
+def test_requirements_have_the_lower_bounds_of_setup():
+    lines = (ROOT / 'requirements' / 'runtime.txt').read_text().splitlines()
+    required = [line.partition(',')[0] for line in lines if not line.startswith('#')]
+    assert required == setup_keyword('install_requires')
+
+
+def test_interfaces_are_all_built():
+    folder = ROOT / 'flex_planner_interfaces'
+    names = {str(path.relative_to(folder)) for kind in ('msg', 'srv', 'action')
+             for path in folder.glob(f'{kind}/*.{kind}')}
+    listed = re.findall(r'\b(?:msg|srv|action)/\w+\.\w+', (folder / 'CMakeLists.txt').read_text())
+    assert set(listed) == names
+
+
+@pytest.mark.parametrize('name', ['planner', 'arm_simulator', 'flex-planner'])
+def test_entry_point_can_be_called(name):
+    (entry_point,) = metadata.entry_points(group='console_scripts', name=name)
+    assert entry_point.value == console_scripts()[name]
+    assert callable(entry_point.load())
+
+
+def test_parameter_and_launch_files_are_installed():
+    share = Path(get_package_share_directory('flex_planner'))
+    for pattern in ('config/*.yaml', 'config/arms/*.yaml', 'launch/*.py'):
+        wanted = {path.name: path.read_text() for path in ROOT.glob(pattern)}
+        installed = {path.name: path.read_text() for path in share.glob(pattern)}
+        assert installed == wanted
+        assert wanted
+
+
+def test_launch_file_starts_executables_of_this_package():
+    nodes = [keywords for _, keywords in launch_calls('Node')]
+    assert {node['package'] for node in nodes} == {'flex_planner'}
+    assert {node['executable'] for node in nodes} <= console_scripts().keys()
+
+
+def test_launch_file_offers_an_arm_that_exists():
+    arguments = {names[0]: keywords for names, keywords in launch_calls('DeclareLaunchArgument')}
+    assert arguments.keys() == {'arm', 'params_file'}
+    assert (ROOT / 'config' / 'arms' / f'{arguments["arm"]["default_value"]}.yaml').is_file()
+    functions = [node.name for node in ast.parse(LAUNCH_FILE.read_text()).body
+                 if isinstance(node, ast.FunctionDef)]
+    assert functions == ['generate_launch_description']
