@@ -61,7 +61,7 @@ class Link:
 
     @property
     def mass(self) -> float:
-        """Mass of the beam [kg]."""
+        """Return the mass of the beam [kg]."""
         return self.linear_density * self.length
 
     def mode_shapes(self) -> LinkModes:
@@ -101,7 +101,7 @@ class Motor:
 
     @property
     def torque_slope(self) -> float:
-        """K_2 of eq. (15): torque lost per speed [N m s/rad]."""
+        """Return K_2 of eq. (15): torque lost per speed [N m s/rad]."""
         return 0.0 if math.isinf(self.no_load_speed) else self.stall_torque / self.no_load_speed
 
 
@@ -199,34 +199,34 @@ class Arm:
 
     @property
     def n_joints(self) -> int:
-        """Number of joints, n."""
+        """Return the number of joints, n."""
         return len(self.links)
 
     @property
     def n_modes(self) -> int:
-        """Number of modal coordinates of all links."""
+        """Return the number of modal coordinates of all links."""
         return sum(link.modes for link in self.links)
 
     @property
     def n_coordinates(self) -> int:
-        """Number of generalized coordinates, n_t."""
+        """Return the number of generalized coordinates, n_t."""
         return self.n_joints + self.n_modes
 
     @property
     def modal_names(self) -> tuple[str, ...]:
-        """Names of the modal coordinates, e.g. ``link1_mode2``."""
+        """Return the names of the modal coordinates, e.g. ``link1_mode2``."""
         return tuple(f'link{i}_mode{j}' for i, link in enumerate(self.links, 1)
                      for j in range(1, link.modes + 1))
 
     @property
     def modal_slices(self) -> tuple[slice, ...]:
-        """Where each link's modal coordinates are among the generalized coordinates."""
+        """Return where each link's modal coordinates are among the generalized ones."""
         ends = np.cumsum([self.n_joints, *(link.modes for link in self.links)])
         return tuple(slice(int(a), int(b)) for a, b in zip(ends[:-1], ends[1:], strict=True))
 
     @property
     def reach(self) -> float:
-        """Distance of the tip from the base with the arm stretched out [m]."""
+        """Return the distance of the tip from the base with the arm stretched out [m]."""
         return sum(link.length for link in self.links)
 
     def flexural_rigidities(self) -> Array:

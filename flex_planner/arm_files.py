@@ -103,14 +103,13 @@ def arm_from_mapping(content: object) -> Arm:
 
     """
     top = _Section('', content)
-    arm_fields = dict(
-        name=top.text('name'), source=top.text('source', ''),
+    arm: Arm = top.build(
+        Arm, name=top.text('name'), source=top.text('source', ''),
         links=tuple(_link(section) for section in top.sections('links')),
         joints=tuple(_joint(section) for section in top.sections('joints')),
-        nodes=tuple(_node(section) for section in top.sections('nodes', optional=True)))
-    gravity = top.take('gravity', (0.0, 0.0))
-    top.finish()
-    return Arm(gravity=gravity, **arm_fields)
+        nodes=tuple(_node(section) for section in top.sections('nodes', optional=True)),
+        gravity=top.take('gravity', (0.0, 0.0)))
+    return arm
 
 
 class _Section:

@@ -80,8 +80,17 @@ def hamiltonian_drift(problem: MotionProblem, solution: CollocationSolution) -> 
     return float(np.ptp(controls.hamiltonian)) / size
 
 
-def totals(problem: MotionProblem, solution: CollocationSolution) -> dict[str, float]:
-    """Return cost J, effort and energy, by Gauss quadrature on the mesh."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Totals:
+    """Integrals over a motion: J of eq. (6), effort [N^2 m^2 s] and energy [J], as in `Plan`."""
+
+    cost: float
+    effort: float
+    energy: float
+
+
+def totals(problem: MotionProblem, solution: CollocationSolution) -> Totals:
+    """Return cost, effort and energy, by Gauss quadrature on the mesh."""
     n, n_t = problem.model.arm.n_joints, problem.model.arm.n_coordinates
     z = solution.stage_values().reshape(-1, problem.size)
     controls = problem.model.controls(z, problem.p)
@@ -91,5 +100,5 @@ def totals(problem: MotionProblem, solution: CollocationSolution) -> dict[str, f
         return float(weights @ values)
 
     power = np.abs(controls.torque * z[:, n_t:n_t + n]).sum(axis=1)
-    return {'cost': integral(controls.cost_rate),
-            'effort': integral((controls.torque ** 2).sum(axis=1)), 'energy': integral(power)}
+    return Totals(cost=integral(controls.cost_rate), energy=integral(power),
+                  effort=integral((controls.torque ** 2).sum(axis=1)))

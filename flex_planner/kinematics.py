@@ -48,6 +48,8 @@ def link_points(arm: Arm, coordinates: Array, stations: int = 2) -> Array:
 
     Parameters
     ----------
+    arm : Arm
+        n joints, n_t coordinates.
     coordinates : numpy.ndarray, shape (..., n_t)
         q.
     stations : int
@@ -87,6 +89,8 @@ def jacobian(arm: Arm, positions: Array) -> Array:
 
     Parameters
     ----------
+    arm : Arm
+        n joints.
     positions : numpy.ndarray, shape (n,)
         Joint angles [rad].
 

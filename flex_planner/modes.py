@@ -53,7 +53,7 @@ class LinkModes:
 
     @property
     def count(self) -> int:
-        """Number of modes."""
+        """Return the number of modes."""
         return int(self.area.size)
 
 

@@ -84,7 +84,7 @@ class MotionProblem:
 
         """
         arm, duration = self.model.arm, self.task.duration
-        n, n_t = arm.n_joints, arm.n_coordinates
+        n = arm.n_joints
         travel = np.maximum(np.abs(self.goal - self.start)[:n], 0.1)
         mass = self.model.mass_and_energy(self.start[None], self.p)[0][0]
         inertia = np.abs(mass[:, :n]) @ (4 * travel / duration**2)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from flex_planner.certify import certify, CertificateLimits, totals
+from flex_planner.certify import CertificateLimits, certify, totals
 from flex_planner.collocation import CollocationResult, Settings, solve, Status
 from flex_planner.model import ArmModel
 from flex_planner.motion import MotionProblem, task_parameters
@@ -78,8 +78,9 @@ def _certified(plan: Plan, result: CollocationResult, settings: Settings,
     problem, reasons = plan.problem, ['']
     for attempt in range(_REFINEMENTS + 1):
         certificate = certify(problem, result)
-        plan = replace(plan, solution=result.solution, certificate=certificate,
-                       **totals(problem, result.solution))
+        total = totals(problem, result.solution)
+        plan = replace(plan, solution=result.solution, certificate=certificate, cost=total.cost,
+                       effort=total.effort, energy=total.energy)
         reasons = limits.violations(certificate)
         if not reasons:
             return replace(plan, status=PlanStatus.SOLVED, message=PlanStatus.SOLVED.value)

@@ -138,22 +138,22 @@ class Plan:
 
     @property
     def solved(self) -> bool:
-        """Whether the plan is certified."""
+        """Return whether the plan is certified."""
         return self.status is PlanStatus.SOLVED
 
     @property
     def arm(self) -> Arm:
-        """The arm."""
+        """Return the arm."""
         return self.task.arm
 
     @property
     def model(self) -> ArmModel:
-        """The arm's compiled functions."""
+        """Return the arm's compiled functions."""
         return self.problem.model
 
     @property
     def mesh_intervals(self) -> int:
-        """Intervals of the final mesh, 0 without a solution."""
+        """Return the intervals of the final mesh, 0 without a solution."""
         return self.solution.intervals if self.solution else 0
 
     def sample(self, times: Array) -> Samples:

@@ -118,7 +118,7 @@ class Plant:
 
     @property
     def time(self) -> float:
-        """Time since the start [s]."""
+        """Return the time since the start [s]."""
         return self._ticks * self._period
 
     def follow(self, reference: JointReference) -> None:
@@ -160,9 +160,11 @@ class Plant:
     def _runge_kutta(self, x: Array, h: float) -> Array:
         """Return the state after one classical Runge-Kutta step."""
         def rate(state: Array) -> Array:
-            return self._rate(state, self.torque).copy()
+            result: Array = self._rate(state, self.torque).copy()
+            return result
 
         k_1 = rate(x)
         k_2 = rate(x + h / 2 * k_1)
         k_3 = rate(x + h / 2 * k_2)
-        return x + h / 6 * (k_1 + 2 * k_2 + 2 * k_3 + rate(x + h * k_3))
+        after: Array = x + h / 6 * (k_1 + 2 * k_2 + 2 * k_3 + rate(x + h * k_3))
+        return after

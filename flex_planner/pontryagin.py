@@ -14,7 +14,7 @@ from typing import Any
 
 import casadi as ca
 from flex_planner.arm import Arm
-from flex_planner.dynamics import Chain, build_chain
+from flex_planner.dynamics import build_chain, Chain
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -32,7 +32,8 @@ class PiecewisePolynomial:
     def through(cls, breaks: Array, theta: Array, values: Array) -> PiecewisePolynomial:
         """Interpolate values (N, d + 1, k) at positions theta (d + 1,) in each interval."""
         powers = np.vander(theta, increasing=True)
-        return cls(breaks, np.linalg.solve(powers[None], values))
+        coefficients = np.linalg.solve(powers[None], values)
+        return cls(breaks, coefficients.astype(np.float64))
 
     def __call__(self, time: float) -> Array:
         """Return the value at one time, shape (k,)."""

@@ -66,8 +66,12 @@ def clamped_modes(model: ArmModel, coordinates: Array, p: Array) -> tuple[Array,
 
     Parameters
     ----------
+    model : ArmModel
+        n_f modal coordinates.
     coordinates : numpy.ndarray, shape (n_t,)
         Posture about which it vibrates.
+    p : numpy.ndarray
+        Stacked `Parameters`.
 
     Returns
     -------
@@ -93,10 +97,14 @@ def residual_vibration(model: ArmModel, state: Array, rest: Array, p: Array) -> 
 
     Parameters
     ----------
+    model : ArmModel
+        n_t coordinates.
     state : numpy.ndarray, shape (2 n_t,)
         When the joints are locked.
     rest : numpy.ndarray, shape (n_t,)
         Equilibrium.
+    p : numpy.ndarray
+        Stacked `Parameters`.
 
     """
     arm = model.arm

@@ -5,8 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from flex_planner.collocation import CollocationResult, CollocationSolution, GaussRule
-from flex_planner.collocation import Settings, solve, Status
+from flex_planner.collocation import (
+    CollocationResult,
+    CollocationSolution,
+    GaussRule,
+    Settings,
+    solve,
+    Status,
+)
 from flex_planner.model import ArmModel
 from flex_planner.motion import MotionProblem
 from flex_planner.progress import Monitor

@@ -84,6 +84,8 @@ def postures_from_points(arm: Arm, start: ArrayLike, goal: ArrayLike,
 
     Parameters
     ----------
+    arm : Arm
+        Two links.
     start, goal : array_like, shape (2,)
         Tip positions in the base frame [m].
     elbow : int

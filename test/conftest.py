@@ -42,14 +42,14 @@ def ei5_arm() -> Arm:
 
 @pytest.fixture(scope='session')
 def single_mode_arm(ei50_arm: Arm) -> Arm:
-    """The paper's arm with one mode a link."""
+    """Return the arm of the paper with one mode a link."""
     link = Link(length=0.5, linear_density=6.0, flexural_rigidity=50.0, modes=1)
     return Arm(name='single mode', links=(link, link), joints=ei50_arm.joints)
 
 
 @pytest.fixture(scope='session')
 def uneven_arm() -> Arm:
-    """The arm of the paper's appendix, with links that cannot be mistaken for one another."""
+    """Return the arm of the appendix, with links that cannot be mistaken for one another."""
     first = Link(length=0.6, linear_density=6.0, flexural_rigidity=50.0, modes=2)
     second = Link(length=0.35, linear_density=6.0, flexural_rigidity=20.0, modes=2)
     return Arm(name='uneven', links=(first, second), joints=(Joint(), Joint()))
@@ -57,7 +57,7 @@ def uneven_arm() -> Arm:
 
 @pytest.fixture(scope='session')
 def workshop_arm() -> Arm:
-    """An arm that has everything: gravity, friction, nodes, motors, unlike links."""
+    """Return an arm that has everything: gravity, friction, nodes, motors, unlike links."""
     links = (Link(length=0.6, linear_density=4.0, flexural_rigidity=30.0, modes=1),
              Link(length=0.4, linear_density=2.5, flexural_rigidity=12.0, modes=2))
     joints = (Joint(motor=Motor(stall_torque=9.0, no_load_speed=4.0), viscous_friction=0.3),

@@ -8,8 +8,13 @@ import math
 from typing import Any
 
 from flex_planner.arm import Arm, Joint, Link, MAX_LINKS, MAX_MODES, Motor, Node
-from flex_planner.errors import InvalidSizeError, InvalidValueError, NotFiniteError
-from flex_planner.errors import SingularError, UnreachableError
+from flex_planner.errors import (
+    InvalidSizeError,
+    InvalidValueError,
+    NotFiniteError,
+    SingularError,
+    UnreachableError,
+)
 from flex_planner.modes import pinned_pinned
 from flex_planner.task import postures_from_points, Task
 import numpy as np

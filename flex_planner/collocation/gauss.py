@@ -51,14 +51,16 @@ class GaussRule:
 
     @property
     def stages(self) -> int:
-        """Number of stages, s."""
+        """Return the number of stages, s."""
         return int(self.nodes.size)
 
     def basis(self, theta: Array) -> Array:
         """Return the integrals of the Lagrange polynomials up to theta, shape (k, s)."""
-        return np.vander(theta, self.stages + 1, increasing=True) @ self.integrals.T
+        basis: Array = np.vander(theta, self.stages + 1, increasing=True) @ self.integrals.T
+        return basis
 
     def basis_rate(self, theta: Array) -> Array:
         """Return the Lagrange polynomials at theta, shape (k, s)."""
         powers = np.vander(theta, self.stages, increasing=True)
-        return powers @ (self.integrals[:, 1:] * np.arange(1, self.stages + 1)).T
+        rate: Array = powers @ (self.integrals[:, 1:] * np.arange(1, self.stages + 1)).T
+        return rate

@@ -139,7 +139,7 @@ class NewtonSystem:
 
 def _row_sizes(rows: Array) -> Array:
     """Return the largest entry of each row, to scale it by."""
-    sizes = np.abs(rows).max(axis=1, initial=0.0)
+    sizes: Array = np.abs(rows).max(axis=1, initial=0.0)
     if not np.isfinite(sizes).all() or (sizes == 0).any():
         raise SingularSystemError('a boundary row is zero or not finite')
     return sizes

@@ -10,7 +10,6 @@ equations are scaled, and long damped detours disappear.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 from flex_planner.collocation.linear import NewtonSystem, Residual, SingularSystemError
@@ -99,7 +98,8 @@ def _linearise(problem: BoundaryValueProblem, solution: CollocationSolution,
 
 def magnitudes(problem: BoundaryValueProblem, solution: CollocationSolution) -> Array:
     """Return the magnitude of each unknown that relative sizes refer to, shape (m,)."""
-    return np.maximum(np.abs(solution.nodes).max(axis=0), problem.scale)
+    largest: Array = np.maximum(np.abs(solution.nodes).max(axis=0), problem.scale)
+    return largest
 
 
 def newton(problem: BoundaryValueProblem, guess: CollocationSolution, *, tolerance: float,
@@ -143,7 +143,7 @@ def newton(problem: BoundaryValueProblem, guess: CollocationSolution, *, toleran
         accepted = _damped(problem, solution, system, full, step, scale)
         if accepted is None:
             return NewtonOutcome(solution, False, norm, iteration + 1, None,
-                                 'no step of Newton\'s method reduces the error')
+                                 "no step of Newton's method reduces the error")
         solution, step, simplified = accepted
         if step == 1.0 and simplified.norm <= tolerance:
             return NewtonOutcome(_moved(solution, simplified, 1.0), True, simplified.norm,
@@ -181,12 +181,11 @@ def _damped(problem: BoundaryValueProblem, solution: CollocationSolution, system
             full: _Step, step: float,
             scale: Array) -> tuple[CollocationSolution, float, _Step] | None:
     """Return the first point along the correction that passes the test, or None."""
-    measure: Callable[[CollocationSolution], _Step] = lambda point: _measured(
-        system.correction(collocation_residual(problem, point)), scale)
     while step >= _SMALLEST_STEP:
         trial = _moved(solution, full, step)
         try:
-            simplified = measure(trial)
+            residual = collocation_residual(problem, trial)
+            simplified = _measured(system.correction(residual), scale)
         except SingularSystemError:
             step /= 4
             continue

@@ -26,11 +26,11 @@ class BoundaryValueProblem(Protocol):
 
     @property
     def size(self) -> int:
-        """Number of equations, m."""
+        """Return the number of equations, m."""
 
     @property
     def scale(self) -> Array:
-        """Smallest magnitudes that matter, shape (m,)."""
+        """Return the smallest magnitudes that matter, shape (m,)."""
 
     def rate(self, t: Array, z: Array) -> Array:
         """Return F(t, z) for times (k,) and unknowns (k, m), shape (k, m)."""

@@ -42,12 +42,12 @@ class CollocationSolution:
 
     @property
     def steps(self) -> Array:
-        """Interval lengths, shape (N,)."""
+        """Return the interval lengths, shape (N,)."""
         return np.diff(self.mesh)
 
     @property
     def intervals(self) -> int:
-        """Number of intervals, N."""
+        """Return the number of intervals, N."""
         return self.mesh.size - 1
 
     def stage_times(self) -> Array:
@@ -57,19 +57,23 @@ class CollocationSolution:
     def stage_values(self) -> Array:
         """Return z at the collocation points, shape (N, s, m)."""
         increments = np.einsum('ij,kjm->kim', self.rule.matrix, self.stages)
-        return self.nodes[:-1, None] + self.steps[:, None, None] * increments
+        values: Array = self.nodes[:-1, None] + self.steps[:, None, None] * increments
+        return values
 
     def __call__(self, times: Array) -> Array:
         """Return z at times (k,) within the mesh, shape (k, m)."""
         interval, theta = self._locate(times)
         basis = self.rule.basis(theta)
         increments = np.einsum('ks,ksm->km', basis, self.stages[interval])
-        return self.nodes[interval] + self.steps[interval, None] * increments
+        values: Array = self.nodes[interval] + self.steps[interval, None] * increments
+        return values
 
     def rate(self, times: Array) -> Array:
         """Return dz/dt at times (k,), shape (k, m)."""
         interval, theta = self._locate(times)
-        return np.einsum('ks,ksm->km', self.rule.basis_rate(theta), self.stages[interval])
+        basis = self.rule.basis_rate(theta)
+        rate: Array = np.einsum('ks,ksm->km', basis, self.stages[interval])
+        return rate
 
     def on_mesh(self, mesh: Array) -> CollocationSolution:
         """Return the same function sampled on another mesh of the same span."""

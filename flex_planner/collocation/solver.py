@@ -18,7 +18,7 @@ class Status(Enum):
     """How a solve ended; the value is shown to people."""
 
     CONVERGED = 'converged'
-    NEWTON_FAILED = 'Newton\'s method did not converge'
+    NEWTON_FAILED = "Newton's method did not converge"
     MESH_LIMIT = 'the mesh reached its largest number of intervals'
     CANCELED = StopReason.CANCELED.value
     TIMEOUT = StopReason.TIMEOUT.value

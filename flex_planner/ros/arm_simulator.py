@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from builtin_interfaces.msg import Time
 from flex_planner.arm import Arm
 from flex_planner.arm_files import load_arm
 from flex_planner.kinematics import tip_position
@@ -15,8 +17,8 @@ from flex_planner.trajectory_rules import trajectory_violations
 from flex_planner.validation import Array, vector
 from geometry_msgs.msg import PointStamped
 import numpy as np
-from rclpy.node import Node
 from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
 
@@ -115,11 +117,11 @@ class ArmSimulator(Node):  # type: ignore[misc]
 
     def _on_trajectory(self, trajectory: JointTrajectory) -> None:
         """Follow a trajectory, or say why not."""
+        self._advance()  # first, so that the motion begins when its trajectory came
         refusal = self._refusal(trajectory)
         if refusal:
             self.get_logger().error(f'trajectory refused: {refusal}')
             return
-        self._advance()
         self._plant.follow(_reference(trajectory, self._settings.joint_names))
         self.get_logger().info(f'following a trajectory of {len(trajectory.points)} points')
 
@@ -170,9 +172,9 @@ def _reference(trajectory: JointTrajectory, names: list[str]) -> JointReference:
                           velocities=column('velocities'), torques=column('effort'))
 
 
-def _state_message(stamp: object, names: object, positions: Array, velocities: Array,
+def _state_message(stamp: Time, names: Sequence[str], positions: Array, velocities: Array,
                    efforts: Array) -> JointState:
-    message = JointState(name=list(names), position=positions.tolist(),  # type: ignore[call-overload]
+    message = JointState(name=list(names), position=positions.tolist(),
                          velocity=velocities.tolist(), effort=efforts.tolist())
     message.header.stamp = stamp
     return message

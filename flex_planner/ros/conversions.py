@@ -78,16 +78,17 @@ def planning_time_limit(message: MotionTask, settings: PlannerSettings) -> float
 
 
 def _postures(message: MotionTask, arm: Arm,
-              settings: PlannerSettings) -> tuple[Sequence[float] | Array, ...]:
+              settings: PlannerSettings) -> tuple[Array, Array]:
     """Return start and goal joint angles as they were given or follow from points."""
     if message.space == MotionTask.JOINT:
-        return message.start_positions, message.goal_positions
+        return np.asarray(message.start_positions), np.asarray(message.goal_positions)
     if message.space != MotionTask.CARTESIAN:
         raise InvalidValueError('space', message.space, '0 (JOINT) or 1 (CARTESIAN)')
     if message.elbow not in (-1, 0, 1):
         raise InvalidValueError('elbow', message.elbow, '-1, +1, or 0 for the default')
-    points = ((point.x, point.y) for point in (message.start_point, message.goal_point))
-    return postures_from_points(arm, *points, elbow=message.elbow or settings.elbow)
+    start, goal = message.start_point, message.goal_point
+    return postures_from_points(arm, (start.x, start.y), (goal.x, goal.y),
+                                elbow=message.elbow or settings.elbow)
 
 
 def error_code(error: Exception) -> int:

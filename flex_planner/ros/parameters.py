@@ -1,4 +1,4 @@
-"""Node parameters declared from a dataclass: description, range and read-only flag in one place."""
+"""Node parameters declared from a dataclass: description, range and flag in one place."""
 
 from __future__ import annotations
 

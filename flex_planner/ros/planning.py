@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 import logging
 import time
 
-from flex_planner.errors import FlexPlannerError, RecordingError
+from flex_planner.errors import FlexPlannerError
 from flex_planner.model import ArmModel
 from flex_planner.path import plan_path
 from flex_planner.plan import Plan

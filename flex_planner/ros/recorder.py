@@ -68,6 +68,16 @@ class OutcomeRecorder:
             Parameters at the request, kept in an attachment.
         stamp : int
             When the request was accepted [ns since 1970].
+        task : MotionTask
+            The request.
+        report : PlanReport
+            Its outcome; the recording's path is entered.
+        trajectory : FlexibleTrajectory
+            The plan as it is published.
+        plan : Plan or None
+            None where none was made.
+        reference : Reference or None
+            Samples of the plan.
 
         Raises
         ------

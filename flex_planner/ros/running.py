@@ -10,8 +10,8 @@ from flex_planner.errors import FlexPlannerError
 from flex_planner.ros.logs import forward_logs
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.node import Node
 import rclpy.logging
+from rclpy.node import Node
 
 
 def run_node(create: Callable[[], Node], name: str, args: list[str] | None) -> None:

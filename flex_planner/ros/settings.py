@@ -8,10 +8,10 @@ from pathlib import Path
 
 from flex_planner.arm import Arm
 from flex_planner.collocation import Settings
+from flex_planner.errors import InvalidValueError
 from flex_planner.reference import SamplingSettings
 from flex_planner.ros.parameters import described
 from flex_planner.validation import vector
-from flex_planner.errors import InvalidValueError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
