@@ -31,12 +31,11 @@ setup(
         'scipy>=1.11',
     ],
     extras_require={'test': ['hypothesis', 'mcap-ros2-support', 'pytest', 'pytest-timeout']},
-    zip_safe=True,
+    zip_safe=False,
     entry_points={
         'console_scripts': [
             'planner = flex_planner.ros.planner_node:main',
             'arm_simulator = flex_planner.ros.arm_simulator:main',
-            'flex-planner = flex_planner.cli:main',
         ],
     },
 )

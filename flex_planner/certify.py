@@ -8,6 +8,7 @@ from flex_planner.collocation import CollocationResult, CollocationSolution
 from flex_planner.kinematics import tip_position
 from flex_planner.motion import MotionProblem
 from flex_planner.plan import Certificate
+from flex_planner.progress import Monitor
 from flex_planner.simulation import PiecewisePolynomial, simulate
 from flex_planner.statics import residual_vibration
 from flex_planner.validation import Array
@@ -36,16 +37,22 @@ class CertificateLimits:
                 for name, value, limit in pairs if not value <= limit]
 
 
-def certify(problem: MotionProblem, result: CollocationResult) -> Certificate:
+def certify(problem: MotionProblem, result: CollocationResult,
+            monitor: Monitor) -> Certificate:
     """
     Return the certificate of a solution.
 
     The planned torque is applied to the original dynamics, from the start, by an integrator of
     another kind; H is evaluated between the collocation points.
 
+    Raises
+    ------
+    StoppedError
+        If the monitor stopped it.
+
     """
     final = simulate(problem.model, problem.p, problem.start,
-                     torque_polynomial(problem, result.solution), problem.task.duration)
+                     torque_polynomial(problem, result.solution), problem.task.duration, monitor)
     if not np.isfinite(final).all():
         return Certificate(collocation_residual=result.residual)
     arm, n_t = problem.model.arm, problem.model.arm.n_coordinates

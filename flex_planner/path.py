@@ -14,11 +14,12 @@ from flex_planner.collocation import CollocationResult, Settings, solve, Status
 from flex_planner.model import ArmModel
 from flex_planner.motion import MotionProblem, task_parameters
 from flex_planner.plan import Plan, PlanStatus
-from flex_planner.progress import Monitor
+from flex_planner.progress import Monitor, StoppedError, StopReason
 from flex_planner.strategies import LADDER
 from flex_planner.task import Task
 
 _STOPPED = {Status.TIMEOUT: PlanStatus.TIMEOUT, Status.CANCELED: PlanStatus.CANCELED}
+_STATUSES = {StopReason.TIMEOUT: PlanStatus.TIMEOUT, StopReason.CANCELED: PlanStatus.CANCELED}
 _REFINEMENTS = 2
 _REFINEMENT_FACTOR = 10.0
 
@@ -54,7 +55,10 @@ def plan_path(task: Task, *, model: ArmModel | None = None, settings: Settings |
     if result.status in _STOPPED:
         plan = replace(plan, status=_STOPPED[result.status])
     elif result.converged:
-        plan = _certified(plan, result, settings, monitor)
+        try:
+            plan = _certified(plan, result, settings, monitor)
+        except StoppedError as stop:
+            plan = replace(plan, status=_STATUSES[stop.reason], message=str(stop))
     return replace(plan, iterations=monitor.iteration, planning_time=monitor.elapsed)
 
 
@@ -77,7 +81,7 @@ def _certified(plan: Plan, result: CollocationResult, settings: Settings,
     limits = CertificateLimits(boundary_error=plan.task.tolerance)
     problem, reasons = plan.problem, ['']
     for attempt in range(_REFINEMENTS + 1):
-        certificate = certify(problem, result)
+        certificate = certify(problem, result, monitor)
         total = totals(problem, result.solution)
         plan = replace(plan, solution=result.solution, certificate=certificate, cost=total.cost,
                        effort=total.effort, energy=total.energy)

@@ -16,6 +16,14 @@ class StopReason(Enum):
     TIMEOUT = 'time limit reached'
 
 
+class StoppedError(Exception):
+    """Work was stopped from outside, in a place that has no other way to return."""
+
+    def __init__(self, reason: StopReason) -> None:
+        self.reason = reason
+        super().__init__(reason.value)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Progress:
     """
@@ -75,6 +83,12 @@ class Monitor:
         if self.elapsed > self.time_limit:
             return StopReason.TIMEOUT
         return None
+
+    def check(self) -> None:
+        """Raise StoppedError if the work should stop now."""
+        reason = self.stop_reason()
+        if reason is not None:
+            raise StoppedError(reason)
 
     def step(self, residual: float, intervals: int) -> None:
         """Count and report an iteration."""

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from flex_planner.model import ArmModel
+from flex_planner.progress import Monitor
 from flex_planner.validation import Array
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -47,7 +48,8 @@ class PiecewisePolynomial:
 
 
 def simulate(model: ArmModel, p: Array, state: Array, torque: Callable[[float], Array],
-             duration: float, *, rtol: float = 1e-8, atol: float = 1e-10) -> Array:
+             duration: float, monitor: Monitor | None = None, *, rtol: float = 1e-8,
+             atol: float = 1e-10) -> Array:
     """
     Return the state after a time under open-loop torques, by SciPy's DOP853.
 
@@ -63,6 +65,8 @@ def simulate(model: ArmModel, p: Array, state: Array, torque: Callable[[float], 
         Time [s] to torques (n,) [N m].
     duration : float
         [s].
+    monitor : Monitor, optional
+        May stop it.
     rtol, atol : float
         Of the integrator.
 
@@ -71,9 +75,20 @@ def simulate(model: ArmModel, p: Array, state: Array, torque: Callable[[float], 
     numpy.ndarray, shape (2 n_t,)
         NaN if the integration failed.
 
+    Raises
+    ------
+    StoppedError
+        If the monitor stopped it.
+
     """
-    rate = model.state_rate(p)
-    result = solve_ivp(lambda t, x: rate(x, torque(t)).copy(), (0.0, duration), state,
-                       method='DOP853', rtol=rtol, atol=atol)
+    watch = monitor or Monitor()
+    state_rate = model.state_rate(p)
+
+    def rate(time: float, x: Array) -> Array:
+        watch.check()
+        result: Array = state_rate(x, torque(time)).copy()
+        return result
+
+    result = solve_ivp(rate, (0.0, duration), state, method='DOP853', rtol=rtol, atol=atol)
     final: Array = result.y[:, -1] if result.success else np.full_like(state, np.nan)
     return final
