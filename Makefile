@@ -31,6 +31,7 @@ test: lint
 lint: setup
 	tools/run ruff check
 	tools/run mypy
+	@mkdir -p log
 	@tools/run ament_flake8 $(CODE) >log/lint.txt || { cat log/lint.txt; exit 1; }
 	@tools/run ament_pep257 $(CODE) >log/lint.txt
 

@@ -29,6 +29,7 @@ setup(
         'pyyaml>=6.0',
         'rosbags>=0.11',
         'scipy>=1.11',
+        'zstandard>=0.22',
     ],
     extras_require={'test': ['hypothesis', 'mcap-ros2-support', 'pytest', 'pytest-timeout']},
     zip_safe=False,

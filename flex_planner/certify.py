@@ -37,8 +37,8 @@ class CertificateLimits:
                 for name, value, limit in pairs if not value <= limit]
 
 
-def certify(problem: MotionProblem, result: CollocationResult,
-            monitor: Monitor) -> Certificate:
+def certify(problem: MotionProblem, result: CollocationResult, monitor: Monitor, *,
+            rtol: float = 1e-8) -> Certificate:
     """
     Return the certificate of a solution.
 
@@ -52,7 +52,8 @@ def certify(problem: MotionProblem, result: CollocationResult,
 
     """
     final = simulate(problem.model, problem.p, problem.start,
-                     torque_polynomial(problem, result.solution), problem.task.duration, monitor)
+                     torque_polynomial(problem, result.solution), problem.task.duration, monitor,
+                     rtol=rtol, atol=rtol / 100)
     if not np.isfinite(final).all():
         return Certificate(collocation_residual=result.residual)
     arm, n_t = problem.model.arm, problem.model.arm.n_coordinates
@@ -78,7 +79,7 @@ def torque_polynomial(problem: MotionProblem,
 
 def hamiltonian_drift(problem: MotionProblem, solution: CollocationSolution) -> float:
     """Return the spread of H over the motion relative to the size of its terms."""
-    times = np.linspace(0, problem.task.duration, 4 * solution.intervals + 1)
+    times = np.linspace(0, problem.task.duration, 4 * solution.intervals + 1, dtype=np.float64)
     z = solution(times)
     controls = problem.model.controls(z, problem.p)
     half = z.shape[1] // 2

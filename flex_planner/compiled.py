@@ -175,15 +175,15 @@ def load_functions(key: str, build: Builder) -> dict[str, BatchFunction]:
     if functions is not None:
         return functions
     built = build()
-    compiler = _compiler()
-    if compiler is None:
-        _LOG.warning('no C compiler (cc, gcc or clang) found: functions are interpreted, '
-                     'which makes a plan 10 to 50 times slower')
-        return {name: _InterpretedFunction(f, Signature.of(f, batched))
-                for name, (f, batched) in built.items()}
     signatures = {name: Signature.of(f, batched) for name, (f, batched) in built.items()}
-    library = _compile(compiler, key, _source(built), signatures)
-    return _bind(library, signatures)
+    compiler, reason = _compiler(), 'no C compiler (cc, gcc or clang) found'
+    if compiler is not None:
+        try:
+            return _bind(_compile(compiler, key, _source(built), signatures), signatures)
+        except (OSError, subprocess.CalledProcessError) as error:
+            reason = f'{compiler} failed: {getattr(error, "stderr", "") or error}'
+    _LOG.warning('%s: functions are interpreted, which makes a plan 10 to 50 times slower', reason)
+    return {name: _InterpretedFunction(f, signatures[name]) for name, (f, _) in built.items()}
 
 
 def _compiler() -> str | None:
@@ -234,7 +234,7 @@ def _compile(compiler: str, key: str, source: str, signatures: Mapping[str, Sign
         code, library = Path(scratch, 'functions.c'), Path(scratch, 'functions.so')
         code.write_text(source)
         subprocess.run([compiler, *_FLAGS, str(code), '-o', str(library), '-lm'],
-                       check=True, capture_output=True)
+                       check=True, capture_output=True, text=True)
         digest = _digest(library)
         # named by its content: two processes that build at once never mix their files
         target = folder / f'{key}-{digest[:16]}.so'
@@ -278,7 +278,7 @@ def _load(key: str) -> dict[str, BatchFunction] | None:
                             tuple((rows, columns) for rows, columns in entry['outputs']))
             for name, entry in record['functions'].items()}
         return _bind(library, signatures)
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         return None
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         _LOG.warning('compiled functions %s are damaged (%s) and are built again', key, error)

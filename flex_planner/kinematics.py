@@ -65,7 +65,7 @@ def link_points(arm: Arm, coordinates: Array, stations: int = 2) -> Array:
     base = np.zeros((*coordinates.shape[:-1], 2))
     points = []
     for i, (link, modal) in enumerate(zip(arm.links, arm.modal_slices, strict=True)):
-        x = np.linspace(0, link.length, stations)
+        x = np.linspace(0, link.length, stations, dtype=np.float64)
         shapes = link.mode_shapes()
         bend = coordinates[..., modal] @ shapes.shape(x).T  # (..., stations)
         c, s = np.cos(angles[..., i, None]), np.sin(angles[..., i, None])

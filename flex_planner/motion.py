@@ -67,7 +67,7 @@ class MotionProblem:
     def straight_line(self, intervals: int, rule: GaussRule) -> CollocationSolution:
         """Return constant velocity from start to goal with zero costates, as a guess."""
         n_t = self.model.arm.n_coordinates
-        mesh = np.linspace(0, self.task.duration, intervals + 1)
+        mesh = np.linspace(0, self.task.duration, intervals + 1, dtype=np.float64)
         nodes = np.zeros((intervals + 1, self.size))
         change = self.goal[:n_t] - self.start[:n_t]
         nodes[:, :n_t] = self.start[:n_t] + np.outer(mesh / self.task.duration, change)
@@ -94,8 +94,9 @@ class MotionProblem:
             bend = np.maximum(np.abs(np.linalg.solve(stiffness, inertia[n:])), 1e-9 * arm.reach)
         positions = np.concatenate([travel, bend])
         velocity_costates = np.abs(mass[:, :n]) @ (self.parameters.effort_weights * inertia[:n])
-        return 0.1 * np.concatenate([positions, positions / duration,
-                                     velocity_costates / duration, velocity_costates])
+        scale: Array = np.concatenate([positions, positions / duration,
+                                       velocity_costates / duration, velocity_costates]) / 10
+        return scale
 
 
 def task_parameters(task: Task) -> Parameters:

@@ -181,7 +181,7 @@ class Plan:
 
     def uniform_samples(self, count: int) -> Samples:
         """Return the motion at evenly spaced times, both ends included."""
-        return self.sample(np.linspace(0, self.task.duration, count))
+        return self.sample(np.linspace(0, self.task.duration, count, dtype=np.float64))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

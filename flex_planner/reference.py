@@ -91,7 +91,7 @@ def sample_reference(plan: Plan, settings: SamplingSettings) -> Reference:
         if error <= settings.torque_tolerance or duration / count < 2 * _SMALLEST_STEP:
             break
         count *= 2
-    times = np.linspace(0, duration, count + 1)
+    times = np.linspace(0, duration, count + 1, dtype=np.float64)
     times_ns = np.round(times * 1e9).astype(np.int64)
     moving = _at_rest_at_the_ends(plan, plan.sample(times))
     return Reference(times_ns=np.append(times_ns, times_ns[-1] + HOLD_DELAY_NS),

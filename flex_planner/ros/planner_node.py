@@ -15,6 +15,7 @@ from flex_planner.ros.worker import Worker
 from flex_planner_interfaces.msg import FlexibleTrajectory
 from flex_planner_interfaces.srv import PlanPath
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -50,6 +51,7 @@ class PlannerNode(Node):  # type: ignore[misc]
         super().__init__('flex_planner')
         arm = load_arm(self._arm_parameter())
         self._settings = declare(self, PlannerSettings.for_arm(arm))
+        self._settings.check_joints(arm.n_joints)
         self.add_on_set_parameters_callback(self._judge_parameters)
         self.add_post_set_parameters_callback(self._apply_parameters)
         self.get_logger().info(f'preparing the dynamics of {arm.name}')
@@ -59,7 +61,9 @@ class PlannerNode(Node):  # type: ignore[misc]
         self._joints = self.create_publisher(JointTrajectory, '~/joint_trajectory', LATCHED)
         self._flexible = self.create_publisher(
             FlexibleTrajectory, '~/flexible_trajectory', LATCHED)
-        self.create_service(PlanPath, '~/plan_path', self._on_plan_path)
+        # in the group that all else is in, a request that waits would hold up the others
+        self.create_service(PlanPath, '~/plan_path', self._on_plan_path,
+                            callback_group=ReentrantCallbackGroup())
         self.get_logger().info(f'ready to plan for {arm.name}')
 
     def _arm_parameter(self) -> str:

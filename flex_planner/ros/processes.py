@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import ExitStack
+from pathlib import Path
 import signal
 import subprocess
 import sys
@@ -23,18 +25,23 @@ class NodeProcess:
         Node parameters; lists and texts in YAML notation are taken as they are.
     remappings : mapping of str to str
         Names to be replaced.
+    log : Path, optional
+        File for what the node says; default: the standard error of this process.
 
     """
 
     def __init__(self, module: str, parameters: Mapping[str, object] | None = None,
-                 remappings: Mapping[str, str] | None = None) -> None:
+                 remappings: Mapping[str, str] | None = None, log: Path | None = None) -> None:
         pairs = [f'{name}:={_yaml(value)}' for name, value in (parameters or {}).items()]
         rules = [f'{name}:={target}' for name, target in (remappings or {}).items()]
         arguments = [word for pair in pairs for word in ('-p', pair)]
         arguments += [word for rule in rules for word in ('-r', rule)]
-        # a session of its own: Ctrl-C in the terminal reaches the node through stop() only
-        self.process = subprocess.Popen(
-            [sys.executable, '-m', module, '--ros-args', *arguments], start_new_session=True)
+        with ExitStack() as stack:
+            output = stack.enter_context(log.open('wb')) if log else None
+            # a session of its own: Ctrl-C in the terminal reaches the node through stop() only
+            self.process = subprocess.Popen(
+                [sys.executable, '-m', module, '--ros-args', *arguments],
+                stdout=output, stderr=output, start_new_session=True)
 
     def stop(self, number: signal.Signals = signal.SIGINT) -> int:
         """End the process by a signal, by force after 5 s, and return its exit code."""

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import logging
+import signal
 import sys
 
 from flex_planner.errors import FlexPlannerError
 from flex_planner.ros.logs import forward_logs
 import rclpy
+from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 import rclpy.logging
 from rclpy.node import Node
@@ -21,26 +23,39 @@ def run_node(create: Callable[[], Node], name: str, args: list[str] | None) -> N
     Parameters
     ----------
     create : callable
-        Returns the node; a FlexPlannerError is logged as the reason not to start.
+        Returns the node; a FlexPlannerError, and a parameter of a wrong type or out of its
+        range, is logged as the reason not to start.
     name : str
         Of the logger until the node has its own.
     args : list of str or None
         Command line.
 
     """
-    rclpy.init(args=args)
+    node, code, started = None, 0, False
+
+    def on_signal(number: int, frame: object) -> None:
+        # once it spins, rclpy ends it between two callbacks; before, nobody would for seconds
+        if not started:
+            sys.exit(0)
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, on_signal)
+    rclpy.init(args=args)  # calls the handlers above from its own
     forward_logs(logging.getLogger('flex_planner'))
-    node, code = None, 0
     try:
         node = create()
+        started = True
         executor = SingleThreadedExecutor()
         executor.add_node(node)
         executor.spin()
-    except (KeyboardInterrupt, ExternalShutdownException):
+    except ExternalShutdownException:
         pass
-    except FlexPlannerError as error:
+    except (FlexPlannerError, ParameterException) as error:
         rclpy.logging.get_logger(name).fatal(str(error))
         code = 1
+    except Exception:
+        if rclpy.ok():
+            raise  # else it comes of a signal that shut rclpy down
     finally:
         if node is not None:
             node.destroy_node()

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from flex_planner.arm import Arm
 from flex_planner.collocation import Settings
-from flex_planner.errors import InvalidValueError
+from flex_planner.errors import InvalidSizeError, InvalidValueError
 from flex_planner.reference import SamplingSettings
 from flex_planner.ros.parameters import described
 from flex_planner.validation import vector
@@ -76,6 +76,11 @@ class PlannerSettings:
         """Return the defaults for an arm."""
         names = [f'joint{i}' for i in range(1, arm.n_joints + 1)]
         return replace(cls(), joint_names=names, effort_weights=[1.0] * arm.n_joints)
+
+    def check_joints(self, count: int) -> None:
+        """Raise InvalidSizeError unless there is a name for each of the arm's joints."""
+        if len(self.joint_names) != count:
+            raise InvalidSizeError('joint_names', self.joint_names, f'a list of {count} names')
 
     def solver(self) -> Settings:
         """Return the settings of the boundary-value solver."""
