@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 
 from flex_planner.collocation import CollocationResult, CollocationSolution
@@ -52,7 +53,7 @@ def certify(problem: MotionProblem, result: CollocationResult, monitor: Monitor,
 
     """
     final = simulate(problem.model, problem.p, problem.start,
-                     torque_polynomial(problem, result.solution), problem.task.duration, monitor,
+                     planned_torque(problem, result.solution), problem.task.duration, monitor,
                      rtol=rtol, atol=rtol / 100)
     if not np.isfinite(final).all():
         return Certificate(collocation_residual=result.residual)
@@ -67,14 +68,31 @@ def certify(problem: MotionProblem, result: CollocationResult, monitor: Monitor,
                                               problem.p))
 
 
-def torque_polynomial(problem: MotionProblem,
-                      solution: CollocationSolution) -> PiecewisePolynomial:
-    """Return the planned torque as a polynomial in every interval of the mesh."""
+def planned_torque(problem: MotionProblem,
+                   solution: CollocationSolution) -> Callable[[float], Array]:
+    """
+    Return the planned torque of eq. (14) as a quick function of one time.
+
+    The torque without bounds and the speeds are polynomials in every interval of the mesh; the
+    bounds of eq. (15) are applied last, so that the corners where a motor switches stay sharp.
+
+    """
+    n, n_t = problem.model.arm.n_joints, problem.model.arm.n_coordinates
     theta = np.concatenate([[0.0], solution.rule.nodes, [1.0]])
     times = solution.mesh[:-1, None] + solution.steps[:, None] * theta
-    torque = problem.model.controls(solution(times.ravel()), problem.p).torque
-    values = torque.reshape(solution.intervals, theta.size, -1)
-    return PiecewisePolynomial.through(solution.mesh, theta, values)
+    z = solution(times.ravel())
+    free = problem.model.controls(z, problem.p).free_torque
+    values = np.hstack([free, z[:, n_t:n_t + n]]).reshape(solution.intervals, theta.size, 2 * n)
+    pieces = PiecewisePolynomial.through(solution.mesh, theta, values)
+    stall, slope = problem.parameters.stall_torque, problem.parameters.torque_slope
+
+    def torque(time: float) -> Array:
+        now = pieces(time)
+        shift = slope * now[n:]
+        bounded: Array = np.minimum(np.maximum(now[:n], -stall - shift), stall - shift)
+        return bounded
+
+    return torque
 
 
 def hamiltonian_drift(problem: MotionProblem, solution: CollocationSolution) -> float:

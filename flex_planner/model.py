@@ -81,6 +81,8 @@ class Controls:
     ----------
     torque : numpy.ndarray, shape (k, n)
         Eq. (14) [N m].
+    free_torque : numpy.ndarray, shape (k, n)
+        The same without bounds, smooth where motors switch: eq. (13) [N m].
     cost_rate, hamiltonian : numpy.ndarray, shape (k,)
         L of eq. (7) and H of eq. (8).
     payload_share : numpy.ndarray, shape (k,)
@@ -91,6 +93,7 @@ class Controls:
     """
 
     torque: Array
+    free_torque: Array
     cost_rate: Array
     hamiltonian: Array
     payload_share: Array
@@ -124,9 +127,10 @@ class ArmModel:
 
     def controls(self, z: Array, p: Array) -> Controls:
         """Return torque, cost and Hamiltonian at points, see `Controls`."""
-        torque, cost, hamiltonian, share, acceleration = self._functions['control'](z, p)
-        return Controls(torque=torque, cost_rate=cost[:, 0], hamiltonian=hamiltonian[:, 0],
-                        payload_share=share[:, 0], acceleration=acceleration)
+        torque, free, cost, hamiltonian, share, acceleration = self._functions['control'](z, p)
+        return Controls(torque=torque, free_torque=free, cost_rate=cost[:, 0],
+                        hamiltonian=hamiltonian[:, 0], payload_share=share[:, 0],
+                        acceleration=acceleration)
 
     def forward_dynamics(self, x: Array, torque: Array, p: Array) -> Array:
         """Return x' of eq. (5) for states (k, 2 n_t) and torques (k, n)."""

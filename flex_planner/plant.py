@@ -50,7 +50,7 @@ class JointReference:
     Parameters
     ----------
     times : numpy.ndarray, shape (k,)
-        Strictly increasing from 0 [s].
+        Strictly increasing from 0, see :meth:`after` [s].
     positions, velocities, torques : numpy.ndarray, shape (k, n)
         [rad], [rad/s], [N m]; the last row is held for ever.
 
@@ -67,6 +67,15 @@ class JointReference:
         still = np.zeros((1, positions.size))
         return cls(times=np.zeros(1), positions=positions[None], velocities=still,
                    torques=torques[None])
+
+    def after(self, positions: Array, velocities: Array, torques: Array) -> JointReference:
+        """Return the reference with a way to its first sample, unless that is at time 0."""
+        if self.times[0] == 0:
+            return self
+        return JointReference(
+            times=np.append(0.0, self.times), positions=np.vstack([positions, self.positions]),
+            velocities=np.vstack([velocities, self.velocities]),
+            torques=np.vstack([torques, self.torques]))
 
     def spline(self) -> CubicHermiteSpline | None:
         """Return positions over time, None if there is a single sample."""
@@ -106,6 +115,8 @@ class Plant:
     def __init__(self, model: ArmModel, *, payload_mass: float, gains: Gains, positions: Array,
                  rate: float = 1000.0) -> None:
         self.model, self._gains = model, gains
+        for name in ('stiffness', 'damping'):
+            vector(name, getattr(gains, name), model.arm.n_joints)
         self._period = 1 / number('rate', rate, at_least=10, at_most=1e5, unit='Hz')
         mass = number('payload_mass', payload_mass, at_least=0, unit='kg')
         self._p = Parameters.of(model.arm, payload_mass=mass).stacked()

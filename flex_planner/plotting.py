@@ -9,7 +9,6 @@ from pathlib import Path
 from flex_planner.arm import Arm
 from flex_planner.kinematics import link_points
 from flex_planner.validation import Array
-import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 import numpy as np
@@ -88,7 +87,6 @@ def draw_motion(path: Path, arm: Arm, joint_names: Sequence[str], motion: Motion
         As carried out: dashed lines.
 
     """
-    matplotlib.use('Agg')
     figure = Figure(figsize=(15, 8.5), layout='constrained')
     axes = figure.subplots(2, 3)
     n = arm.n_joints

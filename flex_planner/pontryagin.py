@@ -60,7 +60,8 @@ def build_functions(arm: Arm) -> dict[str, tuple[Any, int]]:
 
         - ``optimality`` z -> z', eqs. (11), (12) with (14), (15)
         - ``optimality_jacobian`` z -> z', dz'/dz
-        - ``control`` z -> torque, running cost L, Hamiltonian H, dH/dm_p, accelerations
+        - ``control`` z -> torque, torque without bounds, running cost L, Hamiltonian H,
+          dH/dm_p, accelerations
         - ``forward_dynamics`` (x, u) -> x', eq. (5)
         - ``inverse_dynamics`` (x, a) -> generalized forces
         - ``mass_and_energy`` x -> M, kinetic energy, potential energy
@@ -99,7 +100,7 @@ def _factorized(matrix: Any) -> tuple[Any, Any]:
 
 
 def _optimality(par: _Parameters, n: int) -> tuple[Any, Any, tuple[Any, ...]]:
-    """Return z, z' and (torque, L, H, dH/dm_p, accelerations)."""
+    """Return z, z' and the outputs of ``control``."""
     chain = par.chain
     q, rates = chain.coordinates, chain.rates
     n_t = q.numel()
@@ -125,7 +126,7 @@ def _optimality(par: _Parameters, n: int) -> tuple[Any, Any, tuple[Any, ...]]:
     hamiltonian = cost + ca.dot(psi_1, rates) + ca.dot(psi_2, a_value)
     z = ca.vertcat(q, rates, psi_1, psi_2)
     F = ca.vertcat(rates, a_value, psi_1_rate, psi_2_rate)
-    return z, F, (u, cost, hamiltonian, payload_share, a_value)
+    return z, F, (u, u_free, cost, hamiltonian, payload_share, a_value)
 
 
 def _bounded(par: _Parameters, y: Any, speeds: Any) -> tuple[Any, Any]:

@@ -250,11 +250,15 @@ def test_task_weights_of_joints_leave_the_modes_free() -> None:
     assert task.velocity_weights.tolist() == [3.0, 4.0, 5.0]
 
 
-def test_goal_angle_is_the_one_nearest_to_the_start(rigid_arm: Arm) -> None:
-    # across the negative x axis, where the angle jumps from pi to -pi
-    start, goal = postures_from_points(rigid_arm, (-0.6, 0.3), (-0.6, -0.3), elbow=1)
-    assert abs(goal[0] - start[0]) < np.pi
-    assert goal[0] - start[0] == pytest.approx(2 * np.arctan2(0.3, 0.6), abs=1e-12)  # rounding
+@pytest.mark.parametrize(('first', 'last'), [(120.0, 145.0), (145.0, 120.0), (10.0, 20.0)])
+def test_goal_angle_is_the_one_nearest_to_the_start(rigid_arm: Arm, first: float,
+                                                    last: float) -> None:
+    # around 132 deg the first joint angle passes 180 deg; on a circle it turns with the point
+    points = [0.67 * np.array([math.cos(angle), math.sin(angle)])
+              for angle in np.radians([first, last])]
+    start, goal = postures_from_points(rigid_arm, points[0], points[1], elbow=-1)
+    turn = np.degrees(goal - start)
+    np.testing.assert_allclose(turn, [last - first, 0], atol=1e-12)  # rounding
 
 
 @pytest.mark.parametrize(('start', 'goal', 'error', 'message'), [

@@ -202,3 +202,13 @@ def test_presets_are_found_in_the_share_folder_of_an_installation(
     monkeypatch.setattr(arm_files, '__file__', str(tmp_path / 'lib' / 'arm_files.py'))
     monkeypatch.setenv('AMENT_PREFIX_PATH', f'/nonexistent:{tmp_path}')
     assert load_arm('installed').name == 'two links'
+
+
+def test_source_tree_comes_before_installations(tmp_path: Path,
+                                                monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = tmp_path / 'share' / 'flex_planner' / 'config' / 'arms'
+    folder.mkdir(parents=True)
+    own = load_arm('korayem_rigid').name
+    Path(write(folder, COMPLETE)).rename(folder / 'korayem_rigid.yaml')
+    monkeypatch.setenv('AMENT_PREFIX_PATH', str(tmp_path))
+    assert load_arm('korayem_rigid').name == own

@@ -270,6 +270,17 @@ def test_levelled_mesh_puts_nodes_where_the_defect_is() -> None:
     assert steps.max() > 2 * steps.min()
 
 
+def test_levelled_mesh_grades_towards_a_steep_interval() -> None:
+    solution, defect = solved_on(STEEP, 9, 3), np.full(9, 1e-12)
+    defect[4] = 1.0
+    mesh = levelled(solution, defect, 1e-4, fewest=4, most=100)
+    counts, _ = np.histogram(mesh, bins=solution.mesh)
+    # six in the steep interval, and in its neighbours half as many instead of a sixth of one
+    assert counts[4] >= 6
+    assert min(counts[3], counts[5]) >= 3
+    assert counts[[0, 1, 7, 8]].max() <= 1
+
+
 @pytest.mark.parametrize('stages', range(2, 9))
 def test_gauss_rule_meets_its_order_conditions(stages: int) -> None:
     rule, powers = GaussRule.of(stages), np.arange(1, 2 * stages + 1)
@@ -438,6 +449,27 @@ def test_linear_problem_takes_one_iteration_from_anywhere() -> None:
         outcome = newton_of(LINEAR, shift)
         assert (outcome.converged, outcome.iterations, outcome.message) == (True, 1, 'converged')
         assert outcome.correction <= 1e-9
+
+
+class Arctangent(System):
+    """z' = 0 with arctan(z(0)) = 0, the textbook's trap for undamped Newton steps."""
+
+    def left(self, z: Array) -> tuple[Array, Array]:
+        return np.arctan(z), 1 / (1 + z**2)[None]
+
+
+@pytest.mark.parametrize(('start', 'iterations'), [(1.3, 5), (1.4, 5), (3.0, 6), (100.0, 12)])
+def test_newton_is_damped_where_full_steps_diverge(start: float, iterations: int) -> None:
+    # undamped, the iteration diverges from |z| > 1.3917
+    problem = Arctangent(rate_of=lambda t, z: [0 * z[0]], jacobian_of=lambda t, z: [[0]],
+                         left_rows=[], left_values=[], right_rows=[], right_values=[],
+                         scale=np.ones(1))
+    mesh = np.linspace(0, 1, 3)
+    guess = CollocationSolution.from_values(mesh, np.full((3, 1), start), GaussRule.of(2))
+    outcome = newton(problem, guess, tolerance=1e-9, max_iterations=60, monitor=Monitor())
+    assert outcome.converged, outcome.message
+    assert outcome.iterations <= iterations
+    np.testing.assert_allclose(outcome.solution.nodes, 0, atol=1e-9)  # Newton's tolerance
 
 
 def test_newton_converges_quadratically_near_the_solution() -> None:

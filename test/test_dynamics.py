@@ -12,6 +12,12 @@ from flex_planner.arm import Arm, Joint, Link, Node
 from flex_planner.kinematics import frame_angles, link_points, tip_position
 from flex_planner.model import ArmModel, Parameters
 from flex_planner.simulation import simulate
+from flex_planner.statics import (
+    clamped_modes,
+    equilibrium,
+    modal_stiffness,
+    residual_vibration,
+)
 from flex_planner.validation import Array
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -76,7 +82,7 @@ def appendix_inertia(q: Array, L_1: float, L_2: float, rho: float, m_p: float) -
     Return the inertia matrix of the paper's appendix, in the order of the appendix.
 
     That order is theta_1, theta_2, q_11, q_21, q_12, q_22. Its garbled places are read as in
-    numerics.md section 5: all of J_r12 is multiplied by L_2, rho multiplies its first bracket
+    all of J_r12 is multiplied by L_2, rho multiplies its first bracket
     and the bracket of J_rf112.
 
     """
@@ -334,3 +340,74 @@ def test_response_tends_to_that_of_the_rigid_arm_as_it_stiffens(hanging_arm: Arm
     # fig. 4: E I = 100 is very close; the sag, and with it the distance, goes as 1 / E I
     assert distances[0] < 0.01
     np.testing.assert_allclose(np.divide(distances[:-1], distances[1:]), 4.0, rtol=0.15)
+
+
+# At rest
+
+
+def test_equilibrium_leaves_no_force_on_the_modes(workshop_arm: Arm,
+                                                  workshop_model: ArmModel) -> None:
+    p = parameters(workshop_arm)
+    coordinates, torque = equilibrium(workshop_model, np.array([0.3, -0.8]), p)
+    x = np.concatenate([coordinates, np.zeros(5)])[None]
+    force = workshop_model.inverse_dynamics(x, np.zeros((1, 5)), p)[0]
+    np.testing.assert_allclose(force[2:], 0, atol=1e-12)  # rounding of ~10 N
+    assert coordinates[:2].tolist() == [0.3, -0.8]
+    assert torque.tolist() == force[:2].tolist()
+    assert np.abs(torque).min() > 1.0
+
+
+def test_equilibrium_of_a_level_link_is_the_sag_of_a_beam(hanging_arm: Arm) -> None:
+    # simply supported under its weight: 5 rho g L^4 / (384 E I) in the middle, of which the
+    # first sine carries 4 rho g L^4 / (pi^5 E I)
+    coordinates, _ = equilibrium(ArmModel(hanging_arm), np.zeros(2), parameters(hanging_arm))
+    expected = -4 * 6.0 * 9.81 * 0.5**4 / (np.pi**5 * 100.0)
+    np.testing.assert_allclose(coordinates, [0, 0, expected, expected], rtol=1e-12)  # rounding
+
+
+def test_rigid_arm_is_held_by_the_moment_of_its_weight(hanging_arm: Arm) -> None:
+    rigid = hanging_arm.rigid()
+    coordinates, torque = equilibrium(ArmModel(rigid), np.zeros(2), parameters(rigid, 1.0))
+    assert coordinates.tolist() == [0.0, 0.0]
+    # two rods of 3 kg and a payload of 1 kg, level: levers 0.25, 0.75, 1 and 0.25, 0.5 m
+    np.testing.assert_allclose(torque, [9.81 * 4.0, 9.81 * 1.25], rtol=1e-13)  # rounding
+
+
+def test_locked_links_ring_with_the_frequencies_of_pinned_beams(uneven_arm: Arm,
+                                                                uneven_model: ArmModel) -> None:
+    # the payload does not load pinned links, and locked joints part them
+    p = parameters(uneven_arm)
+    frequencies, vectors = clamped_modes(uneven_model, np.array([0.5, 1.0, 0, 0, 0, 0]), p)
+    order = np.array([1, 2])
+    expected = [*(order * np.pi / 0.6)**2 * np.sqrt(50 / 6.0),
+                *(order * np.pi / 0.35)**2 * np.sqrt(20 / 6.0)]
+    np.testing.assert_allclose(frequencies, np.sort(expected), rtol=1e-12)  # rounding
+    stiffness = modal_stiffness(uneven_model, p[1:3])
+    np.testing.assert_allclose(vectors.T @ stiffness @ vectors, np.diag(frequencies**2),
+                               atol=1e-12 * frequencies[-1]**2)
+
+
+@pytest.mark.parametrize(('entry', 'value', 'expected'), [
+    # a half-sine of 2 mm; of mode 2, which the stations meet at its peak; a speed over omega
+    (2, 2e-3, 2e-3), (3, 1e-3, 1e-3), (8, 0.1, 0.1 / ((np.pi / 0.6)**2 * np.sqrt(50 / 6.0)))])
+def test_residual_vibration_is_the_amplitude_of_the_ringing(
+        uneven_arm: Arm, uneven_model: ArmModel, entry: int, value: float,
+        expected: float) -> None:
+    rest, state = np.array([0.5, 1.0, 0, 0, 0, 0]), np.zeros(12)
+    state[:6], state[entry] = rest, value
+    found = residual_vibration(uneven_model, state, rest, parameters(uneven_arm))
+    assert found == pytest.approx(expected, rel=1e-12)  # rounding
+
+
+def test_arm_at_rest_or_rigid_does_not_ring(uneven_arm: Arm, uneven_model: ArmModel,
+                                            rigid_arm: Arm, rigid_model: ArmModel) -> None:
+    rest = np.array([0.5, 1.0, 0, 0, 0, 0])
+    state = np.concatenate([rest, [3.0, -2.0, 0, 0, 0, 0]])  # turning is not bending
+    assert residual_vibration(uneven_model, state, rest, parameters(uneven_arm)) == 0.0
+    assert residual_vibration(rigid_model, np.ones(4), np.ones(2), parameters(rigid_arm)) == 0.0
+
+
+def test_failed_simulation_is_nan(rigid_model: ArmModel, rigid_arm: Arm) -> None:
+    end = simulate(rigid_model, parameters(rigid_arm), np.zeros(4),
+                   lambda t: np.full(2, np.nan if t > 0.5 else 0.1), 1.0)
+    assert np.isnan(end).all()

@@ -35,7 +35,7 @@ ELBOWS = st.sampled_from([-1, 1])
 
 
 @pytest.mark.parametrize(('point', 'degrees'), [
-    # eq. (28); its theta_2(0) = -60 deg is a slip, see numerics.md section 5
+    # eq. (28); its theta_2(0) = -60 deg is a slip
     ((0.5, 0.0), (60.0, -120.0)), ((0.5, 0.5), (90.0, -90.0))])
 def test_points_of_the_paper_have_the_angles_of_eq_28(rigid_arm: Arm, point: tuple[float, float],
                                                       degrees: tuple[float, float]) -> None:

@@ -64,7 +64,7 @@ def test_tip_deflection_of_every_family_is_its_shape_at_the_end(family: str) -> 
 
 
 def test_pinned_link_turns_the_next_frame_by_nothing(modes: LinkModes) -> None:
-    # the joint angle is measured from the chord, see numerics.md section 1
+    # the joint angle is measured from the chord
     assert modes.tip_slope.tolist() == modes.tip_deflection.tolist() == [0.0] * COUNT
 
 

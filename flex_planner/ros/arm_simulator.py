@@ -122,7 +122,9 @@ class ArmSimulator(Node):  # type: ignore[misc]
         if refusal:
             self.get_logger().error(f'trajectory refused: {refusal}')
             return
-        self._plant.follow(_reference(trajectory, self._settings.joint_names))
+        n, n_t, state = self._arm.n_joints, self._arm.n_coordinates, self._plant.state
+        reference = _reference(trajectory, self._settings.joint_names)
+        self._plant.follow(reference.after(state[:n], state[n_t:n_t + n], self._plant.torque))
         self.get_logger().info(f'following a trajectory of {len(trajectory.points)} points')
 
     def _refusal(self, trajectory: JointTrajectory) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 from flex_planner.arm_files import load_arm
@@ -96,11 +97,12 @@ class PlannerNode(Node):  # type: ignore[misc]
     def _outcome(self, request: PlanPath.Request) -> Future:
         """Hand a request to the worker and return what it will lead to."""
         executor, settings = self.executor, self._settings
-        future = Future(executor=executor)
+        future, accepted = Future(executor=executor), time.monotonic_ns()
 
         def job() -> None:
-            future.set_result(self._planning.plan(request.task, settings,
-                                                  lambda: self._worker.stopping))
+            future.set_result(self._planning.plan(
+                request.task, settings, lambda: self._worker.stopping,
+                waited_ns=time.monotonic_ns() - accepted))
             # a future that another thread completes does not wake the executor by itself
             executor.wake()
 

@@ -76,7 +76,7 @@ class Planning:
         self._model, self._recorder = model, recorder
 
     def plan(self, message: MotionTask, settings: PlannerSettings,
-             canceled: Callable[[], bool]) -> Outcome:
+             canceled: Callable[[], bool], waited_ns: int = 0) -> Outcome:
         """
         Plan a request and record it with its outcome.
 
@@ -88,9 +88,11 @@ class Planning:
             Parameters when it arrived.
         canceled : callable
             Returns True once planning should stop.
+        waited_ns : int
+            How long ago the request was accepted [ns].
 
         """
-        started, stamp = time.monotonic_ns(), time.time_ns()
+        accepted, stamp = time.monotonic_ns() - waited_ns, time.time_ns() - waited_ns
         try:
             outcome = self._planned(message, settings, canceled)
         except FlexPlannerError as error:
@@ -98,7 +100,7 @@ class Planning:
         except Exception as error:
             _LOG.exception('planning failed')
             outcome = unknown_failure(error)
-        outcome.report.planning_time = duration_message(time.monotonic_ns() - started)
+        outcome.report.planning_time = duration_message(time.monotonic_ns() - accepted)
         return self._recorded(message, settings, outcome, stamp)
 
     def _planned(self, message: MotionTask, settings: PlannerSettings,
@@ -129,7 +131,9 @@ class Planning:
                 settings, stamp, message, outcome.report, outcome.trajectory, outcome.plan,
                 outcome.reference)
         except Exception as error:
-            _LOG.exception('recording failed')
+            foreseen = isinstance(error, FlexPlannerError)
+            _LOG.error('recording failed: %s', error, exc_info=not foreseen)
+            outcome.report.recording = ''
             if outcome.report.error_code != PlanReport.NONE:
                 return outcome
             outcome.report.error_code = PlanReport.RECORDING_FAILED

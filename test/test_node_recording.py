@@ -1,0 +1,208 @@
+"""Recordings of the planner node, read by libraries that we did not write."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from flex_planner_interfaces.msg import MotionTask, PlanReport
+from flex_planner_interfaces.srv import PlanPath
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+import numpy as np
+import pytest
+from ros_support import Planner, task
+from rosbags.highlevel import AnyReader
+from trajectory_msgs.msg import JointTrajectory
+import yaml
+
+NODE = '/flex_planner'
+TYPES = {
+    f'{NODE}/motion_task': 'flex_planner_interfaces/msg/MotionTask',
+    f'{NODE}/plan_report': 'flex_planner_interfaces/msg/PlanReport',
+    f'{NODE}/joint_trajectory': 'trajectory_msgs/msg/JointTrajectory',
+    f'{NODE}/flexible_trajectory': 'flex_planner_interfaces/msg/FlexibleTrajectory',
+    f'{NODE}/reference_states': 'sensor_msgs/msg/JointState',
+}
+
+
+class Found(NamedTuple):
+    """A message of a recording: topic, type, log time [ns], content."""
+
+    topic: str
+    kind: str
+    time: int
+    message: Any
+
+
+def plain(message: Any, like: Any) -> Any:
+    """Return a message of any library as dicts, lists and numbers, by the fields of rclpy's."""
+    if hasattr(like, 'get_fields_and_field_types'):
+        return {name: plain(getattr(message, name), getattr(like, name))
+                for name in like.get_fields_and_field_types()}
+    if isinstance(like, list) and like and not isinstance(like[0], str):
+        return [plain(a, b) for a, b in zip(message, like, strict=True)]
+    return list(message) if hasattr(like, '__len__') and not isinstance(like, str) else message
+
+
+def read_by_rosbags(folder: Path) -> list[Found]:
+    with AnyReader([folder]) as reader:
+        return [Found(connection.topic, connection.msgtype, time,
+                      reader.deserialize(data, connection.msgtype))
+                for connection, time, data in reader.messages()]
+
+
+def read_by_mcap(folder: Path) -> list[Found]:
+    with next(folder.glob('*.mcap')).open('rb') as stream:
+        reader = make_reader(stream, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        return [Found(channel.topic, schema.name, record.log_time, message)
+                for schema, channel, record, message in reader.iter_decoded_messages()]
+
+
+READERS = pytest.mark.parametrize('read', [read_by_rosbags, read_by_mcap])
+
+
+def only(found: list[Found], topic: str) -> Found:
+    """Return the message of a topic that has one."""
+    (message,) = [entry for entry in found if entry.topic == f'{NODE}/{topic}']
+    return message
+
+
+@pytest.fixture(scope='module')
+def planner(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Planner]:
+    with Planner(tmp_path_factory.mktemp('recorded'), 'korayem_ei50') as planner:
+        yield planner
+
+
+@pytest.fixture(scope='module')
+def sent() -> MotionTask:
+    return task(payload_mass=0.8, velocity_weights=[0.5, 0.25], publish=True)
+
+
+@pytest.fixture(scope='module')
+def answer(planner: Planner, sent: MotionTask) -> PlanPath.Response:
+    answer = planner.call(PlanPath, f'{NODE}/plan_path', PlanPath.Request(task=sent))
+    assert answer.report.error_code == PlanReport.NONE, answer.report.error_msg
+    return answer
+
+
+@READERS
+def test_recording_holds_every_topic_once_and_the_samples(answer: PlanPath.Response,
+                                                          read: Any) -> None:
+    found = read(Path(answer.report.recording))
+    assert {entry.topic: entry.kind for entry in found} == TYPES
+    states = [entry for entry in found if entry.topic == f'{NODE}/reference_states']
+    assert len(states) == len(answer.trajectory.points)
+    assert len(found) == len(states) + 4
+    assert [entry.time for entry in found] == sorted(entry.time for entry in found)
+
+
+@READERS
+def test_request_and_answer_are_recorded_as_they_were(answer: PlanPath.Response,
+                                                      sent: MotionTask, read: Any) -> None:
+    found = read(Path(answer.report.recording))
+    trajectory = answer.trajectory
+    for topic, original in (('motion_task', sent), ('plan_report', answer.report),
+                            ('joint_trajectory', trajectory.joint_trajectory),
+                            ('flexible_trajectory', trajectory)):
+        recorded = plain(only(found, topic).message, original)
+        assert recorded == plain(original, original), topic
+
+
+@READERS
+def test_reference_states_come_at_the_times_of_the_motion(answer: PlanPath.Response,
+                                                          read: Any) -> None:
+    found = read(Path(answer.report.recording))
+    ready = only(found, 'joint_trajectory').time
+    states = [entry for entry in found if entry.topic == f'{NODE}/reference_states']
+    points = answer.trajectory.joint_trajectory.points
+    for entry, point, bend in zip(states, points, answer.trajectory.points, strict=True):
+        after = point.time_from_start.sec * 10**9 + point.time_from_start.nanosec
+        stamp = entry.message.header.stamp
+        assert entry.time == stamp.sec * 10**9 + stamp.nanosec == ready + after
+        position, velocity = entry.message.position, entry.message.velocity
+        assert list(position) == [*point.positions, *bend.modal_displacements]
+        assert list(velocity) == [*point.velocities, *bend.modal_rates]
+        assert list(entry.message.effort) == [*point.effort, 0, 0, 0, 0]
+    assert list(states[0].message.name)[:3] == ['joint1', 'joint2', 'link1_mode1']
+
+
+def test_outcome_is_recorded_the_planning_time_after_the_request(
+        answer: PlanPath.Response) -> None:
+    found = read_by_rosbags(Path(answer.report.recording))
+    took = answer.report.planning_time
+    passed = only(found, 'plan_report').time - only(found, 'motion_task').time
+    assert passed == took.sec * 10**9 + took.nanosec
+    assert only(found, 'flexible_trajectory').time == only(found, 'plan_report').time
+
+
+def test_scenario_is_attached(answer: PlanPath.Response) -> None:
+    with next(Path(answer.report.recording).glob('*.mcap')).open('rb') as stream:
+        (attachment,) = make_reader(stream).iter_attachments()
+    scenario = yaml.safe_load(attachment.data)
+    assert attachment.name == 'scenario.yaml'
+    assert scenario['arm']['links'][0]['flexural_rigidity'] == 50
+    assert scenario['parameters']['joint_names'] == ['joint1', 'joint2']
+    assert scenario['parameters']['tolerance'] == 1e-3
+
+
+def test_latched_topics_are_recorded_as_latched(answer: PlanPath.Response) -> None:
+    text = (Path(answer.report.recording) / 'metadata.yaml').read_text()
+    topics = yaml.safe_load(text)['rosbag2_bagfile_information']['topics_with_message_count']
+    policies = {entry['topic_metadata']['name']:
+                entry['topic_metadata']['offered_qos_profiles'][0]['durability']
+                for entry in topics}
+    latched = {name for name, policy in policies.items() if policy == 'transient_local'}
+    assert latched == {f'{NODE}/joint_trajectory', f'{NODE}/flexible_trajectory'}
+
+
+@pytest.mark.parametrize(('wrong', 'code'), [
+    ({'duration': float('nan')}, PlanReport.NOT_FINITE),
+    ({'payload_mass': 200.0}, PlanReport.NOT_CONVERGED)])
+def test_failed_request_is_recorded_with_its_report(planner: Planner, wrong: dict[str, Any],
+                                                    code: int) -> None:
+    report = planner.report(**wrong)
+    assert report.error_code == code
+    for found in (read_by_rosbags(Path(report.recording)), read_by_mcap(Path(report.recording))):
+        assert len(found) == 2
+        assert plain(only(found, 'plan_report').message, report) == plain(report, report)
+        recorded, original = only(found, 'motion_task').message, task(**wrong)
+        np.testing.assert_equal(plain(recorded, original), plain(original, original))
+
+
+def test_nothing_is_recorded_if_told_so(planner: Planner) -> None:
+    folder = Path(planner.get('recording_folder'))
+    planner.plan(duration=-1.0)
+    before = sorted(folder.iterdir())
+    assert planner.set('record', False).successful
+    report = planner.report()
+    assert planner.set('record', True).successful
+    assert report.error_code == PlanReport.NONE
+    assert report.recording == ''
+    assert sorted(folder.iterdir()) == before
+
+
+def test_every_recording_has_its_own_folder(planner: Planner) -> None:
+    paths = [planner.report(duration=-1.0).recording for _ in range(3)]
+    assert len(set(paths)) == 3
+    assert sorted(paths) == paths
+    assert {str(Path(path).parent) for path in paths} == {planner.get('recording_folder')}
+
+
+def test_plan_that_cannot_be_recorded_is_returned_but_not_published(tmp_path: Path) -> None:
+    blocker = tmp_path / 'file'
+    blocker.write_text('no folder')
+    with Planner(tmp_path, 'korayem_rigid', 'blocked',
+                 recording_folder=blocker / 'recordings') as planner:
+        heard = planner.listen(JointTrajectory, '/blocked/joint_trajectory')
+        answer = planner.plan(publish=True)
+        planner.spin(0.2)
+        wrong = planner.report(duration=-1.0)
+        assert 'Traceback' not in planner.log()
+    assert answer.report.error_code == PlanReport.RECORDING_FAILED
+    assert str(blocker) in answer.report.error_msg
+    assert answer.report.recording == wrong.recording == ''
+    assert len(answer.trajectory.points) > 100
+    assert not heard
+    assert wrong.error_code == PlanReport.OUT_OF_RANGE

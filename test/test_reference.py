@@ -1,0 +1,138 @@
+"""Samples of a plan, as a controller gets them."""
+
+from __future__ import annotations
+
+from flex_planner.arm import Arm
+from flex_planner.errors import InvalidValueError, NotFiniteError
+from flex_planner.model import ArmModel, Parameters
+from flex_planner.path import plan_path
+from flex_planner.plan import Plan
+from flex_planner.reference import (
+    HOLD_DELAY_NS,
+    Reference,
+    sample_reference,
+    SamplingSettings,
+)
+from flex_planner.task import Task
+import numpy as np
+import pytest
+
+
+@pytest.fixture(scope='module')
+def flexible(ei50_model: ArmModel, ei50_arm: Arm, paper_task) -> Plan:
+    return plan_path(paper_task(ei50_arm), model=ei50_model)
+
+
+@pytest.fixture(scope='module')
+def hanging(workshop_model: ArmModel, workshop_arm: Arm) -> Plan:
+    """Return a plan under gravity, with friction and unlike links."""
+    return plan_path(Task(arm=workshop_arm, start_positions=[-1.5, 0.1], duration=1.0,
+                          goal_positions=[-1.3, 0.3], payload_mass=0.3), model=workshop_model)
+
+
+@pytest.fixture(params=['flexible', 'hanging'])
+def plan(request: pytest.FixtureRequest) -> Plan:
+    plan: Plan = request.getfixturevalue(request.param)
+    assert plan.solved, plan.message
+    return plan
+
+
+def interpolation_error(plan: Plan, reference: Reference) -> float:
+    """Return the error of linear interpolation on a grid 32 times as fine as the samples."""
+    moving = reference.samples
+    times = np.linspace(0, plan.task.duration, 32 * (moving.times.size - 2) + 1)
+    exact = plan.sample(times).torques
+    lines = np.stack([np.interp(times, moving.times[:-1], column[:-1])
+                      for column in moving.torques.T], axis=1)
+    return float(np.abs(lines - exact).max())
+
+
+def test_times_are_integers_that_grow_from_0(plan: Plan) -> None:
+    times = sample_reference(plan, SamplingSettings()).times_ns
+    assert times.dtype == np.int64
+    assert times[0] == 0
+    assert (np.diff(times) > 0).all()
+    assert times[-2] == round(plan.task.duration * 1e9)
+    assert times[-1] - times[-2] == HOLD_DELAY_NS
+
+
+def test_samples_belong_to_their_times(plan: Plan) -> None:
+    reference = sample_reference(plan, SamplingSettings())
+    inner = slice(1, -2)
+    exact = plan.sample(reference.times_ns[inner] * 1e-9)
+    np.testing.assert_allclose(reference.samples.times, reference.times_ns * 1e-9, atol=1e-12)
+    for name in ('coordinates', 'rates', 'accelerations', 'torques', 'velocity_costates', 'tip'):
+        np.testing.assert_allclose(getattr(reference.samples, name)[inner], getattr(exact, name),
+                                   rtol=1e-6, atol=1e-6)
+
+
+def test_motion_starts_and_ends_exactly_at_rest(plan: Plan) -> None:
+    samples = sample_reference(plan, SamplingSettings()).samples
+    n_t = plan.arm.n_coordinates
+    for row, state in ((0, plan.problem.start), (-2, plan.problem.goal), (-1, plan.problem.goal)):
+        assert samples.coordinates[row].tolist() == state[:n_t].tolist()
+        assert not samples.rates[row].any()
+    assert not samples.accelerations[-1].any()
+
+
+def test_last_effort_holds_the_arm(plan: Plan) -> None:
+    samples = sample_reference(plan, SamplingSettings()).samples
+    n, n_t = plan.arm.n_joints, plan.arm.n_coordinates
+    p = Parameters.of(plan.arm, payload_mass=plan.task.payload_mass).stacked()
+    still = np.concatenate([samples.coordinates[-1], np.zeros(n_t)])[None]
+    force = plan.model.inverse_dynamics(still, np.zeros((1, n_t)), p)[0]
+    np.testing.assert_allclose(samples.torques[-1], force[:n], atol=1e-9)
+    # the joints bear the whole load: the links are bent as far as it bends them
+    np.testing.assert_allclose(force[n:], 0, atol=1e-9)
+    assert samples.torques[-1].any() == plan.arm.gravity.any()
+
+
+def test_last_effort_under_gravity_is_not_that_of_the_arrival(hanging: Plan) -> None:
+    torques = sample_reference(hanging, SamplingSettings()).samples.torques
+    assert np.abs(torques[-1] - torques[-2]).max() > 1
+
+
+@pytest.mark.parametrize('tolerance', [0.2, 0.02, 0.002])
+def test_torque_error_bounds_linear_interpolation(plan: Plan, tolerance: float) -> None:
+    reference = sample_reference(plan, SamplingSettings(torque_tolerance=tolerance))
+    assert 0 < reference.torque_error <= tolerance
+    # four probes a step, one of them in the middle, where a parabola is worst
+    assert interpolation_error(plan, reference) <= 1.02 * reference.torque_error
+
+
+def test_tighter_tolerance_gives_more_samples(plan: Plan) -> None:
+    counts = [sample_reference(plan, SamplingSettings(torque_tolerance=tolerance)).times_ns.size
+              for tolerance in (0.5, 0.02, 0.001)]
+    assert counts[0] < counts[1] < counts[2]
+    assert counts[0] == 102  # steps of 10 ms, and the sample that holds
+
+
+def test_longest_step_is_kept(plan: Plan) -> None:
+    reference = sample_reference(plan, SamplingSettings(longest_step=0.03, torque_tolerance=1e3))
+    assert np.diff(reference.times_ns).max() <= 30_000_000
+    assert reference.times_ns.size == 36
+
+
+def test_steps_stay_above_a_quarter_of_a_millisecond(flexible: Plan) -> None:
+    reference = sample_reference(flexible, SamplingSettings(torque_tolerance=1e-12))
+    assert np.diff(reference.times_ns)[:-1].min() >= 250_000
+    assert reference.torque_error > 1e-12  # and the truth is told
+
+
+def test_plan_without_solution_has_no_samples(rigid_arm: Arm, rigid_model: ArmModel,
+                                              paper_task) -> None:
+    failed = plan_path(paper_task(rigid_arm, payload_mass=200.0), model=rigid_model)
+    assert not failed.solved
+    with pytest.raises(ValueError, match='the plan has no solution'):
+        sample_reference(failed, SamplingSettings())
+
+
+@pytest.mark.parametrize(('values', 'error', 'text'), [
+    ({'longest_step': 1e-5}, InvalidValueError, 'longest_step is 1e-05'),
+    ({'longest_step': 2.0}, InvalidValueError, 'longest_step is 2.0'),
+    ({'torque_tolerance': 0.0}, InvalidValueError, 'torque_tolerance is 0.0'),
+    ({'torque_tolerance': np.nan}, NotFiniteError, 'torque_tolerance is nan')])
+def test_bad_sampling_settings_are_refused(values: dict[str, float], error: type[Exception],
+                                           text: str) -> None:
+    with pytest.raises(error, match=text):
+        SamplingSettings(**values)
