@@ -83,7 +83,7 @@ def load_arm(name: str) -> Arm:
     try:
         if path.stat().st_size > _MAX_BYTES:
             raise ArmFileError(f'{path}: the file is larger than {_MAX_BYTES} bytes')
-        content = yaml.safe_load(path.read_text(encoding='utf-8'))
+        content = yaml.load(path.read_text(encoding='utf-8'), _StrictLoader)
     except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
         raise ArmFileError(f'{path}: cannot be read: {error}') from None
     try:
@@ -110,6 +110,19 @@ def arm_from_mapping(content: object) -> Arm:
         nodes=tuple(_node(section) for section in top.sections('nodes', optional=True)),
         gravity=top.take('gravity', (0.0, 0.0)))
     return arm
+
+
+class _StrictLoader(yaml.SafeLoader):
+    """YAML in which a key may be given once only."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        """Return a mapping; PyYAML itself would keep the last of equal keys silently."""
+        keys = [key.value for key, _ in node.value]
+        for key_node, _ in node.value:
+            if keys.count(key_node.value) > 1:
+                raise yaml.constructor.ConstructorError(
+                    None, None, f'field {key_node.value!r} is given twice', key_node.start_mark)
+        return super().construct_mapping(node, deep)
 
 
 class _Section:

@@ -163,7 +163,6 @@ def test_file_that_is_no_plain_yaml_is_refused(tmp_path: Path, content: str) -> 
         load_arm(write(tmp_path, content))
 
 
-@pytest.mark.xfail(reason='PyYAML keeps the last of two equal keys and says nothing', strict=True)
 def test_field_given_twice_is_refused(tmp_path: Path) -> None:
     text = yaml.safe_dump(COMPLETE) + 'gravity: [0.0, 0.0]\n'
     with pytest.raises(ArmFileError, match='gravity'):

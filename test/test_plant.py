@@ -16,7 +16,8 @@ from flex_planner.reference import sample_reference, SamplingSettings
 import numpy as np
 import pytest
 
-GAINS = Gains(stiffness=[100.0, 100.0], damping=[10.0, 10.0])
+GAINS = Gains(stiffness=np.full(2, 100.0), damping=np.full(2, 10.0))
+POSTURE = np.array([-1.3, 0.3])  # off the vertical
 PERIOD = 1e-3
 
 
@@ -48,7 +49,7 @@ def distance_to_goal(plan: Plan, plant: Plant) -> float:
 
 
 def test_plant_at_rest_stays_under_gravity(workshop_model: ArmModel) -> None:
-    plant = Plant(workshop_model, payload_mass=0.3, gains=GAINS, positions=[-1.3, 0.3])
+    plant = Plant(workshop_model, payload_mass=0.3, gains=GAINS, positions=POSTURE)
     before, holding = plant.state.copy(), plant.torque.copy()
     plant.advance(1.0)
     np.testing.assert_allclose(plant.state, before, atol=1e-10)
@@ -58,7 +59,7 @@ def test_plant_at_rest_stays_under_gravity(workshop_model: ArmModel) -> None:
 
 def test_arm_that_sags_under_more_load_than_known_leaves_its_place(
         workshop_model: ArmModel) -> None:
-    plant = Plant(workshop_model, payload_mass=0.3, gains=GAINS, positions=[-1.3, 0.3])
+    plant = Plant(workshop_model, payload_mass=0.3, gains=GAINS, positions=POSTURE)
     before = plant.state.copy()
     plant.follow(JointReference.hold(before[:2], np.zeros(2)))
     plant.advance(1.0)
@@ -117,7 +118,7 @@ def test_time_does_not_run_back(plan: Plan) -> None:
 
 
 def test_torque_never_leaves_the_bounds_of_the_motors(plan: Plan) -> None:
-    plant = plant_at_start(plan, Gains(stiffness=[5e3, 5e3], damping=[50.0, 50.0]))
+    plant = plant_at_start(plan, Gains(stiffness=np.full(2, 5e3), damping=np.full(2, 50.0)))
     plant.follow(JointReference.hold(plan.task.start_positions + [1.0, -0.5], np.zeros(2)))
     reached = 0
     for k in range(1, 301):
@@ -166,8 +167,8 @@ def test_heavier_payload_than_planned_shows_at_the_tip(plan: Plan,
     ({'payload_mass': np.nan}, NotFiniteError, 'payload_mass is nan'),
     ({'positions': [0.0]}, InvalidSizeError, 'positions'),
     ({'positions': [0.0, np.nan]}, NotFiniteError, r'positions\[1\]'),
-    ({'gains': Gains(stiffness=[1.0], damping=[1.0])}, InvalidSizeError, 'stiffness'),
-    ({'gains': Gains(stiffness=[1.0, 1.0], damping=[1.0] * 3)}, InvalidSizeError, 'damping'),
+    ({'gains': Gains(stiffness=np.ones(1), damping=np.ones(1))}, InvalidSizeError, 'stiffness'),
+    ({'gains': Gains(stiffness=np.ones(2), damping=np.ones(3))}, InvalidSizeError, 'damping'),
 ])
 def test_bad_plant_is_refused(ei50_model: ArmModel, changes: dict[str, Any],
                               error: type[Exception], text: str) -> None:
@@ -181,4 +182,4 @@ def test_bad_plant_is_refused(ei50_model: ArmModel, changes: dict[str, Any],
     ([1.0, 1.0], [1.0, np.nan], r'damping\[1\] is nan')])
 def test_bad_gains_are_refused(stiffness: list[float], damping: list[float], text: str) -> None:
     with pytest.raises(InvalidValueError, match=text):
-        Gains(stiffness=stiffness, damping=damping)
+        Gains(stiffness=np.array(stiffness), damping=np.array(damping))

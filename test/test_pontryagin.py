@@ -134,8 +134,10 @@ def test_torque_is_eq_14_within_the_bounds_of_eq_15(model: ArmModel,
     mass = model.mass_and_energy(z[:, :2 * n_t], p)[0]
     free = -np.linalg.solve(mass, z[:, 3 * n_t:, None])[:, :2, 0] / EFFORT
     lower, upper = model.arm.torque_bounds(z[:, n_t:n_t + 2])
-    torque = model.controls(z, p).torque
-    np.testing.assert_allclose(torque, np.clip(free, lower, upper), rtol=1e-11)  # rounding
+    controls = model.controls(z, p)
+    torque = controls.torque
+    np.testing.assert_allclose(controls.free_torque, free, rtol=1e-11)  # rounding
+    np.testing.assert_allclose(torque, np.clip(free, lower, upper), rtol=1e-11)
     saturated = (torque == lower) | (torque == upper)
     assert np.array_equal(saturated.all(axis=0), np.abs(share) > 1)
     assert np.array_equal(saturated.any(axis=0), np.abs(share) > 1)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from flex_planner.arm import Arm
 from flex_planner.errors import InvalidValueError, NotFiniteError
 from flex_planner.model import ArmModel, Parameters
@@ -19,15 +21,16 @@ import pytest
 
 
 @pytest.fixture(scope='module')
-def flexible(ei50_model: ArmModel, ei50_arm: Arm, paper_task) -> Plan:
+def flexible(ei50_model: ArmModel, ei50_arm: Arm, paper_task: Any) -> Plan:
     return plan_path(paper_task(ei50_arm), model=ei50_model)
 
 
 @pytest.fixture(scope='module')
 def hanging(workshop_model: ArmModel, workshop_arm: Arm) -> Plan:
     """Return a plan under gravity, with friction and unlike links."""
-    return plan_path(Task(arm=workshop_arm, start_positions=[-1.5, 0.1], duration=1.0,
-                          goal_positions=[-1.3, 0.3], payload_mass=0.3), model=workshop_model)
+    task = Task(arm=workshop_arm, start_positions=np.array([-1.5, 0.1]), duration=1.0,
+                goal_positions=np.array([-1.3, 0.3]), payload_mass=0.3)
+    return plan_path(task, model=workshop_model)
 
 
 @pytest.fixture(params=['flexible', 'hanging'])
@@ -120,7 +123,7 @@ def test_steps_stay_above_a_quarter_of_a_millisecond(flexible: Plan) -> None:
 
 
 def test_plan_without_solution_has_no_samples(rigid_arm: Arm, rigid_model: ArmModel,
-                                              paper_task) -> None:
+                                              paper_task: Any) -> None:
     failed = plan_path(paper_task(rigid_arm, payload_mass=200.0), model=rigid_model)
     assert not failed.solved
     with pytest.raises(ValueError, match='the plan has no solution'):
