@@ -16,7 +16,7 @@ import signal
 import socket
 import time
 from types import TracebackType
-from typing import Any
+from typing import Any, TypeVar
 import warnings
 
 from flex_planner.ros.processes import NodeProcess
@@ -34,6 +34,7 @@ from rclpy.task import Future
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 STARTING = 60.0  # [s], a node on a machine that is busy
+SomeClient = TypeVar('SomeClient', bound='Client')
 _NUMBERS = itertools.count(1)
 
 
@@ -111,7 +112,7 @@ class Client:
         self.node.destroy_subscription(subscription)
         return messages[0]
 
-    def __enter__(self) -> Client:
+    def __enter__(self: SomeClient) -> SomeClient:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
@@ -151,12 +152,13 @@ class Planner(Client):
         """Ask for the motion of the paper with some fields changed; return the report."""
         return self.plan(**fields).report
 
-    def set(self, name: str, value: object) -> SetParametersResult:
+    def set_parameter(self, name: str, value: object) -> SetParametersResult:
         """Set a parameter as ``ros2 param set`` does."""
-        request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
+        change = Parameter(name, value=value).to_parameter_msg()
+        request = SetParameters.Request(parameters=[change])
         return self.call(SetParameters, f'{self.name}/set_parameters', request).results[0]
 
-    def get(self, name: str) -> Any:
+    def parameter(self, name: str) -> Any:
         """Return the value of a parameter."""
         request = GetParameters.Request(names=[name])
         answer = self.call(GetParameters, f'{self.name}/get_parameters', request)

@@ -29,7 +29,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope='module')
 def table(folder: Path, ros: None) -> dict[str, str]:
     rows = [re.split(' {2,}', line.strip(), maxsplit=1) for line in demo.run(folder).splitlines()]
-    return {name: value for name, value in rows}
+    return {row[0]: row[1] for row in rows}
 
 
 def test_table_shows_motion_certificate_and_files(table: dict[str, str]) -> None:
@@ -46,7 +46,8 @@ def test_table_shows_motion_certificate_and_files(table: dict[str, str]) -> None
 
 
 def test_simulated_arm_arrives(table: dict[str, str]) -> None:
-    found = re.fullmatch(r'tip error (\S+) mm, vibration (\S+) mm', table['simulated arm, at rest'])
+    row = table['simulated arm, at rest']
+    found = re.fullmatch(r'tip error (\S+) mm, vibration (\S+) mm', row)
     assert found is not None
     assert float(found[1]) < 0.01
     assert float(found[2]) < 0.01

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 import math
 from pathlib import Path
 import signal
@@ -17,7 +17,6 @@ from flex_planner.ros.processes import NodeProcess
 from flex_planner.task import postures_from_points
 from flex_planner.trajectory_rules import trajectory_violations
 from flex_planner_interfaces.msg import FlexibleTrajectory, MotionTask, PlanReport
-from flex_planner_interfaces.srv import PlanPath
 from geometry_msgs.msg import Point
 import pytest
 from rcl_interfaces.srv import DescribeParameters, ListParameters
@@ -119,7 +118,7 @@ def test_joint_space_gives_the_motion_of_the_same_points(rigid: Planner) -> None
 
 
 def test_elbow_0_means_the_branch_of_the_parameter(rigid: Planner) -> None:
-    assert rigid.get('elbow') == -1
+    assert rigid.parameter('elbow') == -1
     assert rigid.plan(elbow=0).trajectory == rigid.plan(elbow=-1).trajectory
     other = rigid.plan(elbow=1)
     assert other.report.error_code == PlanReport.NONE
@@ -330,10 +329,10 @@ def test_every_parameter_is_described(rigid: Planner) -> None:
 
 def test_parameter_that_is_set_counts(rigid: Planner) -> None:
     before = rigid.plan().trajectory
-    assert rigid.set('sampling_step', 0.1).successful
+    assert rigid.set_parameter('sampling_step', 0.1).successful
     after = rigid.plan().trajectory
-    assert rigid.get('sampling_step') == 0.1
-    assert rigid.set('sampling_step', 0.01).successful
+    assert rigid.parameter('sampling_step') == 0.1
+    assert rigid.set_parameter('sampling_step', 0.01).successful
     assert len(after.points) < len(before.points) / 2
     assert rigid.plan().trajectory == before
 
@@ -353,27 +352,27 @@ def test_parameter_that_is_set_counts(rigid: Planner) -> None:
 ])
 def test_bad_parameter_is_refused_with_a_reason(rigid: Planner, name: str, value: Any,
                                                 reason: str) -> None:
-    before = rigid.get(name)
-    result = rigid.set(name, value)
+    before = rigid.parameter(name)
+    result = rigid.set_parameter(name, value)
     assert not result.successful
     assert reason in result.reason
-    assert rigid.get(name) == before
+    assert rigid.parameter(name) == before
 
 
 def test_parameters_answer_while_a_plan_is_being_made(flexible: Planner) -> None:
-    flexible.get('tolerance')  # the client is connected from here on
+    flexible.parameter('tolerance')  # the client is connected from here on
     plan = flexible.send_plan(**LONG, allowed_planning_time=1.0)
     flexible.spin(0.1)
-    assert flexible.get('tolerance') == 1e-3
+    assert flexible.parameter('tolerance') == 1e-3
     assert not plan.done()
     flexible.wait('plan', plan.done)
 
 
 def test_request_keeps_the_parameters_of_its_arrival(flexible: Planner) -> None:
-    assert flexible.set('allowed_planning_time', 0.7).successful
+    assert flexible.set_parameter('allowed_planning_time', 0.7).successful
     plan = flexible.send_plan(**LONG)
     flexible.spin(0.2)
-    assert flexible.set('allowed_planning_time', 30.0).successful
+    assert flexible.set_parameter('allowed_planning_time', 30.0).successful
     assert not plan.done()
     flexible.wait('plan', plan.done, 3)
     assert plan.result().report.error_code == PlanReport.TIMEOUT

@@ -57,7 +57,7 @@ def read_by_mcap(folder: Path) -> list[Found]:
     with next(folder.glob('*.mcap')).open('rb') as stream:
         reader = make_reader(stream, validate_crcs=True, decoder_factories=[DecoderFactory()])
         return [Found(channel.topic, schema.name, record.log_time, message)
-                for schema, channel, record, message in reader.iter_decoded_messages()]
+                for schema, channel, record, message in reader.iter_decoded_messages() if schema]
 
 
 READERS = pytest.mark.parametrize('read', [read_by_rosbags, read_by_mcap])
@@ -172,12 +172,12 @@ def test_failed_request_is_recorded_with_its_report(planner: Planner, wrong: dic
 
 
 def test_nothing_is_recorded_if_told_so(planner: Planner) -> None:
-    folder = Path(planner.get('recording_folder'))
+    folder = Path(planner.parameter('recording_folder'))
     planner.plan(duration=-1.0)
     before = sorted(folder.iterdir())
-    assert planner.set('record', False).successful
+    assert planner.set_parameter('record', False).successful
     report = planner.report()
-    assert planner.set('record', True).successful
+    assert planner.set_parameter('record', True).successful
     assert report.error_code == PlanReport.NONE
     assert report.recording == ''
     assert sorted(folder.iterdir()) == before
@@ -187,7 +187,7 @@ def test_every_recording_has_its_own_folder(planner: Planner) -> None:
     paths = [planner.report(duration=-1.0).recording for _ in range(3)]
     assert len(set(paths)) == 3
     assert sorted(paths) == paths
-    assert {str(Path(path).parent) for path in paths} == {planner.get('recording_folder')}
+    assert {str(Path(path).parent) for path in paths} == {planner.parameter('recording_folder')}
 
 
 def test_plan_that_cannot_be_recorded_is_returned_but_not_published(tmp_path: Path) -> None:
