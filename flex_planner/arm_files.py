@@ -174,7 +174,7 @@ class _Section:
         try:
             return kind(**values)
         except InvalidValueError as error:
-            raise InvalidValueError(self.name(error.field), error.value, error.bound) from None
+            raise type(error)(self.name(error.field), error.value, error.bound) from None
 
 
 def _link(section: _Section) -> Link:

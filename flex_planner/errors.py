@@ -35,7 +35,23 @@ class InvalidValueError(FlexPlannerError, ValueError):
 
 
 class InvalidSizeError(InvalidValueError):
-    """A list has the wrong number of entries."""
+    """
+    A list has the wrong number of entries.
+
+    Parameters
+    ----------
+    field : str
+        Name of the field.
+    value : str
+        How many entries it has, in words.
+    bound : str
+        What was expected, in words.
+
+    """
+
+    def __init__(self, field: str, value: str, bound: str) -> None:
+        super().__init__(field, value, bound)
+        self.args = (f'{field} has {value}, but must be {bound}',)
 
 
 class NotFiniteError(InvalidValueError):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from flex_planner.collocation import CollocationSolution, GaussRule
+from flex_planner.errors import InvalidTaskError
 from flex_planner.model import ArmModel, Parameters
 from flex_planner.statics import equilibrium, modal_stiffness
 from flex_planner.task import Task
@@ -34,6 +35,11 @@ class MotionProblem:
     p : numpy.ndarray
         Stacked parameters.
 
+    Raises
+    ------
+    InvalidTaskError
+        If a motor is too weak to hold the arm at the goal.
+
     """
 
     def __init__(self, model: ArmModel, task: Task, parameters: Parameters) -> None:
@@ -43,6 +49,7 @@ class MotionProblem:
         self.size = 4 * n_t
         start, _ = equilibrium(model, task.start_positions, self.p)
         goal, self.holding_torque = equilibrium(model, task.goal_positions, self.p)
+        _check_holding(self.holding_torque, parameters)
         self.start = np.concatenate([start, np.zeros(n_t)])
         self.goal = np.concatenate([goal, np.zeros(n_t)])
         self.scale = self._scale()
@@ -97,6 +104,15 @@ class MotionProblem:
         scale: Array = np.concatenate([positions, positions / duration,
                                        velocity_costates / duration, velocity_costates]) / 10
         return scale
+
+
+def _check_holding(torque: Array, parameters: Parameters) -> None:
+    """Refuse a goal at which the arm would sink as soon as it has arrived."""
+    for i, (needed, stall) in enumerate(zip(torque, parameters.stall_torque, strict=True), 1):
+        if abs(needed) > stall:
+            raise InvalidTaskError(
+                f'joint {i} needs {abs(needed):.4g} N m to hold the arm with its payload at the '
+                f'goal, but the stall torque of its motor is {stall:.4g} N m')
 
 
 def task_parameters(task: Task) -> Parameters:

@@ -46,6 +46,11 @@ def plan_path(task: Task, *, model: ArmModel | None = None, settings: Settings |
     Plan
         Check `Plan.solved`: a failure is a status, not an exception.
 
+    Raises
+    ------
+    InvalidTaskError
+        If a motor is too weak to hold the arm at the goal.
+
     """
     settings, monitor = settings or Settings(), monitor or Monitor()
     model = model or ArmModel(task.arm)

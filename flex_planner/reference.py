@@ -11,7 +11,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from flex_planner.errors import InvalidTaskError
 from flex_planner.plan import Plan, Samples
+from flex_planner.progress import Monitor
 from flex_planner.validation import Array, number
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +23,8 @@ from numpy.typing import NDArray
 HOLD_DELAY_NS = 1000
 
 _SMALLEST_STEP = 2.5e-4
+# a controller's message and a recording should stay below some megabytes
+MAX_SAMPLES = 20_000
 _PROBES = 4
 
 
@@ -56,8 +60,8 @@ class SamplingSettings:
     longest_step : float
         0.00025 to 1 [s].
     torque_tolerance : float
-        The step is halved until linear interpolation is this exact or the step would fall below
-        0.25 ms; > 0 [N m].
+        The step is halved until linear interpolation is this exact, the step would fall below
+        0.25 ms, or the samples would be more than 20000; > 0 [N m].
 
     Raises
     ------
@@ -74,21 +78,33 @@ class SamplingSettings:
         number('torque_tolerance', self.torque_tolerance, above=0, unit='N m')
 
 
-def sample_reference(plan: Plan, settings: SamplingSettings) -> Reference:
+def sample_reference(plan: Plan, settings: SamplingSettings,
+                     monitor: Monitor | None = None) -> Reference:
     """
     Return samples of a solved plan, evenly spaced, and one more that holds the arm.
 
     Raises
     ------
+    InvalidTaskError
+        If even the longest step makes more than 20000 samples.
+    StoppedError
+        If the monitor stopped it.
     ValueError
         If the plan has no solution.
 
     """
-    duration = plan.task.duration
+    watch, duration = monitor or Monitor(), plan.task.duration
     count = int(np.ceil(duration / settings.longest_step))
+    if count > MAX_SAMPLES:
+        raise InvalidTaskError(
+            f'a motion of {duration:g} s sampled every {settings.longest_step:g} s has {count} '
+            f'samples, but may have {MAX_SAMPLES}; the parameter sampling_step must be >= '
+            f'{duration / MAX_SAMPLES:g} s')
     while True:
+        watch.check()
         error = _interpolation_error(plan, count)
-        if error <= settings.torque_tolerance or duration / count < 2 * _SMALLEST_STEP:
+        finest = duration / count < 2 * _SMALLEST_STEP or 2 * count > MAX_SAMPLES
+        if error <= settings.torque_tolerance or finest:
             break
         count *= 2
     times = np.linspace(0, duration, count + 1, dtype=np.float64)

@@ -122,9 +122,10 @@ def vector(
         array = np.array(values, dtype=float)
     except (TypeError, ValueError, OverflowError):
         raise InvalidValueError(field, values, f'a list of {wanted} numbers') from None
-    if array.ndim != 1 or array.size not in sizes:
-        given = f'{array.size} numbers' if array.ndim == 1 else f'an array of shape {array.shape}'
-        raise InvalidSizeError(field, given, f'a list of {wanted} numbers')
+    if array.ndim != 1:
+        raise InvalidSizeError(field, f'shape {array.shape}', f'a list of {wanted} numbers')
+    if array.size not in sizes:
+        raise InvalidSizeError(field, f'{array.size} numbers', f'a list of {wanted} numbers')
     for index, entry in enumerate(array):
         number(f'{field}[{index}]', entry, above=above, at_least=at_least, at_most=at_most,
                unit=unit)

@@ -9,6 +9,7 @@ the compiled functions stay in the user's cache folder.
 from __future__ import annotations
 
 from collections.abc import Callable
+import os
 from typing import Any
 
 from flex_planner.arm import Arm, Joint, Link, Motor, Node
@@ -17,6 +18,9 @@ from flex_planner.model import ArmModel
 from flex_planner.task import postures_from_points, Task
 from hypothesis import settings
 import pytest
+
+# read when a message class is imported: assignments of a wrong type fail at once
+os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
 
 # the machine may be busy, and the same examples every time keep a failure repeatable
 settings.register_profile('repository', deadline=None, derandomize=True)

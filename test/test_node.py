@@ -400,7 +400,6 @@ def test_node_ends_at_once_with_code_0(tmp_path: Path, number: signal.Signals,
             planner.send_plan(**fields)
             planner.spin(0.3)
         code, seconds = planner.stop(number)
-        print(f'exit after {seconds:.2f} s')
         assert code == 0
         assert seconds < EXIT_LIMIT
         assert 'Traceback' not in planner.log()

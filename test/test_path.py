@@ -28,6 +28,7 @@ from flex_planner.collocation import (
     solve,
     Status,
 )
+from flex_planner.errors import InvalidTaskError
 from flex_planner.kinematics import tip_position
 from flex_planner.model import ArmModel
 from flex_planner.motion import MotionProblem, task_parameters
@@ -571,3 +572,11 @@ def test_limits_name_what_they_refuse(name: str, value: float) -> None:
 
 def test_certificate_of_a_plan_without_solution_is_infinite() -> None:
     assert all(getattr(Certificate(), entry.name) == math.inf for entry in fields(Certificate))
+
+
+def test_motor_too_weak_to_hold_the_goal_is_refused_in_words(workshop_arm: Arm) -> None:
+    # the second joint needs 9.375 N m there, its motor has 9
+    task = Task(arm=workshop_arm, start_positions=[-1.8, 0.2], goal_positions=[-1.2, 0.5],
+                duration=1.0, payload_mass=0.3)
+    with pytest.raises(InvalidTaskError, match='needs .* at the goal, but the stall torque'):
+        plan_path(task)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from flex_planner.arm import Arm
-from flex_planner.errors import InvalidValueError, NotFiniteError
+from flex_planner.errors import InvalidTaskError, InvalidValueError, NotFiniteError
 from flex_planner.model import ArmModel, Parameters
 from flex_planner.path import plan_path
 from flex_planner.plan import Plan
+from flex_planner.progress import Monitor, StoppedError
 from flex_planner.reference import (
     HOLD_DELAY_NS,
     Reference,
@@ -139,3 +141,14 @@ def test_bad_sampling_settings_are_refused(values: dict[str, float], error: type
                                            text: str) -> None:
     with pytest.raises(error, match=text):
         SamplingSettings(**values)
+
+
+def test_more_samples_than_a_message_should_hold_are_refused(flexible: Plan) -> None:
+    task = replace(flexible.task, duration=6.0)
+    with pytest.raises(InvalidTaskError, match='has 24000 samples, but may have 20000'):
+        sample_reference(replace(flexible, task=task), SamplingSettings(longest_step=2.5e-4))
+
+
+def test_sampling_listens_to_the_monitor(flexible: Plan) -> None:
+    with pytest.raises(StoppedError):
+        sample_reference(flexible, SamplingSettings(), Monitor(canceled=lambda: True))

@@ -16,6 +16,7 @@ from flex_planner.errors import (
     UnreachableError,
 )
 from flex_planner.plan import peaks, Plan, PlanStatus, Samples
+from flex_planner.progress import StopReason
 from flex_planner.reference import Reference
 from flex_planner.ros.settings import PlannerSettings
 from flex_planner.task import postures_from_points, Task
@@ -46,6 +47,8 @@ STATUS_CODES = {
     PlanStatus.TIMEOUT: PlanReport.TIMEOUT,
     PlanStatus.CANCELED: PlanReport.CANCELED,
 }
+STOP_CODES = {StopReason.TIMEOUT: PlanReport.TIMEOUT,
+              StopReason.CANCELED: PlanReport.CANCELED}
 _MAX_PLANNING_TIME = 3600.0
 
 

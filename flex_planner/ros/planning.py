@@ -11,7 +11,7 @@ from flex_planner.errors import FlexPlannerError
 from flex_planner.model import ArmModel
 from flex_planner.path import plan_path
 from flex_planner.plan import Plan
-from flex_planner.progress import Monitor
+from flex_planner.progress import Monitor, StoppedError
 from flex_planner.reference import Reference, sample_reference
 from flex_planner.ros.conversions import (
     add_reference,
@@ -22,6 +22,7 @@ from flex_planner.ros.conversions import (
     joint_trajectory,
     planning_time_limit,
     report_from_plan,
+    STOP_CODES,
     task_from_message,
 )
 from flex_planner.ros.recorder import OutcomeRecorder
@@ -97,11 +98,13 @@ class Planning:
             outcome = self._planned(message, settings, canceled)
         except FlexPlannerError as error:
             outcome = _failure(error_code(error), str(error))
+        except StoppedError as stop:
+            outcome = _failure(STOP_CODES[stop.reason], stop.reason.value)
         except Exception as error:
             _LOG.exception('planning failed')
             outcome = unknown_failure(error)
         outcome.report.planning_time = duration_message(time.monotonic_ns() - accepted)
-        return self._recorded(message, settings, outcome, stamp)
+        return self._recorded(message, settings, outcome, stamp, canceled)
 
     def _planned(self, message: MotionTask, settings: PlannerSettings,
                  canceled: Callable[[], bool]) -> Outcome:
@@ -112,7 +115,7 @@ class Planning:
         report = report_from_plan(plan)
         if not plan.solved:
             return Outcome(report=report, trajectory=FlexibleTrajectory(), plan=plan)
-        reference = sample_reference(plan, settings.sampling())
+        reference = sample_reference(plan, settings.sampling(), monitor)
         add_reference(report, plan, reference)
         joints = joint_trajectory(reference, settings.joint_names)
         broken = trajectory_violations(joints, settings.joint_names)
@@ -122,14 +125,14 @@ class Planning:
         return Outcome(report=report, trajectory=trajectory, plan=plan, reference=reference)
 
     def _recorded(self, message: MotionTask, settings: PlannerSettings, outcome: Outcome,
-                  stamp: int) -> Outcome:
+                  stamp: int, canceled: Callable[[], bool]) -> Outcome:
         """Record an outcome; a plan that cannot be recorded is a failure with a trajectory."""
         if not settings.record:
             return outcome
         try:
             path = self._recorder.write(
                 settings, stamp, message, outcome.report, outcome.trajectory, outcome.plan,
-                outcome.reference)
+                outcome.reference, canceled)
         except Exception as error:
             foreseen = isinstance(error, FlexPlannerError)
             _LOG.error('recording failed: %s', error, exc_info=not foreseen)

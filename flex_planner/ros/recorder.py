@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict
 from datetime import datetime, timezone
 import itertools
@@ -9,6 +10,7 @@ from pathlib import Path
 
 from flex_planner import __version__
 from flex_planner.arm import Arm
+from flex_planner.errors import RecordingError
 from flex_planner.plan import Plan
 from flex_planner.recording import (
     DEFAULT,
@@ -57,8 +59,8 @@ class OutcomeRecorder:
                              DEFAULT)
 
     def write(self, settings: PlannerSettings, stamp: int, task: MotionTask, report: PlanReport,
-              trajectory: FlexibleTrajectory, plan: Plan | None,
-              reference: Reference | None) -> Path:
+              trajectory: FlexibleTrajectory, plan: Plan | None, reference: Reference | None,
+              canceled: Callable[[], bool]) -> Path:
         """
         Write a recording and return its folder.
 
@@ -78,6 +80,8 @@ class OutcomeRecorder:
             None where none was made.
         reference : Reference or None
             Samples of the plan.
+        canceled : callable
+            Returns True once writing should stop, which is an error.
 
         Raises
         ------
@@ -97,13 +101,16 @@ class OutcomeRecorder:
             if plan is not None and reference is not None:
                 recording.write(self._joints, trajectory.joint_trajectory, ready)
                 recording.write(self._flexible, trajectory, ready)
-                self._write_states(recording, settings, plan, reference, ready)
+                self._write_states(recording, settings, plan, reference, ready, canceled)
         return path
 
     def _write_states(self, recording: Recording, settings: PlannerSettings, plan: Plan,
-                      reference: Reference, ready: int) -> None:
+                      reference: Reference, ready: int, canceled: Callable[[], bool]) -> None:
         names = [*settings.joint_names, *plan.arm.modal_names]
         for k, time in enumerate(reference.times_ns):
+            if canceled():
+                raise RecordingError(f'writing stopped after {k} of {len(reference.times_ns)} '
+                                     'samples')
             stamp = ready + int(time)
             message = reference_state(plan, reference.samples, k, names, stamp)
             recording.write(self._states, message, stamp)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import logging
+import os
 import signal
 import sys
+import threading
 
 from flex_planner.errors import FlexPlannerError
 from flex_planner.ros.logs import forward_logs
@@ -60,4 +62,19 @@ def run_node(create: Callable[[], Node], name: str, args: list[str] | None) -> N
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()
+    _leave(code)
+
+
+def _leave(code: int) -> None:
+    """
+    End the process.
+
+    A solve that did not give up in time still runs in its thread. The libraries' clean-up at
+    exit would wait for it, and has nothing left to do: ROS is shut down, files are closed.
+
+    """
+    if any(thread is not threading.main_thread() for thread in threading.enumerate()):
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
     sys.exit(code)

@@ -80,7 +80,8 @@ class PlannerSettings:
     def check_joints(self, count: int) -> None:
         """Raise InvalidSizeError unless there is a name for each of the arm's joints."""
         if len(self.joint_names) != count:
-            raise InvalidSizeError('joint_names', self.joint_names, f'a list of {count} names')
+            raise InvalidSizeError('joint_names', f'{len(self.joint_names)} names',
+                                   f'a list of {count} names')
 
     def solver(self) -> Settings:
         """Return the settings of the boundary-value solver."""
