@@ -17,6 +17,8 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 import rclpy.logging
 from rclpy.node import Node
 
+_LONGEST_WAIT = 0.2  # [s]
+
 
 def run_node(create: Callable[[], Node], name: str, args: list[str] | None) -> None:
     """
@@ -49,7 +51,10 @@ def run_node(create: Callable[[], Node], name: str, args: list[str] | None) -> N
         started = True
         executor = SingleThreadedExecutor()
         executor.add_node(node)
-        executor.spin()
+        # spin() would wait without end: where the signal that ends rclpy comes between two waits,
+        # its wake-up is lost now and then
+        while rclpy.ok():
+            executor.spin_once(timeout_sec=_LONGEST_WAIT)
     except ExternalShutdownException:
         pass
     except (FlexPlannerError, ParameterException) as error:
