@@ -195,8 +195,9 @@ def install_requirements() -> None:
     """Install all of requirements/ into the virtual environment."""
     print('setup: installing ROS 2 Jazzy and libraries (the first time 1 GB, some minutes)',
           flush=True)
+    # byte code of 1 GB of packages, most of them never imported, would take a minute
     command = [f'{VENV}/bin/python', '-m', 'pip', 'install', '--no-input', '--prefer-binary',
-               '--disable-pip-version-check', '--progress-bar', 'off']
+               '--disable-pip-version-check', '--progress-bar', 'off', '--no-compile']
     for path in REQUIREMENTS:
         command += ['-r', str(path)]
     run(command, 'pip could not install requirements/*.txt; is the package index reachable?')
