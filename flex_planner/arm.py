@@ -10,8 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 import math
 
+from flex_planner.beams import TipLoad
 from flex_planner.errors import InvalidValueError
-from flex_planner.modes import FAMILIES, LinkModes
+from flex_planner.modes import FAMILIES, LinkModes, mode_shapes
 from flex_planner.validation import Array, integer, number, vector
 import numpy as np
 
@@ -36,6 +37,12 @@ class Link:
         Number of assumed modes, 0 (rigid) to 8.
     mode_family : str
         A name in :data:`flex_planner.modes.FAMILIES`.
+    shape_mass, shape_inertia : float
+        What `clamped_mass` shapes expect at the tip: the mass [kg] and rotary inertia [kg m^2]
+        of what the link carries, for example all further links stretched out, >= 0. They form
+        the shapes only; the dynamics take masses from links, nodes and payload.
+    damping_ratio : float
+        Of each mode of the link by itself, 0 to 1 (excluded).
 
     Raises
     ------
@@ -49,6 +56,9 @@ class Link:
     flexural_rigidity: float = math.inf
     modes: int = 0
     mode_family: str = 'pinned_pinned'
+    shape_mass: float = 0.0
+    shape_inertia: float = 0.0
+    damping_ratio: float = 0.0
 
     def __post_init__(self) -> None:
         number('length', self.length, above=0, unit='m')
@@ -58,6 +68,11 @@ class Link:
                unit='N m^2 (needed for a link with modes)')
         if self.mode_family not in list(FAMILIES):
             raise InvalidValueError('mode_family', self.mode_family, f'one of {list(FAMILIES)}')
+        number('shape_mass', self.shape_mass, at_least=0, unit='kg')
+        number('shape_inertia', self.shape_inertia, at_least=0, unit='kg m^2')
+        ratio = number('damping_ratio', self.damping_ratio, at_least=0)
+        if ratio >= 1:
+            raise InvalidValueError('damping_ratio', ratio, 'a number < 1')
 
     @property
     def mass(self) -> float:
@@ -66,7 +81,9 @@ class Link:
 
     def mode_shapes(self) -> LinkModes:
         """Return the link's mode shapes and their integrals."""
-        return FAMILIES[self.mode_family](self.length, self.modes)
+        load = TipLoad(mass_ratio=self.shape_mass / self.mass,
+                       inertia_ratio=self.shape_inertia / (self.mass * self.length**2))
+        return mode_shapes(self.mode_family, self.length, self.modes, load)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,14 +133,25 @@ class Joint:
         Torque limits.
     viscous_friction : float
         >= 0 [N m s/rad].
+    lower_limit, upper_limit : float
+        Of the joint angle at start and goal [rad]; infinite for none.
+
+    Raises
+    ------
+    InvalidValueError
+        If a value breaks its bound.
 
     """
 
     motor: Motor = field(default_factory=Motor)
     viscous_friction: float = 0.0
+    lower_limit: float = -math.inf
+    upper_limit: float = math.inf
 
     def __post_init__(self) -> None:
         number('viscous_friction', self.viscous_friction, at_least=0, unit='N m s/rad')
+        number('lower_limit', self.lower_limit, infinite=True, unit='rad')
+        number('upper_limit', self.upper_limit, above=self.lower_limit, infinite=True, unit='rad')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -232,6 +260,11 @@ class Arm:
     def flexural_rigidities(self) -> Array:
         """Return E I of each link, shape (n,) [N m^2]; 0 for a link without modes."""
         return np.array([link.flexural_rigidity if link.modes else 0.0 for link in self.links])
+
+    def angle_limits(self) -> tuple[Array, Array]:
+        """Return the lower and upper limit of each joint angle, shape (n,) [rad]."""
+        return (np.array([joint.lower_limit for joint in self.joints]),
+                np.array([joint.upper_limit for joint in self.joints]))
 
     def torque_bounds(self, speeds: Array) -> tuple[Array, Array]:
         """

@@ -8,7 +8,7 @@ lie in ``config/arms``.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 import math
 import os
 from pathlib import Path
@@ -148,6 +148,10 @@ class _Section:
             raise InvalidValueError(self.name(key), None, 'given')
         return self._left.pop(key, default)
 
+    def number(self, key: str, *, above: float = -math.inf) -> float:
+        """Return a number, checked here because others are computed from it."""
+        return number(self.name(key), self.take(key), above=above)
+
     def text(self, key: str, default: str | None = None) -> str:
         """Return a text field."""
         value = self.take(key, default)
@@ -178,26 +182,49 @@ class _Section:
 
 
 def _link(section: _Section) -> Link:
-    length = section.take('length')
-    if section.has('mass') == section.has('linear_density'):
-        given = 'given with linear_density' if section.has('mass') else None
-        raise InvalidValueError(section.name('mass'), given,
-                                'given, or linear_density in its place')
-    density = section.take('linear_density', math.nan)
-    if section.has('mass'):
-        density = _ratio(section, section.take('mass'), length)
+    length = section.number('length', above=0)
+    area, second_moment = _cross_section(section)
+    density = _one_of(section, {
+        'linear_density': lambda value: value, 'mass': lambda value: value / length,
+        'density': lambda value: value * area})
     modes = section.take('modes', 0)
+    rigidity = math.inf
+    if modes or section.has('flexural_rigidity') or section.has('youngs_modulus'):
+        rigidity = _one_of(section, {
+            'flexural_rigidity': lambda value: value,
+            'youngs_modulus': lambda value: value * second_moment})
+    family = section.take('mode_family', 'pinned_pinned')
+    shape = {name: section.number(name) for name in ('shape_mass', 'shape_inertia')
+             if family == 'clamped_mass'}
     link: Link = section.build(
-        Link, length=length, linear_density=density, modes=modes,
-        flexural_rigidity=section.take('flexural_rigidity', math.inf),
-        mode_family=section.take('mode_family', 'pinned_pinned'))
+        Link, length=length, linear_density=density, modes=modes, flexural_rigidity=rigidity,
+        mode_family=family, damping_ratio=section.take('damping_ratio', 0.0), **shape)
     return link
 
 
-def _ratio(section: _Section, mass: object, length: object) -> float:
-    """Return mass over length, both checked under the names that the file gives them."""
-    return (number(section.name('mass'), mass, above=0, unit='kg')
-            / number(section.name('length'), length, above=0, unit='m'))
+def _cross_section(section: _Section) -> tuple[float, float]:
+    """Return area [m^2] and second moment [m^4] of the section; NaN where they are not given."""
+    if section.has('section'):
+        part = _Section(section.name('section'), section.take('section'))
+        width, thickness = part.number('width', above=0), part.number('thickness', above=0)
+        part.finish()
+        return width * thickness, width * thickness**3 / 12
+    if section.has('second_moment_of_area'):
+        return math.nan, section.number('second_moment_of_area', above=0)
+    return math.nan, math.nan
+
+
+def _one_of(section: _Section, ways: Mapping[str, Callable[[float], float]]) -> float:
+    """Return a quantity that may be given in several ways, but has to be given in one."""
+    given = [name for name in ways if section.has(name)]
+    if len(given) != 1:
+        raise InvalidValueError(section.name(' or '.join(ways)),
+                                ' and '.join(given) or None, 'given, one of them')
+    result = ways[given[0]](section.number(given[0], above=0))
+    if math.isnan(result):
+        needs = 'section' if given[0] == 'density' else 'section or second_moment_of_area'
+        raise InvalidValueError(section.name(needs), None, f'given with {given[0]}')
+    return result
 
 
 def _joint(section: _Section) -> Joint:
@@ -206,8 +233,10 @@ def _joint(section: _Section) -> Joint:
         part = _Section(section.name('motor'), section.take('motor'))
         motor = part.build(Motor, stall_torque=part.take('stall_torque'),
                            no_load_speed=part.take('no_load_speed', math.inf))
-    joint: Joint = section.build(Joint, motor=motor,
-                                 viscous_friction=section.take('viscous_friction', 0.0))
+    joint: Joint = section.build(
+        Joint, motor=motor, viscous_friction=section.take('viscous_friction', 0.0),
+        lower_limit=section.take('lower_limit', -math.inf),
+        upper_limit=section.take('upper_limit', math.inf))
     return joint
 
 

@@ -65,7 +65,7 @@ def certify(problem: MotionProblem, result: CollocationResult, monitor: Monitor,
         hamiltonian_drift=hamiltonian_drift(problem, result.solution),
         tip_error=float(np.linalg.norm(tips[0] - tips[1])),
         residual_vibration=residual_vibration(problem.model, final, problem.goal[:n_t],
-                                              problem.p))
+                                              problem.parameters))
 
 
 def planned_torque(problem: MotionProblem,

@@ -25,20 +25,21 @@ class Chain:
     ----------
     coordinates, rates : casadi.SX, shape (n_t, 1)
         q [rad, m] and q' [rad/s, m/s].
-    payload_mass : casadi.SX
-        m_p at the tip [kg].
+    payload_mass, payload_inertia : casadi.SX
+        m_p at the tip [kg], and its rotary inertia [kg m^2].
     rigidity : casadi.SX, shape (n, 1)
         E I of each link [N m^2].
     kinetic, potential : casadi.SX
         Energies [J]; potential includes bending.
     friction : casadi.SX, shape (n_t, 1)
-        Generalized forces of viscous joint friction [N m].
+        Generalized forces of viscous joint friction [N m] and modal damping [N].
 
     """
 
     coordinates: Any
     rates: Any
     payload_mass: Any
+    payload_inertia: Any
     rigidity: Any
     kinetic: Any
     potential: Any
@@ -95,7 +96,8 @@ def build_chain(arm: Arm) -> Chain:
 
     """
     q, rates = ca.SX.sym('q', arm.n_coordinates), ca.SX.sym('dq', arm.n_coordinates)
-    payload, rigidity = ca.SX.sym('m_p'), ca.SX.sym('EI', arm.n_joints)
+    payload, inertia = ca.SX.sym('m_p'), ca.SX.sym('J_p')
+    rigidity = ca.SX.sym('EI', arm.n_joints)
     zero = ca.SX(2, 1)
     frame = _Frame(zero, zero, ca.SX(ca.sparsify(ca.DM(arm.gravity))), ca.SX(1, 1))
     kinetic, potential, slope, slope_rate = ca.SX(0), ca.SX(0), ca.SX(0), ca.SX(0)
@@ -111,10 +113,22 @@ def build_chain(arm: Arm) -> Chain:
         mass = arm.nodes[i + 1].mass + (payload if i == arm.n_joints - 1 else 0)
         kinetic += mass * ca.sumsqr(frame.velocity) / 2
         potential += V - mass * ca.dot(frame.gravity, frame.position)
-    kinetic += arm.nodes[-1].inertia * (frame.rate + slope_rate)**2 / 2
-    damping = ca.DM([joint.viscous_friction for joint in arm.joints] + [0.0] * arm.n_modes)
-    return Chain(coordinates=q, rates=rates, payload_mass=payload, rigidity=rigidity,
-                 kinetic=kinetic, potential=potential, friction=ca.sparsify(damping) * rates)
+    kinetic += (arm.nodes[-1].inertia + inertia) * (frame.rate + slope_rate)**2 / 2
+    return Chain(coordinates=q, rates=rates, payload_mass=payload, payload_inertia=inertia,
+                 rigidity=rigidity, kinetic=kinetic, potential=potential,
+                 friction=_damping(arm, rigidity) * rates)
+
+
+def _damping(arm: Arm, rigidity: Any) -> Any:
+    """Return the damping coefficient of each coordinate: joints, then modes."""
+    coefficients = [ca.SX(ca.sparsify(ca.DM(joint.viscous_friction))) for joint in arm.joints]
+    for i, link in enumerate(arm.links):
+        modes, ratio = link.mode_shapes(), link.damping_ratio
+        for j in range(link.modes if ratio else 0):
+            mass = link.linear_density * modes.gram[j, j]
+            coefficients.append(2 * ratio * ca.sqrt(rigidity[i] * modes.stiffness[j, j] * mass))
+        coefficients += [ca.SX(1, 1)] * (0 if ratio else link.modes)
+    return ca.vertcat(*coefficients)
 
 
 def _dot(weights: Any, values: Any) -> Any:

@@ -1,5 +1,5 @@
 """
-Where the arm is: positions of joints and tip, inverse kinematics, condition (I) of the paper.
+Where the arm is and how fast it moves: frames, bent links, tip.
 
 Written with array operations and apart from :mod:`flex_planner.dynamics`, so that each can
 check the other.
@@ -9,18 +9,8 @@ check the other.
 from __future__ import annotations
 
 from flex_planner.arm import Arm
-from flex_planner.errors import (
-    InvalidTaskError,
-    InvalidValueError,
-    SingularError,
-    UnreachableError,
-)
 from flex_planner.validation import Array
 import numpy as np
-from numpy.typing import ArrayLike
-
-# relative to reach^2: nearer to a stretched or folded arm a small step needs huge joint motion
-_SINGULAR = 1e-3
 
 
 def frame_angles(arm: Arm, coordinates: Array) -> Array:
@@ -101,76 +91,29 @@ def jacobian(arm: Arm, positions: Array) -> Array:
     return np.cumsum(parts[:, ::-1], axis=1)[:, ::-1]
 
 
-def check_singularity(arm: Arm, positions: Array) -> None:
+def tip_velocity(arm: Arm, coordinates: Array, rates: Array) -> Array:
     """
-    Apply the second half of condition (I): the Jacobian must not lose rank.
-
-    An arm with one joint moves its tip along a circle only and is never refused.
-
-    Raises
-    ------
-    SingularError
-        With the reason in words.
-
-    """
-    if arm.n_joints < 2:
-        return
-    J = jacobian(arm, np.asarray(positions, dtype=float))
-    # for two joints this is |det J|
-    measure = float(np.sqrt(max(np.linalg.det(J @ J.T), 0.0)))
-    if measure < _SINGULAR * arm.reach**2:
-        degrees = ', '.join(f'{np.degrees(angle):.2f}' for angle in positions)
-        raise SingularError(
-            f'the arm is stretched out or folded at joint angles ({degrees}) deg: '
-            f'sqrt(det(J J^T)) = {measure:.3g} m^2 is below {_SINGULAR * arm.reach**2:.3g} m^2, '
-            'so its tip cannot move in every direction')
-
-
-def inverse_kinematics(arm: Arm, point: ArrayLike, elbow: int) -> Array:
-    """
-    Return the joint angles of a two-link arm that put its unbent tip at a point.
+    Return the velocity of the tip of the bent arm, eq. (22).
 
     Parameters
     ----------
     arm : Arm
-        Two links.
-    point : array_like, shape (2,)
-        In the base frame [m].
-    elbow : int
-        Sign of the second joint angle, +1 or -1.
+        n_t coordinates.
+    coordinates, rates : numpy.ndarray, shape (..., n_t)
+        q and q'.
 
     Returns
     -------
-    numpy.ndarray, shape (2,)
-        [rad].
-
-    Raises
-    ------
-    UnreachableError
-        If the point is out of the workspace.
-    SingularError
-        If the arm is stretched out or folded there.
-    InvalidTaskError
-        If the arm has not two links.
-    InvalidValueError
-        If `elbow` is not +1 or -1.
+    numpy.ndarray, shape (..., 2)
+        [m/s].
 
     """
-    if arm.n_joints != 2:
-        raise InvalidTaskError(f'the arm has {arm.n_joints} links; points of the tip determine '
-                               'the joint angles of two links only: give joint angles instead')
-    if elbow not in (-1, 1):
-        raise InvalidValueError('elbow', elbow, '+1 or -1')
-    x, y = np.asarray(point, dtype=float)
-    L_1, L_2 = (link.length for link in arm.links)
-    cosine = (x**2 + y**2 - L_1**2 - L_2**2) / (2 * L_1 * L_2)
-    slack = 1e-12
-    if not abs(cosine) <= 1 + slack:
-        raise UnreachableError(
-            f'the point ({x:.6g}, {y:.6g}) m is {np.hypot(x, y):.6g} m from the base; the arm '
-            f'reaches from {abs(L_1 - L_2):.6g} m to {L_1 + L_2:.6g} m')
-    theta_2 = elbow * np.arccos(np.clip(cosine, -1, 1))
-    theta_1 = np.arctan2(y, x) - np.arctan2(L_2 * np.sin(theta_2), L_1 + L_2 * np.cos(theta_2))
-    positions = np.array([np.remainder(theta_1 + np.pi, 2 * np.pi) - np.pi, theta_2])
-    check_singularity(arm, positions)
-    return positions
+    angles, turning = frame_angles(arm, coordinates), frame_angles(arm, rates)
+    velocity = np.zeros((*coordinates.shape[:-1], 2))
+    for i, (link, modal) in enumerate(zip(arm.links, arm.modal_slices, strict=True)):
+        deflection = link.mode_shapes().tip_deflection
+        along = -turning[..., i] * (coordinates[..., modal] @ deflection)
+        across = turning[..., i] * link.length + rates[..., modal] @ deflection
+        c, s = np.cos(angles[..., i]), np.sin(angles[..., i])
+        velocity += np.stack([c * along - s * across, s * along + c * across], -1)
+    return velocity

@@ -17,7 +17,7 @@ from flex_planner.arm import Arm
 from flex_planner.compiled import Array, BatchFunction, content_key, load_functions
 import numpy as np
 
-_SOURCES = ('arm.py', 'modes.py', 'dynamics.py', 'pontryagin.py', 'compiled.py')
+_SOURCES = ('arm.py', 'beams.py', 'modes.py', 'dynamics.py', 'pontryagin.py', 'compiled.py')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -27,8 +27,8 @@ class Parameters:
 
     Attributes
     ----------
-    payload_mass : float
-        m_p [kg].
+    payload_mass, payload_inertia : float
+        m_p [kg] and its rotary inertia [kg m^2].
     rigidity : numpy.ndarray, shape (n,)
         E I of each link [N m^2].
     stall_torque, torque_slope : numpy.ndarray, shape (n,)
@@ -41,6 +41,7 @@ class Parameters:
     """
 
     payload_mass: float
+    payload_inertia: float
     rigidity: Array
     stall_torque: Array
     torque_slope: Array
@@ -49,8 +50,8 @@ class Parameters:
     velocity_weights: Array
 
     @classmethod
-    def of(cls, arm: Arm, *, payload_mass: float = 0.0, effort_weights: Array | None = None,
-           position_weights: Array | None = None,
+    def of(cls, arm: Arm, *, payload_mass: float = 0.0, payload_inertia: float = 0.0,
+           effort_weights: Array | None = None, position_weights: Array | None = None,
            velocity_weights: Array | None = None) -> Parameters:
         """Return the parameters of an arm; weights default to R = 1, W_1 = W_2 = 0."""
         motors = [joint.motor for joint in arm.joints]
@@ -58,7 +59,8 @@ class Parameters:
         def default(weights: Array | None, fallback: Array) -> Array:
             return fallback if weights is None else weights
 
-        return cls(payload_mass=payload_mass, rigidity=arm.flexural_rigidities(),
+        return cls(payload_mass=payload_mass, payload_inertia=payload_inertia,
+                   rigidity=arm.flexural_rigidities(),
                    stall_torque=np.array([motor.stall_torque for motor in motors]),
                    torque_slope=np.array([motor.torque_slope for motor in motors]),
                    effort_weights=default(effort_weights, np.ones(arm.n_joints)),
@@ -67,9 +69,9 @@ class Parameters:
 
     def stacked(self) -> Array:
         """Return them as one vector, as the compiled functions take them."""
-        return np.concatenate([[self.payload_mass], self.rigidity, self.stall_torque,
-                               self.torque_slope, self.effort_weights, self.position_weights,
-                               self.velocity_weights])
+        return np.concatenate([[self.payload_mass, self.payload_inertia], self.rigidity,
+                               self.stall_torque, self.torque_slope, self.effort_weights,
+                               self.position_weights, self.velocity_weights])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -161,6 +163,18 @@ class ArmModel:
         """Return M q'' + h, shape (k, n_t), eq. (3)."""
         return self._functions['inverse_dynamics'](x, acceleration, p)[0]
 
+    def static_forces(self, q: Array, p: Array) -> tuple[Array, Array]:
+        """
+        Return what holds the arm at rest and its stiffness.
+
+        First and second derivatives of the potential energy at coordinates (k, n_t), shapes
+        (k, n_t) [N m, N] and (k, n_t, n_t).
+
+        """
+        force, stiffness = self._functions['static_forces'](q, p)
+        count = self.arm.n_coordinates
+        return force, stiffness.reshape(-1, count, count)
+
     def mass_and_energy(self, x: Array, p: Array) -> tuple[Array, Array, Array]:
         """Return M (k, n_t, n_t), kinetic and potential energy (k,) [J]."""
         mass, kinetic, potential = self._functions['mass_and_energy'](x, p)
@@ -171,7 +185,8 @@ class ArmModel:
 def _key(arm: Arm) -> str:
     """Return the cache key: what enters the functions as constants, and their source."""
     structure = {
-        'links': [(link.length, link.linear_density, link.modes, link.mode_family)
+        'links': [(link.length, link.linear_density, link.modes, link.mode_family,
+                   link.shape_mass, link.shape_inertia, link.damping_ratio)
                   for link in arm.links],
         'friction': [joint.viscous_friction for joint in arm.joints],
         'nodes': [(node.mass, node.inertia) for node in arm.nodes],

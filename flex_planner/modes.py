@@ -1,8 +1,8 @@
 """
 Assumed mode shapes of one link and the integrals that the dynamics need of them.
 
-Korayem et al. 2009, eqs. (1), (19), (20) and (23). A mode family is a function that takes a
-length and a number of modes and returns :class:`LinkModes`; `FAMILIES` lists them by name.
+Korayem et al. 2009, eqs. (1), (19), (20) and (23). A mode family is a function of a length, a
+number of modes and a tip load that returns :class:`LinkModes`; `FAMILIES` lists them by name.
 
 """
 
@@ -10,11 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
+from flex_planner.beams import ClampedMode, TipLoad
+from flex_planner.validation import Array
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+_QUADRATURE_POINTS = 64
+_ROUNDING = 1e-13
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -57,7 +60,7 @@ class LinkModes:
         return int(self.area.size)
 
 
-def pinned_pinned(length: float, count: int) -> LinkModes:
+def pinned_pinned(length: float, count: int, load: TipLoad | None = None) -> LinkModes:
     """
     Return the sine modes of a simply supported link, eq. (20).
 
@@ -70,6 +73,8 @@ def pinned_pinned(length: float, count: int) -> LinkModes:
         [m].
     count : int
         Number of modes, 0 for a rigid link.
+    load : TipLoad, optional
+        Has no effect: a supported tip does not move.
 
     """
     order = np.arange(1, count + 1)
@@ -87,4 +92,91 @@ def pinned_pinned(length: float, count: int) -> LinkModes:
     )
 
 
-FAMILIES: dict[str, Callable[[float, int], LinkModes]] = {'pinned_pinned': pinned_pinned}
+def clamped_free(length: float, count: int, load: TipLoad | None = None) -> LinkModes:
+    """
+    Return the modes of a cantilever.
+
+    The frame of the link is tangent to it at its base; deflection and slope of the tip carry
+    the next link along.
+
+    Parameters
+    ----------
+    length : float
+        [m].
+    count : int
+        Number of modes, 0 for a rigid link.
+    load : TipLoad, optional
+        Has no effect: see :func:`clamped_mass`.
+
+    """
+    return clamped_mass(length, count, TipLoad())
+
+
+def clamped_mass(length: float, count: int, load: TipLoad | None = None) -> LinkModes:
+    """
+    Return the modes of a cantilever that carries a mass and an inertia at its tip.
+
+    Shapes that know what the link carries need fewer modes; frame and coupling to the next link
+    are those of :func:`clamped_free`. The shapes are scaled to a mean square of 1.
+
+    Parameters
+    ----------
+    length : float
+        [m].
+    count : int
+        Number of modes, 0 for a rigid link.
+    load : TipLoad, optional
+        At the tip; none makes it a plain cantilever.
+
+    """
+    modes = [ClampedMode.of(order, load or TipLoad()) for order in range(1, count + 1)]
+    points, weights = _gauss_legendre()
+
+    def stacked(x: Array, derivative: int = 0) -> Array:
+        columns = [mode(np.asarray(x) / length, derivative) for mode in modes]
+        return np.stack(columns, axis=-1) if modes else np.zeros((*np.shape(x), 0))
+
+    sizes = np.sqrt(weights @ stacked(points * length) ** 2)
+
+    def evaluate(x: Array, derivative: int) -> Array:
+        values: Array = stacked(x, derivative) / sizes / length**derivative
+        return values
+
+    stations = points * length
+    phi, bend, rule = evaluate(stations, 0), evaluate(stations, 2), weights * length
+    tip = np.array([length])
+    return LinkModes(
+        shape=lambda x: evaluate(x, 0), curvature=lambda x: evaluate(x, 2),
+        area=rule @ phi, moment=rule @ (stations[:, None] * phi),
+        gram=_clean((phi.T * rule) @ phi), stiffness=_clean((bend.T * rule) @ bend),
+        tip_deflection=evaluate(tip, 0)[0], tip_slope=evaluate(tip, 1)[0])
+
+
+@cache
+def _gauss_legendre() -> tuple[Array, Array]:
+    """Return nodes and weights on [0, 1] that integrate products of 8 modes to rounding."""
+    points, weights = np.polynomial.legendre.leggauss(_QUADRATURE_POINTS)
+    return (points + 1) / 2, weights / 2
+
+
+def _clean(matrix: Array) -> Array:
+    """Return a symmetric matrix with entries that are only rounding set to 0."""
+    symmetric = (matrix + matrix.T) / 2
+    size = np.sqrt(np.outer(np.diag(symmetric), np.diag(symmetric)))
+    cleaned: Array = np.where(np.abs(symmetric) < _ROUNDING * size, 0.0, symmetric)
+    return cleaned
+
+
+Family = Callable[[float, int, TipLoad | None], LinkModes]
+
+FAMILIES: dict[str, Family] = {
+    'pinned_pinned': pinned_pinned,
+    'clamped_free': clamped_free,
+    'clamped_mass': clamped_mass,
+}
+
+
+@cache
+def mode_shapes(family: str, length: float, count: int, load: TipLoad) -> LinkModes:
+    """Return the modes of a family; they are computed once."""
+    return FAMILIES[family](length, count, load)

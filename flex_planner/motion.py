@@ -5,7 +5,7 @@ from __future__ import annotations
 from flex_planner.collocation import CollocationSolution, GaussRule
 from flex_planner.errors import InvalidTaskError
 from flex_planner.model import ArmModel, Parameters
-from flex_planner.statics import equilibrium, modal_stiffness
+from flex_planner.statics import equilibrium
 from flex_planner.task import Task
 from flex_planner.validation import Array
 import numpy as np
@@ -47,8 +47,8 @@ class MotionProblem:
         self.p = parameters.stacked()
         n_t = model.arm.n_coordinates
         self.size = 4 * n_t
-        start, _ = equilibrium(model, task.start_positions, self.p)
-        goal, self.holding_torque = equilibrium(model, task.goal_positions, self.p)
+        start, _ = equilibrium(model, task.start_positions, parameters)
+        goal, self.holding_torque = equilibrium(model, task.goal_positions, parameters)
         _check_holding(self.holding_torque, parameters)
         self.start = np.concatenate([start, np.zeros(n_t)])
         self.goal = np.concatenate([goal, np.zeros(n_t)])
@@ -97,7 +97,8 @@ class MotionProblem:
         inertia = np.abs(mass[:, :n]) @ (4 * travel / duration**2)
         bend = np.zeros(0)
         if arm.n_modes:
-            stiffness = modal_stiffness(self.model, self.parameters.rigidity)
+            coordinates = self.start[None, :arm.n_coordinates]
+            stiffness = self.model.static_forces(coordinates, self.p)[1][0, n:, n:]
             bend = np.maximum(np.abs(np.linalg.solve(stiffness, inertia[n:])), 1e-9 * arm.reach)
         positions = np.concatenate([travel, bend])
         velocity_costates = np.abs(mass[:, :n]) @ (self.parameters.effort_weights * inertia[:n])
@@ -118,6 +119,7 @@ def _check_holding(torque: Array, parameters: Parameters) -> None:
 def task_parameters(task: Task) -> Parameters:
     """Return the parameters that a task and its arm determine."""
     return Parameters.of(task.arm, payload_mass=task.payload_mass,
+                         payload_inertia=task.payload_inertia,
                          effort_weights=task.effort_weights,
                          position_weights=task.position_weights,
                          velocity_weights=task.velocity_weights)

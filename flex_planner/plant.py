@@ -119,11 +119,11 @@ class Plant:
             vector(name, getattr(gains, name), model.arm.n_joints)
         self._period = 1 / number('rate', rate, at_least=10, at_most=1e5, unit='Hz')
         mass = number('payload_mass', payload_mass, at_least=0, unit='kg')
-        self._p = Parameters.of(model.arm, payload_mass=mass).stacked()
+        parameters = Parameters.of(model.arm, payload_mass=mass)
         rest, self.torque = equilibrium(
-            model, vector('positions', positions, model.arm.n_joints, unit='rad'), self._p)
+            model, vector('positions', positions, model.arm.n_joints, unit='rad'), parameters)
         self.state = np.concatenate([rest, np.zeros_like(rest)])
-        self._rate = model.state_rate(self._p)
+        self._rate = model.state_rate(parameters.stacked())
         self._ticks = 0
         self.follow(JointReference.hold(rest[:model.arm.n_joints], self.torque))
 

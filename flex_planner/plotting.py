@@ -1,4 +1,4 @@
-"""Pictures of a planned motion, and of how it was carried out."""
+"""Pictures of planned motions, of how they were carried out, and of the arm's modes."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from pathlib import Path
 
 from flex_planner.arm import Arm
 from flex_planner.kinematics import link_points
+from flex_planner.model import ArmModel, Parameters
+from flex_planner.statics import equilibrium, natural_modes
 from flex_planner.validation import Array
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -15,6 +17,9 @@ import numpy as np
 
 _MILLI = 1e3
 _POSTURES = 6
+_NATURAL_MODES = 4
+_STATIONS = 81
+_SHOWN_BEND = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -104,8 +109,69 @@ def draw_motion(path: Path, arm: Arm, joint_names: Sequence[str], motion: Motion
     _draw_modes(axes[1, 1], arm, motion)
     _draw_tip_error(axes[1, 2], motion, execution)
     figure.suptitle(arm.name)
+    _save(figure, path)
+
+
+def _save(figure: Figure, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=110)
+
+
+def draw_mode_shapes(path: Path, model: ArmModel, posture: Array, payload_mass: float) -> None:
+    """
+    Write a picture of the assumed shapes of each link and of the arm's natural modes as PNG.
+
+    Parameters
+    ----------
+    path : Path
+        File to write.
+    model : ArmModel
+        n joints, at least one link with modes.
+    posture : numpy.ndarray, shape (n,)
+        Of the arm whose natural modes are drawn, joints locked [rad].
+    payload_mass : float
+        At its tip [kg].
+
+    """
+    arm = model.arm
+    parameters = Parameters.of(arm, payload_mass=payload_mass)
+    rest, _ = equilibrium(model, posture, parameters)
+    frequencies, vectors = natural_modes(model, rest, parameters, locked=True)
+    flexible = [i for i, link in enumerate(arm.links) if link.modes]
+    shown = min(frequencies.size, _NATURAL_MODES)
+    figure = Figure(figsize=(5 * max(len(flexible), shown), 8), layout='constrained')
+    top, bottom = figure.subfigures(2, 1)
+    for axes, i in zip(np.atleast_1d(top.subplots(1, len(flexible))), flexible, strict=True):
+        _draw_link_shapes(axes, arm, i)
+    for k, axes in enumerate(np.atleast_1d(bottom.subplots(1, shown))):
+        _draw_natural_mode(axes, arm, rest, vectors[:, k], frequencies[k])
+    figure.suptitle(f'{arm.name}, payload {payload_mass:g} kg')
+    _save(figure, path)
+
+
+def _draw_link_shapes(axes: Axes, arm: Arm, index: int) -> None:
+    """Draw the assumed mode shapes of one link."""
+    link = arm.links[index]
+    x = np.linspace(0, link.length, _STATIONS)
+    for j, shape in enumerate(link.mode_shapes().shape(x).T, 1):
+        axes.plot(x, shape, label=f'mode {j}')
+    _finish(axes, f'link {index + 1}: assumed shapes, {link.mode_family}',
+            'deflection per unit of modal displacement', 'along the link [m]')
+
+
+def _draw_natural_mode(axes: Axes, arm: Arm, rest: Array, vector: Array,
+                       frequency: float) -> None:
+    """Draw the arm bent to both sides in a natural mode, enlarged."""
+    change = np.concatenate([np.zeros(arm.n_joints), vector])
+    still = link_points(arm, rest, _STATIONS).reshape(-1, 2)
+    moved = link_points(arm, rest + 1e-6 * change, _STATIONS).reshape(-1, 2)
+    bend = (moved - still) / np.abs(moved - still).max() * _SHOWN_BEND * arm.reach
+    axes.plot(*still.T, color='silver', linewidth=2)
+    for side, style in ((1, '-'), (-1, '--')):
+        axes.plot(*(still + side * bend).T, style, color='C0')
+    axes.set_aspect('equal', adjustable='datalim')
+    _finish(axes, f'natural mode, {frequency / (2 * np.pi):.4g} Hz, joints locked', 'y [m]',
+            'x [m]')
 
 
 def _draw_joints(axes: Axes, title: str, label: str, names: Sequence[str], times: Array,

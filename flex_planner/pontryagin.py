@@ -38,8 +38,9 @@ class _Parameters:
 
     def stacked(self) -> Any:
         """Return all of them as one column, in the order of `model.Parameters.stacked`."""
-        return ca.vertcat(self.chain.payload_mass, self.chain.rigidity, self.stall, self.slope,
-                          self.effort, self.position, self.velocity)
+        return ca.vertcat(self.chain.payload_mass, self.chain.payload_inertia,
+                          self.chain.rigidity, self.stall, self.slope, self.effort,
+                          self.position, self.velocity)
 
 
 def build_functions(arm: Arm) -> dict[str, tuple[Any, int]]:
@@ -65,13 +66,15 @@ def build_functions(arm: Arm) -> dict[str, tuple[Any, int]]:
         - ``forward_dynamics`` (x, u) -> x', eq. (5)
         - ``inverse_dynamics`` (x, a) -> generalized forces
         - ``mass_and_energy`` x -> M, kinetic energy, potential energy
+        - ``static_forces`` q -> dV/dq, d2V/dq2 with V the potential energy
 
     """
     chain = build_chain(arm)
     par = _Parameters.of(chain, arm.n_joints)
     p = par.stacked()
     z, F, outputs = _optimality(par, arm.n_joints)
-    x = ca.vertcat(chain.coordinates, chain.rates)
+    q = chain.coordinates
+    x = ca.vertcat(q, chain.rates)
     u, a = ca.SX.sym('u', arm.n_joints), ca.SX.sym('a', arm.n_coordinates)
     M, solve = _factorized(chain.mass_matrix())
     forces = ca.vertcat(u, ca.SX(arm.n_modes, 1))
@@ -90,6 +93,8 @@ def build_functions(arm: Arm) -> dict[str, tuple[Any, int]]:
         'inverse_dynamics': function('inverse_dynamics', [x, a], [chain.inverse_dynamics(a)]),
         'mass_and_energy': function('mass_and_energy', [x],
                                     [M, chain.kinetic, chain.potential]),
+        'static_forces': function('static_forces', [q], [ca.gradient(chain.potential, q),
+                                                         ca.hessian(chain.potential, q)[0]]),
     }
 
 

@@ -1,23 +1,18 @@
-"""The arm at rest, and how it rings: static deflection, holding torque, frequencies."""
+"""The arm at rest, and how it rings: static deflection, holding torque, natural frequencies."""
 
 from __future__ import annotations
 
-from flex_planner.model import ArmModel
+from flex_planner.model import ArmModel, Parameters
 from flex_planner.validation import Array
 import numpy as np
-from scipy.linalg import block_diag, eigh
+from scipy.linalg import eigh
 
-_MAX_ITERATIONS = 100
-
-
-def modal_stiffness(model: ArmModel, rigidity: Array) -> Array:
-    """Return the bending stiffness of the modal coordinates, shape (n_f, n_f) [N/m]."""
-    blocks = [EI * link.mode_shapes().stiffness
-              for EI, link in zip(rigidity, model.arm.links, strict=True) if link.modes]
-    return np.atleast_2d(block_diag(*blocks)) if blocks else np.zeros((0, 0))
+_MAX_ITERATIONS = 50
+_STATIONS = 41
 
 
-def equilibrium(model: ArmModel, positions: Array, p: Array) -> tuple[Array, Array]:
+def equilibrium(model: ArmModel, positions: Array,
+                parameters: Parameters) -> tuple[Array, Array]:
     """
     Return the arm at rest with its joints held.
 
@@ -27,8 +22,8 @@ def equilibrium(model: ArmModel, positions: Array, p: Array) -> tuple[Array, Arr
         n joints, n_t coordinates.
     positions : numpy.ndarray, shape (n,)
         Joint angles [rad].
-    p : numpy.ndarray
-        Stacked `Parameters`.
+    parameters : Parameters
+        Payload and stiffness.
 
     Returns
     -------
@@ -43,52 +38,58 @@ def equilibrium(model: ArmModel, positions: Array, p: Array) -> tuple[Array, Arr
         If the links are so soft that no equilibrium is found.
 
     """
-    arm = model.arm
-    n = arm.n_joints
-    x = np.zeros((1, 2 * arm.n_coordinates))
-    x[0, :n] = positions
-    still = np.zeros((1, arm.n_coordinates))
-    stiffness = modal_stiffness(model, p[1:1 + n])
+    n, p = model.arm.n_joints, parameters.stacked()
+    q = np.concatenate([positions, np.zeros(model.arm.n_modes)])
     for _ in range(_MAX_ITERATIONS):
-        force = model.inverse_dynamics(x, still, p)[0]
-        if not arm.n_modes:
-            return x[0, :n].copy(), force[:n]
-        change = np.linalg.solve(stiffness, force[n:])
-        x[0, n:arm.n_coordinates] -= change
-        if np.abs(change).max() <= 1e-14 * arm.reach:
-            return x[0, :arm.n_coordinates].copy(), model.inverse_dynamics(x, still, p)[0, :n]
+        force, stiffness = model.static_forces(q[None], p)
+        if not model.arm.n_modes:
+            return q, force[0]
+        change = np.linalg.solve(stiffness[0, n:, n:], force[0, n:])
+        q[n:] -= change
+        if np.abs(change).max() <= 1e-13 * model.arm.reach:
+            return q, model.static_forces(q[None], p)[0][0, :n]
     raise ArithmeticError('no static equilibrium found: the links are too soft for their load')
 
 
-def clamped_modes(model: ArmModel, coordinates: Array, p: Array) -> tuple[Array, Array]:
+def natural_modes(model: ArmModel, coordinates: Array, parameters: Parameters, *,
+                  locked: bool) -> tuple[Array, Array]:
     """
-    Return the vibration of the arm with locked joints.
+    Return the small vibrations of the arm about a posture, without damping.
 
     Parameters
     ----------
     model : ArmModel
-        n_f modal coordinates.
+        n_t coordinates, n_f of them modal.
     coordinates : numpy.ndarray, shape (n_t,)
-        Posture about which it vibrates.
-    p : numpy.ndarray
-        Stacked `Parameters`.
+        An equilibrium.
+    parameters : Parameters
+        Payload and stiffness.
+    locked : bool
+        Whether the joints are held still; otherwise they are free and the first frequencies are
+        those of the swinging arm, or zero.
 
     Returns
     -------
-    frequencies : numpy.ndarray, shape (n_f,)
-        Angular, ascending [rad/s].
-    vectors : numpy.ndarray, shape (n_f, n_f)
-        Columns are modal displacements, orthonormal in the mass matrix.
+    frequencies : numpy.ndarray, shape (n_f,) or (n_t,)
+        Angular, ascending [rad/s]; NaN where the equilibrium is unstable.
+    vectors : numpy.ndarray, shape (n_f, n_f) or (n_t, n_t)
+        Columns are displacements, orthonormal in the mass matrix.
 
     """
-    n = model.arm.n_joints
+    first, p = model.arm.n_joints if locked else 0, parameters.stacked()
     x = np.concatenate([coordinates, np.zeros_like(coordinates)])[None]
-    mass = model.mass_and_energy(x, p)[0][0, n:, n:]
-    squares, vectors = eigh(modal_stiffness(model, p[1:1 + n]), mass)
-    return np.sqrt(squares), vectors
+    mass = model.mass_and_energy(x, p)[0][0, first:, first:]
+    stiffness = model.static_forces(coordinates[None], p)[1][0, first:, first:]
+    if not mass.size:
+        return np.zeros(0), np.zeros((0, 0))
+    squares, vectors = eigh(stiffness, mass)
+    # a free joint has no stiffness: rounding makes its square slightly negative
+    squares[np.abs(squares) < 1e-10 * np.abs(squares).max(initial=0)] = 0
+    return np.sqrt(np.where(squares < 0, np.nan, squares)), vectors
 
 
-def residual_vibration(model: ArmModel, state: Array, rest: Array, p: Array) -> float:
+def residual_vibration(model: ArmModel, state: Array, rest: Array,
+                       parameters: Parameters) -> float:
     """
     Return how far the links still bend after the joints are locked [m].
 
@@ -103,27 +104,26 @@ def residual_vibration(model: ArmModel, state: Array, rest: Array, p: Array) -> 
         When the joints are locked.
     rest : numpy.ndarray, shape (n_t,)
         Equilibrium.
-    p : numpy.ndarray
-        Stacked `Parameters`.
+    parameters : Parameters
+        Payload and stiffness.
 
     """
     arm = model.arm
     n, n_t = arm.n_joints, arm.n_coordinates
     if not arm.n_modes:
         return 0.0
-    frequencies, vectors = clamped_modes(model, rest, p)
-    x = np.concatenate([rest, np.zeros(n_t)])[None]
-    mass = model.mass_and_energy(x, p)[0][0, n:, n:]
-    to_normal = vectors.T @ mass
-    displacement = to_normal @ (state[n:n_t] - rest[n:])
-    rate = to_normal @ state[n_t + n:]
+    frequencies, vectors = natural_modes(model, rest, parameters, locked=True)
+    displacement = np.linalg.solve(vectors, state[n:n_t] - rest[n:])
+    rate = np.linalg.solve(vectors, state[n_t + n:])
     amplitude = np.hypot(displacement, rate / frequencies)
-    reach = [_bending(link.mode_shapes().shape(np.linspace(0, link.length, 41, dtype=float)),
-                      vectors[part.start - n:part.stop - n], amplitude)
-             for link, part in zip(arm.links, arm.modal_slices, strict=True) if link.modes]
-    return max(reach)
+    return max(float((np.abs(_bending(model, link, vectors)) @ amplitude).max())
+               for link in range(n) if arm.links[link].modes)
 
 
-def _bending(shapes: Array, vectors: Array, amplitude: Array) -> float:
-    """Return the largest deflection of one link."""
-    return float((np.abs(shapes @ vectors) @ amplitude).max())
+def _bending(model: ArmModel, index: int, vectors: Array) -> Array:
+    """Return the deflections of a link's stations in each mode, shape (stations, n_f)."""
+    link, part = model.arm.links[index], model.arm.modal_slices[index]
+    shapes = link.mode_shapes().shape(np.linspace(0, link.length, _STATIONS))
+    n = model.arm.n_joints
+    bending: Array = shapes @ vectors[part.start - n:part.stop - n]
+    return bending

@@ -59,7 +59,8 @@ def solve_rigid(problem: MotionProblem, settings: Settings,
     task, n = problem.task, problem.task.arm.n_joints
     rigid_task = Task(arm=task.arm.rigid(), start_positions=task.start_positions,
                       goal_positions=task.goal_positions, duration=task.duration,
-                      payload_mass=task.payload_mass, effort_weights=task.effort_weights,
+                      payload_mass=task.payload_mass, payload_inertia=task.payload_inertia,
+                      effort_weights=task.effort_weights,
                       position_weights=task.position_weights[:n],
                       velocity_weights=task.velocity_weights[:n])
     parameters = replace(problem.parameters, rigidity=np.zeros(n),

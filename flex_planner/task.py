@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from flex_planner.arm import Arm
 from flex_planner.errors import SingularError, UnreachableError
-from flex_planner.kinematics import inverse_kinematics
+from flex_planner.inverse_kinematics import check_angle_limits, inverse_kinematics
 from flex_planner.validation import Array, number, vector
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,6 +31,8 @@ class Task:
         t_f, > 0 and at most 1000 [s].
     payload_mass : float
         m_p, >= 0 and at most 1e6 [kg].
+    payload_inertia : float
+        Rotary inertia of the payload about the tip, >= 0 and at most 1e6 [kg m^2].
     effort_weights : array_like, shape (n,)
         Diagonal of R, > 0; empty for ones.
     position_weights, velocity_weights : array_like, shape (n,) or (n_t,)
@@ -50,6 +52,7 @@ class Task:
     goal_positions: Array
     duration: float
     payload_mass: float = 0.0
+    payload_inertia: float = 0.0
     effort_weights: Array = field(default_factory=lambda: np.zeros(0))
     position_weights: Array = field(default_factory=lambda: np.zeros(0))
     velocity_weights: Array = field(default_factory=lambda: np.zeros(0))
@@ -60,8 +63,11 @@ class Task:
         for name in ('start_positions', 'goal_positions'):
             self._set(name, vector(name, getattr(self, name), n, at_least=-MAX_JOINT_ANGLE,
                                    at_most=MAX_JOINT_ANGLE, unit='rad'))
+            check_angle_limits(self.arm, name, getattr(self, name))
         number('duration', self.duration, above=0, at_most=MAX_DURATION, unit='s')
         number('payload_mass', self.payload_mass, at_least=0, at_most=MAX_PAYLOAD, unit='kg')
+        number('payload_inertia', self.payload_inertia, at_least=0, at_most=MAX_PAYLOAD,
+               unit='kg m^2')
         number('tolerance', self.tolerance, above=0, at_most=1)
         effort = vector('effort_weights', self.effort_weights, (0, n), above=0)
         self._set('effort_weights', effort if effort.size else vector('', np.ones(n), n))
@@ -79,17 +85,17 @@ def postures_from_points(arm: Arm, start: ArrayLike, goal: ArrayLike,
     """
     Return start and goal joint angles of a motion between two points of the tip.
 
-    The goal's first angle is the one nearest to the start's, so that the arm does not make a
-    needless full turn.
+    The goal is the posture nearest to the start, so that the arm does not make a needless full
+    turn.
 
     Parameters
     ----------
     arm : Arm
-        Two links.
+        n joints.
     start, goal : array_like, shape (2,)
         Tip positions in the base frame [m].
     elbow : int
-        Sign of the second joint angle, +1 or -1.
+        See :func:`flex_planner.inverse_kinematics.inverse_kinematics`, +1 or -1.
 
     Returns
     -------
@@ -98,17 +104,18 @@ def postures_from_points(arm: Arm, start: ArrayLike, goal: ArrayLike,
 
     Raises
     ------
-    UnreachableError, SingularError, InvalidTaskError, InvalidValueError
-        See :func:`flex_planner.kinematics.inverse_kinematics`; the message says which point.
+    UnreachableError, SingularError, InvalidValueError
+        See `inverse_kinematics`; the message says which point.
 
     """
-    postures = []
-    for name, point in (('start_point', start), ('goal_point', goal)):
-        checked = vector(name, point, 2, unit='m')
-        try:
-            postures.append(inverse_kinematics(arm, checked, elbow))
-        except (UnreachableError, SingularError) as error:
-            raise type(error)(f'{name}: {error}') from None
-    first, last = postures
-    last[0] += 2 * np.pi * np.round((first[0] - last[0]) / (2 * np.pi))
-    return first, last
+    first = _posture(arm, 'start_point', start, elbow, None)
+    return first, _posture(arm, 'goal_point', goal, elbow, first)
+
+
+def _posture(arm: Arm, name: str, point: ArrayLike, elbow: int, near: Array | None) -> Array:
+    """Return the posture of one point; errors say which."""
+    checked = vector(name, point, 2, unit='m')
+    try:
+        return inverse_kinematics(arm, checked, elbow, near)
+    except (UnreachableError, SingularError) as error:
+        raise type(error)(f'{name}: {error}') from None

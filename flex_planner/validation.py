@@ -53,7 +53,7 @@ def number(
         result = math.inf
     if math.isnan(result) or (math.isinf(result) and not infinite):
         raise NotFiniteError(field, result, f'a finite number {bound}'.rstrip())
-    if not above < result or not at_least <= result <= at_most:
+    if result <= above > -math.inf or not at_least <= result <= at_most:
         raise InvalidValueError(field, result, f'a number {bound}'.rstrip())
     return result
 

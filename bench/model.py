@@ -1,0 +1,146 @@
+"""
+Cost of the model: operations, build time, evaluation time, against other ways to evaluate it.
+
+Run by ``make bench``. All figures of a table come from one run on one machine; a time is the
+median of many calls, compared side by side.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+import json
+import os
+from pathlib import Path
+import platform
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from typing import Any
+
+from flex_planner.arm import Arm
+from flex_planner.arm_files import load_arm
+from flex_planner.model import ArmModel, Parameters
+from flex_planner.validation import Array
+import numpy as np
+
+POINTS = 300
+SIZES = [(n, m) for n in range(1, 5) for m in range(4)]
+# compiling beyond this many coordinates takes minutes
+MOST_COORDINATES = 12
+BRUTE_FORCE = [(1, 0), (1, 1), (2, 0), (2, 1)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """Figures of one arm; times per point [us], None where not run."""
+
+    links: int
+    modes: int
+    coordinates: int
+    rate_operations: int
+    jacobian_operations: int
+    first_build_seconds: float | None = None
+    later_start_seconds: float | None = None
+    compiled_rate: float | None = None
+    compiled_jacobian: float | None = None
+    interpreted_jacobian: float | None = None
+    brute_force_rate: float | None = None
+
+
+def uniform_arm(links: int, modes: int) -> Arm:
+    """Return an arm of equal links like those of the paper."""
+    paper = load_arm('korayem_ei50')
+    link = replace(paper.links[0], modes=modes)
+    return Arm(name=f'{links} links, {modes} modes each', links=(link,) * links,
+               joints=(paper.joints[0],) * links)
+
+
+def median_seconds(call: Callable[[], Any], *, at_least: int = 7, budget: float = 1.0) -> float:
+    """Return the median duration of a call, repeated for about a second."""
+    call()
+    times: list[float] = []
+    while len(times) < at_least or sum(times) < budget:
+        began = time.perf_counter()
+        call()
+        times.append(time.perf_counter() - began)
+    return statistics.median(times)
+
+
+def random_points(arm: Arm) -> tuple[Array, Array]:
+    """Return extended states and parameters like those met on a motion."""
+    random = np.random.default_rng(0)
+    z = 0.1 * random.normal(size=(POINTS, 4 * arm.n_coordinates))
+    p = Parameters.of(arm, payload_mass=1.0).stacked()
+    return z, p
+
+
+def start_seconds(arm: Arm, cache: str) -> float:
+    """Return how long a fresh process takes from the arm to ready functions."""
+    code = (
+        'import sys, time, pickle\n'
+        'began = time.perf_counter()\n'
+        'from flex_planner.model import ArmModel\n'
+        'ArmModel(pickle.loads(bytes.fromhex(sys.argv[1])))\n'
+        'print(time.perf_counter() - began)\n')
+    import pickle
+
+    result = subprocess.run([sys.executable, '-c', code, pickle.dumps(arm).hex()], check=True,
+                            capture_output=True, text=True,
+                            env={**os.environ, 'XDG_CACHE_HOME': cache})
+    return float(result.stdout)
+
+
+def interpreted_seconds(arm: Arm, z: Array, p: Array) -> float:
+    """Return the time of CasADi's virtual machine for all points, called once."""
+    from flex_planner.pontryagin import build_functions
+
+    function, _ = build_functions(arm)['optimality_jacobian']
+    mapped = function.map(len(z))
+    columns, shared = np.ascontiguousarray(z.T), np.repeat(p[:, None], len(z), axis=1)
+    return median_seconds(lambda: mapped(columns, shared))
+
+
+def measure(links: int, modes: int) -> Row:
+    """Return the figures of one arm."""
+    from bench.brute_force import brute_force_rate
+    from flex_planner.pontryagin import build_functions
+
+    arm = uniform_arm(links, modes)
+    built = build_functions(arm)
+    row = Row(links=links, modes=modes, coordinates=arm.n_coordinates,
+              rate_operations=built['optimality'][0].n_instructions(),
+              jacobian_operations=built['optimality_jacobian'][0].n_instructions())
+    if arm.n_coordinates > MOST_COORDINATES:
+        return row
+    with tempfile.TemporaryDirectory() as cache:
+        first, later = start_seconds(arm, cache), start_seconds(arm, cache)
+    z, p = random_points(arm)
+    model = ArmModel(arm)
+    micro = 1e6 / POINTS
+    row = replace(
+        row, first_build_seconds=first, later_start_seconds=later,
+        compiled_rate=median_seconds(lambda: model.optimality(z, p)) * micro,
+        compiled_jacobian=median_seconds(lambda: model.optimality_jacobian(z, p)) * micro,
+        interpreted_jacobian=interpreted_seconds(arm, z, p) * micro)
+    if (links, modes) in BRUTE_FORCE:
+        evaluate = brute_force_rate(arm)
+        columns = list(z.T)
+        row = replace(row, brute_force_rate=median_seconds(lambda: evaluate(columns)) * micro)
+    return row
+
+
+def versions() -> dict[str, str]:
+    """Return what the figures depend on."""
+    import casadi
+    import scipy
+    import sympy
+
+    compiler = subprocess.run(['cc', '--version'], check=True, capture_output=True, text=True)
+    return {'python': platform.python_version(), 'numpy': np.__version__,
+            'scipy': scipy.__version__, 'casadi': casadi.__version__,
+            'sympy': sympy.__version__, 'compiler': compiler.stdout.splitlines()[0],
+            'machine': f'{platform.machine()}, {os.cpu_count()} cores'}
