@@ -1,5 +1,5 @@
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint clean
+.PHONY: help setup demo test lint bench clean
 
 # The interpreter for .venv; a finished .venv stays as it is unless PYTHON is given.
 ifeq ($(origin PYTHON),undefined)
@@ -7,13 +7,14 @@ PYTHON := python3
 SETUP_FLAGS := --keep-python
 endif
 
-CODE := flex_planner launch test tools setup.py
+CODE := bench flex_planner launch test tools setup.py
 
 help:
 	@echo 'make demo     plan motions of a flexible arm through a ROS 2 node; results in output/'
 	@echo 'make test     check the style and run all tests'
 	@echo 'make setup    only create .venv and build into install/'
 	@echo 'make lint     only check the style'
+	@echo 'make bench    measure, and write docs/benchmarks.md (some minutes, on an idle machine)'
 	@echo 'make clean    remove everything that these targets made'
 	@echo
 	@echo 'Each sets up what it needs. PYTHON=python3.12 picks the interpreter (3.10 to 3.13).'
@@ -34,6 +35,9 @@ lint: setup
 	@mkdir -p log
 	@tools/run ament_flake8 $(CODE) >log/lint.txt || { cat log/lint.txt; exit 1; }
 	@tools/run ament_pep257 $(CODE) >log/lint.txt
+
+bench: setup
+	tools/run python -m bench
 
 clean:
 	rm -rf .venv build install log output .mypy_cache .pytest_cache .ruff_cache .hypothesis

@@ -1,19 +1,16 @@
 """
 Cost of the model: operations, build time, evaluation time, against other ways to evaluate it.
 
-Run by ``make bench``. All figures of a table come from one run on one machine; a time is the
-median of many calls, compared side by side.
+All figures come from one run on one machine; a time is the median of many calls.
 
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-import json
 import os
-from pathlib import Path
-import platform
+import pickle
 import statistics
 import subprocess
 import sys
@@ -26,6 +23,8 @@ from flex_planner.arm_files import load_arm
 from flex_planner.model import ArmModel, Parameters
 from flex_planner.validation import Array
 import numpy as np
+
+from bench.brute_force import brute_force_rate
 
 POINTS = 300
 SIZES = [(n, m) for n in range(1, 5) for m in range(4)]
@@ -86,8 +85,6 @@ def start_seconds(arm: Arm, cache: str) -> float:
         'from flex_planner.model import ArmModel\n'
         'ArmModel(pickle.loads(bytes.fromhex(sys.argv[1])))\n'
         'print(time.perf_counter() - began)\n')
-    import pickle
-
     result = subprocess.run([sys.executable, '-c', code, pickle.dumps(arm).hex()], check=True,
                             capture_output=True, text=True,
                             env={**os.environ, 'XDG_CACHE_HOME': cache})
@@ -106,7 +103,6 @@ def interpreted_seconds(arm: Arm, z: Array, p: Array) -> float:
 
 def measure(links: int, modes: int) -> Row:
     """Return the figures of one arm."""
-    from bench.brute_force import brute_force_rate
     from flex_planner.pontryagin import build_functions
 
     arm = uniform_arm(links, modes)
@@ -133,14 +129,27 @@ def measure(links: int, modes: int) -> Row:
     return row
 
 
-def versions() -> dict[str, str]:
-    """Return what the figures depend on."""
-    import casadi
-    import scipy
-    import sympy
+def table(rows: Sequence[Row]) -> str:
+    """Return the figures as a Markdown table."""
+    heads = ['links x modes', 'coordinates', "operations z'", "with dz'/dz", 'first build [s]',
+             'later start [s]', "z' [us]", "with dz'/dz [us]", 'CasADi VM [us]', 'ratio',
+             "SymPy, z' only [us]", 'ratio']
+    lines = [f'| {" | ".join(heads)} |', f'|{"---|" * len(heads)}']
+    for row in rows:
+        cells = [f'{row.links} x {row.modes}', row.coordinates, row.rate_operations,
+                 row.jacobian_operations, row.first_build_seconds, row.later_start_seconds,
+                 row.compiled_rate, row.compiled_jacobian, row.interpreted_jacobian,
+                 _ratio(row.interpreted_jacobian, row.compiled_jacobian), row.brute_force_rate,
+                 _ratio(row.brute_force_rate, row.compiled_rate)]
+        lines.append(f'| {" | ".join(_cell(cell) for cell in cells)} |')
+    return '\n'.join(lines)
 
-    compiler = subprocess.run(['cc', '--version'], check=True, capture_output=True, text=True)
-    return {'python': platform.python_version(), 'numpy': np.__version__,
-            'scipy': scipy.__version__, 'casadi': casadi.__version__,
-            'sympy': sympy.__version__, 'compiler': compiler.stdout.splitlines()[0],
-            'machine': f'{platform.machine()}, {os.cpu_count()} cores'}
+
+def _ratio(slow: float | None, fast: float | None) -> float | None:
+    return slow / fast if slow and fast else None
+
+
+def _cell(value: float | str | None) -> str:
+    if value is None:
+        return '-'
+    return f'{value:.3g}' if isinstance(value, float) else str(value)

@@ -159,7 +159,7 @@ def _nearest(arm: Arm, point: Array, near: Array) -> Array:
                          method='SLSQP', options={'maxiter': 200, 'ftol': 1e-14})
         positions = np.clip(found.x, lower, upper)
         if np.abs(tip_position(rigid, positions) - point).max() <= _EXACT * arm.reach:
-            return positions
+            return np.asarray(positions, dtype=float)
     raise UnreachableError(f'no posture within the joint limits was found that puts the tip at '
                            f'({point[0]:.6g}, {point[1]:.6g}) m')
 

@@ -152,7 +152,7 @@ def draw_mode_shapes(path: Path, model: ArmModel, posture: Array, payload_mass: 
 def _draw_link_shapes(axes: Axes, arm: Arm, index: int) -> None:
     """Draw the assumed mode shapes of one link."""
     link = arm.links[index]
-    x = np.linspace(0, link.length, _STATIONS)
+    x = np.linspace(0, link.length, _STATIONS, dtype=float)
     for j, shape in enumerate(link.mode_shapes().shape(x).T, 1):
         axes.plot(x, shape, label=f'mode {j}')
     _finish(axes, f'link {index + 1}: assumed shapes, {link.mode_family}',

@@ -123,7 +123,8 @@ def residual_vibration(model: ArmModel, state: Array, rest: Array,
 def _bending(model: ArmModel, index: int, vectors: Array) -> Array:
     """Return the deflections of a link's stations in each mode, shape (stations, n_f)."""
     link, part = model.arm.links[index], model.arm.modal_slices[index]
-    shapes = link.mode_shapes().shape(np.linspace(0, link.length, _STATIONS))
+    stations = np.linspace(0, link.length, _STATIONS, dtype=float)
+    shapes = link.mode_shapes().shape(stations)
     n = model.arm.n_joints
     bending: Array = shapes @ vectors[part.start - n:part.stop - n]
     return bending
