@@ -137,7 +137,7 @@ def table(rows: Sequence[Row]) -> str:
     lines = [f'| {" | ".join(heads)} |', f'|{"---|" * len(heads)}']
     for row in rows:
         cells: list[float | str | None] = [
-            f'{row.links} x {row.modes}', row.coordinates, row.rate_operations,
+                 f'{row.links} x {row.modes}', row.coordinates, row.rate_operations,
                  row.jacobian_operations, row.first_build_seconds, row.later_start_seconds,
                  row.compiled_rate, row.compiled_jacobian, row.interpreted_jacobian,
                  _ratio(row.interpreted_jacobian, row.compiled_jacobian), row.brute_force_rate,
