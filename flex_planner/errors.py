@@ -70,5 +70,9 @@ class SingularError(FlexPlannerError):
     """The arm loses a direction of motion at a point: condition (I), second part."""
 
 
+class NoEquilibriumError(FlexPlannerError):
+    """The links are so soft that the arm does not come to rest under its load."""
+
+
 class RecordingError(FlexPlannerError):
     """A recording cannot be written or read."""

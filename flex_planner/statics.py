@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from flex_planner.errors import NoEquilibriumError
 from flex_planner.model import ArmModel, Parameters
 from flex_planner.validation import Array
 import numpy as np
@@ -34,8 +35,8 @@ def equilibrium(model: ArmModel, positions: Array,
 
     Raises
     ------
-    ArithmeticError
-        If the links are so soft that no equilibrium is found.
+    NoEquilibriumError
+        If the links are so soft that none is found.
 
     """
     n, p = model.arm.n_joints, parameters.stacked()
@@ -48,7 +49,9 @@ def equilibrium(model: ArmModel, positions: Array,
         q[n:] -= change
         if np.abs(change).max() <= 1e-13 * model.arm.reach:
             return q, model.static_forces(q[None], p)[0][0, :n]
-    raise ArithmeticError('no static equilibrium found: the links are too soft for their load')
+    degrees = ', '.join(f'{angle:.4g}' for angle in np.degrees(positions))
+    raise NoEquilibriumError('no static equilibrium was found at joint angles '
+                             f'({degrees}) deg: the links are too soft for their load')
 
 
 def natural_modes(model: ArmModel, coordinates: Array, parameters: Parameters, *,
