@@ -37,6 +37,7 @@ setup(
         'console_scripts': [
             'planner = flex_planner.ros.planner_node:main',
             'arm_simulator = flex_planner.ros.arm_simulator:main',
+            'flex-planner = flex_planner.cli:main',
         ],
     },
 )

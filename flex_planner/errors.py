@@ -70,7 +70,7 @@ class SingularError(FlexPlannerError):
     """The arm loses a direction of motion at a point: condition (I), second part."""
 
 
-class NoEquilibriumError(FlexPlannerError):
+class NoEquilibriumError(InvalidTaskError):
     """The links are so soft that the arm does not come to rest under its load."""
 
 

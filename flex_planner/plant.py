@@ -92,8 +92,8 @@ class Plant:
     ----------
     model : ArmModel
         n joints, n_t coordinates.
-    payload_mass : float
-        At the tip, >= 0 [kg].
+    payload_mass, payload_inertia : float
+        At the tip, >= 0 [kg], [kg m^2].
     gains : Gains
         Of the joint controller.
     positions : array_like, shape (n,)
@@ -113,13 +113,14 @@ class Plant:
     """
 
     def __init__(self, model: ArmModel, *, payload_mass: float, gains: Gains, positions: Array,
-                 rate: float = 1000.0) -> None:
+                 payload_inertia: float = 0.0, rate: float = 1000.0) -> None:
         self.model, self._gains = model, gains
         for name in ('stiffness', 'damping'):
             vector(name, getattr(gains, name), model.arm.n_joints)
         self._period = 1 / number('rate', rate, at_least=10, at_most=1e5, unit='Hz')
         mass = number('payload_mass', payload_mass, at_least=0, unit='kg')
-        parameters = Parameters.of(model.arm, payload_mass=mass)
+        inertia = number('payload_inertia', payload_inertia, at_least=0, unit='kg m^2')
+        parameters = Parameters.of(model.arm, payload_mass=mass, payload_inertia=inertia)
         rest, self.torque = equilibrium(
             model, vector('positions', positions, model.arm.n_joints, unit='rad'), parameters)
         self.state = np.concatenate([rest, np.zeros_like(rest)])

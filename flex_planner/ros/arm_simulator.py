@@ -42,6 +42,9 @@ class SimulatorSettings:
     payload_mass: float = described(
         1.0, 'Mass at the tip of the simulated arm [kg].', lowest=0.0, highest=1e6,
         read_only=True)
+    payload_inertia: float = described(
+        0.0, 'Rotary inertia of that mass about the tip [kg m^2].', lowest=0.0, highest=1e6,
+        read_only=True)
     stiffness: list[float] = described(
         [100.0], 'Proportional gain of each joint [N m/rad].', read_only=True)
     damping: list[float] = described(
@@ -111,7 +114,8 @@ class ArmSimulator(Node):  # type: ignore[misc]
         settings = self._settings
         gains = Gains(stiffness=np.asarray(settings.stiffness),
                       damping=np.asarray(settings.damping))
-        return Plant(ArmModel(self._arm), payload_mass=settings.payload_mass, gains=gains,
+        return Plant(ArmModel(self._arm), payload_mass=settings.payload_mass,
+                     payload_inertia=settings.payload_inertia, gains=gains,
                      positions=np.asarray(settings.initial_positions),
                      rate=settings.control_rate)
 

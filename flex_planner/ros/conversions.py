@@ -66,7 +66,7 @@ def task_from_message(message: MotionTask, arm: Arm, settings: PlannerSettings) 
     tolerance = number('tolerance', message.tolerance, at_least=0, at_most=1)
     return Task(
         arm=arm, start_positions=start, goal_positions=goal, duration=message.duration,
-        payload_mass=message.payload_mass,
+        payload_mass=message.payload_mass, payload_inertia=message.payload_inertia,
         effort_weights=np.asarray(message.effort_weights or settings.effort_weights),
         position_weights=np.asarray(message.position_weights),
         velocity_weights=np.asarray(message.velocity_weights),
