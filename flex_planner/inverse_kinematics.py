@@ -153,10 +153,14 @@ def _nearest(arm: Arm, point: Array, near: Array) -> Array:
     rigid, (lower, upper) = arm.rigid(), arm.angle_limits()
     reach = {'type': 'eq', 'fun': lambda q: (tip_position(rigid, q) - point) / arm.reach,
              'jac': lambda q: jacobian(rigid, q) / arm.reach}
+    # not as bounds: SciPy warns where rounding takes its own steps beyond them
+    sides = np.vstack([np.eye(near.size)[np.isfinite(lower)], -np.eye(near.size)[np.isfinite(upper)]])
+    ends = np.concatenate([-lower[np.isfinite(lower)], upper[np.isfinite(upper)]])
+    within = {'type': 'ineq', 'fun': lambda q: sides @ q + ends, 'jac': lambda q: sides}
     for start in _starts(near, lower, upper):
         found = minimize(lambda q: ((q - near) ** 2).sum() / 2, start, jac=lambda q: q - near,
-                         bounds=list(zip(lower, upper, strict=True)), constraints=[reach],
-                         method='SLSQP', options={'maxiter': 200, 'ftol': 1e-14})
+                         constraints=[reach, within], method='SLSQP',
+                         options={'maxiter': 200, 'ftol': 1e-14})
         positions = np.clip(found.x, lower, upper)
         if np.abs(tip_position(rigid, positions) - point).max() <= _EXACT * arm.reach:
             return np.asarray(positions, dtype=float)
@@ -174,15 +178,16 @@ def _starts(near: Array, lower: Array, upper: Array) -> list[Array]:
 def _turned_into_limits(arm: Arm, positions: Array, near: Array | None) -> Array:
     """Return the same posture by the full turns that suit the joint limits, then `near`."""
     result = positions.copy()
-    turns = 2 * np.pi * np.arange(-2, 3)
     for i, joint in enumerate(arm.joints):
         wanted = 0.0 if near is None else near[i]
-        angles = positions[i] + turns
+        allowed_place = np.clip(wanted, joint.lower_limit, joint.upper_limit)
+        turns = np.round((allowed_place - positions[i]) / (2 * np.pi)) + np.arange(-1, 2)
+        angles = positions[i] + 2 * np.pi * turns
         allowed = angles[(angles >= joint.lower_limit) & (angles <= joint.upper_limit)]
         if not allowed.size:
             raise UnreachableError(
                 f'joint {i + 1} would have to be at {positions[i]:.4g} rad, outside its limits '
                 f'{joint.lower_limit:g} to {joint.upper_limit:g} rad')
-        if i == 0 or result[i] not in allowed:
+        if i == 0 or not joint.lower_limit <= result[i] <= joint.upper_limit:
             result[i] = allowed[np.argmin(np.abs(allowed - wanted))]
     return result

@@ -72,6 +72,21 @@ def workshop_arm() -> Arm:
 
 
 @pytest.fixture(scope='session')
+def crane_arm() -> Arm:
+    """Return an arm with clamped links that has everything the workshop arm has, and damping."""
+    links = (Link(length=0.6, linear_density=4.0, flexural_rigidity=60.0, modes=2,
+                  mode_family='clamped_mass', shape_mass=4.0, shape_inertia=0.4,
+                  damping_ratio=0.02),
+             Link(length=0.4, linear_density=2.5, flexural_rigidity=20.0, modes=1,
+                  mode_family='clamped_free', damping_ratio=0.05))
+    joints = (Joint(motor=Motor(stall_torque=9.0, no_load_speed=4.0), viscous_friction=0.3),
+              Joint(motor=Motor(stall_torque=5.0, no_load_speed=6.0), viscous_friction=0.1))
+    nodes = (Node(mass=2.0, inertia=0.05), Node(mass=1.5, inertia=0.02),
+             Node(mass=0.4, inertia=0.01))
+    return Arm(name='crane', links=links, joints=joints, nodes=nodes, gravity=[1.3, -9.81])
+
+
+@pytest.fixture(scope='session')
 def rigid_model(rigid_arm: Arm) -> ArmModel:
     return ArmModel(rigid_arm)
 
@@ -99,6 +114,11 @@ def uneven_model(uneven_arm: Arm) -> ArmModel:
 @pytest.fixture(scope='session')
 def workshop_model(workshop_arm: Arm) -> ArmModel:
     return ArmModel(workshop_arm)
+
+
+@pytest.fixture(scope='session')
+def crane_model(crane_arm: Arm) -> ArmModel:
+    return ArmModel(crane_arm)
 
 
 @pytest.fixture(scope='session')
