@@ -37,7 +37,7 @@ lint: setup
 	@tools/run ament_pep257 $(CODE) >log/lint.txt
 
 bench: setup
-	@tools/run pip install -q -r requirements/bench.txt
+	@tools/run pip install -q -r bench/requirements.txt
 	tools/run python -m bench
 
 clean:
