@@ -17,6 +17,7 @@ from flex_planner.errors import (
     SingularError,
     UnreachableError,
 )
+from flex_planner.kinematics import tip_position
 from flex_planner.model import ArmModel
 from flex_planner.path import plan_path
 from flex_planner.plan import Plan, PlanStatus
@@ -117,11 +118,12 @@ def test_bad_message_raises_with_the_name_of_its_field(ei50_arm: Arm, text: str,
     assert type(caught.value) is error
 
 
-def test_points_for_an_arm_of_three_links_make_no_sense() -> None:
+def test_points_determine_the_postures_of_three_links_too() -> None:
     link = Link(length=0.3, linear_density=1.0)
     arm = Arm(name='three', links=(link,) * 3, joints=(Joint(),) * 3)
-    with pytest.raises(InvalidTaskError, match='give joint angles instead'):
-        task_from_message(task(effort_weights=[]), arm, PlannerSettings.for_arm(arm))
+    made = task_from_message(task(effort_weights=[]), arm, PlannerSettings.for_arm(arm))
+    tips = tip_position(arm, np.stack([made.start_positions, made.goal_positions]))
+    np.testing.assert_allclose(tips, [[0.5, 0.0], [0.5, 0.5]], atol=1e-9)  # of the search
 
 
 @pytest.mark.parametrize('value', [-1.0, 3601.0, math.nan])

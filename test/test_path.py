@@ -165,7 +165,7 @@ def test_flexible_plan_spares_the_vibration_that_a_rigid_one_leaves(
                    planned_torque(rigid.problem, rigid.solution), 1.0)
     miss = np.linalg.norm(tip_position(ei5_model.arm, end[:6])
                           - tip_position(ei5_model.arm, problem.goal[:6]))
-    vibration = residual_vibration(ei5_model, end, problem.goal[:6], problem.p)
+    vibration = residual_vibration(ei5_model, end, problem.goal[:6], problem.parameters)
     # 0.9 mm and ~1 mm against 6e-5 mm and ~1e-4 mm, rounded there
     assert miss == pytest.approx(0.9e-3, abs=0.05e-3)
     assert vibration == pytest.approx(1e-3, rel=0.5)
