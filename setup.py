@@ -31,7 +31,8 @@ setup(
         'scipy>=1.11',
         'zstandard>=0.22',
     ],
-    extras_require={'test': ['hypothesis', 'mcap-ros2-support', 'pytest', 'pytest-timeout']},
+    extras_require={'test': ['autograd', 'hypothesis', 'mcap-ros2-support', 'mpmath', 'pytest',
+                             'pytest-timeout']},
     zip_safe=False,
     entry_points={
         'console_scripts': [

@@ -21,6 +21,10 @@ from flex_planner.validation import number
 import yaml
 
 _MAX_BYTES = 1_000_000
+_UNITS = {'length': 'm', 'mass': 'kg', 'linear_density': 'kg/m', 'density': 'kg/m^3',
+          'flexural_rigidity': 'N m^2', 'youngs_modulus': 'N/m^2', 'width': 'm',
+          'thickness': 'm', 'second_moment_of_area': 'm^4', 'shape_mass': 'kg',
+          'shape_inertia': 'kg m^2'}
 
 
 class ArmFileError(FlexPlannerError):
@@ -150,7 +154,7 @@ class _Section:
 
     def number(self, key: str, *, above: float = -math.inf) -> float:
         """Return a number, checked here because others are computed from it."""
-        return number(self.name(key), self.take(key), above=above)
+        return number(self.name(key), self.take(key), above=above, unit=_UNITS[key])
 
     def text(self, key: str, default: str | None = None) -> str:
         """Return a text field."""

@@ -18,13 +18,15 @@ from flex_planner.kinematics import jacobian, tip_position
 from flex_planner.validation import Array
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import minimize
+from scipy.optimize import least_squares
 
 # relative to reach^2: nearer to a stretched or folded arm a small step needs huge joint motion
 _SINGULAR = 1e-3
 # relative to the reach
 _EXACT = 1e-9
 _CANDIDATES = 12
+# on the distance from the wanted posture, less and less
+_WEIGHTS = (1e-1, 1e-2, 1e-4, 0.0)
 
 
 def workspace(arm: Arm) -> tuple[float, float]:
@@ -151,17 +153,16 @@ def _bent(arm: Arm, point: Array, elbow: int) -> Array:
 def _nearest(arm: Arm, point: Array, near: Array) -> Array:
     """Return the posture closest to a given one among those that reach a point."""
     rigid, (lower, upper) = arm.rigid(), arm.angle_limits()
-    reach = {'type': 'eq', 'fun': lambda q: (tip_position(rigid, q) - point) / arm.reach,
-             'jac': lambda q: jacobian(rigid, q) / arm.reach}
-    # not as bounds: SciPy warns where rounding takes its own steps beyond them
-    sides = np.vstack([np.eye(near.size)[np.isfinite(lower)], -np.eye(near.size)[np.isfinite(upper)]])
-    ends = np.concatenate([-lower[np.isfinite(lower)], upper[np.isfinite(upper)]])
-    within = {'type': 'ineq', 'fun': lambda q: sides @ q + ends, 'jac': lambda q: sides}
     for start in _starts(near, lower, upper):
-        found = minimize(lambda q: ((q - near) ** 2).sum() / 2, start, jac=lambda q: q - near,
-                         constraints=[reach, within], method='SLSQP',
-                         options={'maxiter': 200, 'ftol': 1e-14})
-        positions = np.clip(found.x, lower, upper)
+        positions = start
+        for weight in _WEIGHTS:
+            positions = least_squares(
+                lambda q, w=weight: np.concatenate([
+                    (tip_position(rigid, q) - point) / arm.reach, w * (q - near)]),
+                positions, lambda q, w=weight: np.vstack([
+                    jacobian(rigid, q) / arm.reach, w * np.eye(near.size)]),
+                bounds=(lower, upper), max_nfev=60, xtol=1e-15, ftol=1e-15,
+                gtol=1e-15).x
         if np.abs(tip_position(rigid, positions) - point).max() <= _EXACT * arm.reach:
             return np.asarray(positions, dtype=float)
     raise UnreachableError(f'no posture within the joint limits was found that puts the tip at '
@@ -171,8 +172,9 @@ def _nearest(arm: Arm, point: Array, near: Array) -> Array:
 def _starts(near: Array, lower: Array, upper: Array) -> list[Array]:
     """Return postures to start from: the given one, then others, always the same."""
     random = np.random.default_rng(0)
-    others = near + random.uniform(-1, 1, (_CANDIDATES, near.size))
-    return [np.clip(start, lower, upper) for start in (near, *others)]
+    middle = np.clip(near, lower, upper)
+    low, high = np.maximum(lower, middle - 2), np.minimum(upper, middle + 2)
+    return [middle, *random.uniform(low, high, (_CANDIDATES, near.size))]
 
 
 def _turned_into_limits(arm: Arm, positions: Array, near: Array | None) -> Array:

@@ -36,7 +36,7 @@ def equilibrium(model: ArmModel, positions: Array,
     Raises
     ------
     NoEquilibriumError
-        If the links are so soft that none is found.
+        If the links are so soft that no stable one is found.
 
     """
     n, p = model.arm.n_joints, parameters.stacked()
@@ -48,6 +48,8 @@ def equilibrium(model: ArmModel, positions: Array,
         change = np.linalg.solve(stiffness[0, n:, n:], force[0, n:])
         q[n:] -= change
         if np.abs(change).max() <= 1e-13 * model.arm.reach:
+            if np.linalg.eigvalsh(stiffness[0, n:, n:])[0] <= 0:
+                break  # balanced, but it would buckle
             return q, model.static_forces(q[None], p)[0][0, :n]
     degrees = ', '.join(f'{angle:.4g}' for angle in np.degrees(positions))
     raise NoEquilibriumError('no static equilibrium was found at joint angles '

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from flex_planner import arm_files
-from flex_planner.arm import Node
+from flex_planner.arm import Link, Node
 from flex_planner.arm_files import arm_from_mapping, ArmFileError, load_arm, preset_files
 from flex_planner.errors import InvalidValueError
 import pytest
@@ -29,6 +29,10 @@ COMPLETE: dict[str, Any] = {
 PRESETS = [('korayem_rigid', 0, math.inf), ('korayem_ei50', 2, 50.0), ('korayem_ei5', 2, 5.0)]
 
 REMOVE = object()
+DENSITY = 'links[0].linear_density or mass or density'
+RIGIDITY = 'links[0].flexural_rigidity or youngs_modulus'
+SECTION = 'links[1].section or second_moment_of_area'
+FAMILY_NAMES = "one of ['pinned_pinned', 'clamped_free', 'clamped_mass']"
 MISTAKES: list[tuple[str, object, str, str]] = [
     # place in COMPLETE, value put there, field named, rest of the message
     ('name', REMOVE, 'name', 'must be given'),
@@ -43,8 +47,9 @@ MISTAKES: list[tuple[str, object, str, str]] = [
     ('links/0/length', 0, 'links[0].length', '> 0 m'),
     ('links/0/length', '0.5 m', 'links[0].length', '> 0 m'),
     ('links/0/length', True, 'links[0].length', '> 0 m'),
-    ('links/0/mass', REMOVE, 'links[0].mass', 'given, or linear_density in its place'),
-    ('links/0/linear_density', 6.0, 'links[0].mass', 'given, or linear_density in its place'),
+    ('links/0/mass', REMOVE, DENSITY, 'is None, but must be given, one of them'),
+    ('links/0/linear_density', 6.0, DENSITY, "is 'linear_density and mass', but must be given, "),
+    ('links/0/density', 2700.0, DENSITY, "is 'mass and density', but must be given, one of them"),
     ('links/0/mass', 0.0, 'links[0].mass', '> 0 kg'),
     ('links/0/mass', -3.0, 'links[0].mass', '> 0 kg'),
     ('links/0/mass', True, 'links[0].mass', '> 0 kg'),
@@ -53,11 +58,27 @@ MISTAKES: list[tuple[str, object, str, str]] = [
     ('links/0/mass', math.nan, 'links[0].mass', '> 0 kg'),
     ('links/1/length', -0.25, 'links[1].length', '> 0 m'),
     ('links/1/linear_density', 0.0, 'links[1].linear_density', '> 0 kg/m'),
-    ('links/0/flexural_rigidity', REMOVE, 'links[0].flexural_rigidity', 'link with modes'),
+    ('links/0/flexural_rigidity', REMOVE, RIGIDITY, 'is None, but must be given, one of them'),
+    ('links/0/youngs_modulus', 7e10, RIGIDITY, "is 'flexural_rigidity and youngs_modulus'"),
+    ('links/1/youngs_modulus', 7e10, SECTION, 'given with youngs_modulus'),
+    ('links/1/youngs_modulus', -1.0, 'links[1].youngs_modulus', '> 0 N/m^2'),
+    ('links/1/flexural_rigidity', 0.0, 'links[1].flexural_rigidity', '> 0 N m^2'),
+    ('links/1/section', {'width': 0.1}, 'links[1].section.thickness', 'must be given'),
+    ('links/1/section', {'width': 0.0, 'thickness': 1.0}, 'links[1].section.width', '> 0 m'),
+    ('links/1/section', {'width': 1.0, 'thickness': -1.0}, 'links[1].section.thickness', '> 0 m'),
+    ('links/1/section', {'width': 1.0, 'thickness': 1.0, 'depth': 1.0}, 'links[1].section.depth',
+     'no such field'),
+    ('links/1/section', 0.1, 'links[1].section', 'a mapping of fields'),
+    ('links/1/second_moment_of_area', 0.0, 'links[1].second_moment_of_area', '> 0 m^4'),
+    ('links/0/shape_mass', 1.0, 'links[0].shape_mass', 'no such field'),  # of clamped_mass only
+    ('links/0/damping_ratio', 1.0, 'links[0].damping_ratio', 'a number < 1'),
+    ('links/0/damping_ratio', -0.1, 'links[0].damping_ratio', '>= 0'),
+    ('joints/0/lower_limit', 'low', 'joints[0].lower_limit', 'a number'),
+    ('joints/0/upper_limit', True, 'joints[0].upper_limit', 'a number'),
     ('links/0/flexural_rigidity', -1, 'links[0].flexural_rigidity', '> 0 N m^2'),
     ('links/0/modes', 2.5, 'links[0].modes', 'an integer from 0 to 8'),
-    ('links/0/mode_family', 'sine', 'links[0].mode_family', "one of ['pinned_pinned']"),
-    ('links/0/mode_family', ['sine'], 'links[0].mode_family', "one of ['pinned_pinned']"),
+    ('links/0/mode_family', 'sine', 'links[0].mode_family', FAMILY_NAMES),
+    ('links/0/mode_family', ['sine'], 'links[0].mode_family', FAMILY_NAMES),
     ('links/0/lenght', 0.5, 'links[0].lenght', 'left out: there is no such field'),
     ('joints', REMOVE, 'joints', 'must be given'),
     ('joints', [{}], 'number of joints', '2, one a link'),
@@ -129,6 +150,92 @@ def test_file_is_read_as_written(tmp_path: Path) -> None:
     assert arm.nodes[0].inertia == 2.0
     assert arm.joints[0].viscous_friction == 0.1
     assert math.isinf(arm.joints[1].motor.stall_torque)
+
+
+def of_section(**fields: Any) -> Link:
+    """Return a link that is described by its section, with some fields changed."""
+    link = {'length': 0.5, 'density': 2700.0, 'youngs_modulus': 7e10, 'modes': 1,
+            'section': {'width': 0.04, 'thickness': 0.003}, **fields}
+    given = {name: value for name, value in link.items() if value is not REMOVE}
+    return arm_from_mapping(changed('links/0', given)).links[0]
+
+
+def test_section_density_and_modulus_give_the_beam() -> None:
+    link = of_section()
+    assert link.linear_density == pytest.approx(2700 * 0.04 * 0.003, rel=1e-15)
+    assert link.flexural_rigidity == pytest.approx(7e10 * 0.04 * 0.003**3 / 12, rel=1e-15)
+
+
+@pytest.mark.parametrize(('fields', 'density', 'rigidity'), [
+    # a rigidity or a mass that is given needs no section for itself
+    ({'youngs_modulus': REMOVE, 'flexural_rigidity': 5.0}, 0.324, 5.0),
+    ({'density': REMOVE, 'mass': 0.2}, 0.4, 6.3),
+    ({'density': REMOVE, 'linear_density': 0.3, 'section': REMOVE,
+      'second_moment_of_area': 1e-10}, 0.3, 7.0),
+    ({'youngs_modulus': REMOVE, 'modes': 0}, 0.324, math.inf)])
+def test_quantities_of_a_beam_combine(fields: dict[str, Any], density: float,
+                                      rigidity: float) -> None:
+    link = of_section(**fields)
+    assert (link.linear_density, link.flexural_rigidity) == pytest.approx((density, rigidity),
+                                                                          rel=1e-14)
+
+
+@pytest.mark.parametrize(('fields', 'message'), [
+    ({'section': REMOVE}, 'section is None, but must be given with density'),
+    ({'section': REMOVE, 'second_moment_of_area': 1e-10},
+     'section is None, but must be given with density'),
+    ({'section': REMOVE, 'density': REMOVE, 'mass': 1.0},
+     'section or second_moment_of_area is None, but must be given with youngs_modulus'),
+    ({'second_moment_of_area': 1e-10}, 'second_moment_of_area is 1e-10, but must be left out')])
+def test_combination_that_leaves_the_beam_open_is_named(fields: dict[str, Any],
+                                                        message: str) -> None:
+    with pytest.raises(InvalidValueError, match=rf'^links\[0\]\.{message}'):
+        of_section(**fields)
+
+
+def test_loads_of_shapes_damping_and_limits_are_read() -> None:
+    content = changed('links/0', {
+        'length': 0.5, 'mass': 3.0, 'flexural_rigidity': 50.0, 'modes': 2, 'damping_ratio': 0.02,
+        'mode_family': 'clamped_mass', 'shape_mass': 1.5, 'shape_inertia': 0.25})
+    content['joints'][0] = {'lower_limit': -1.0, 'upper_limit': 2.0}
+    arm = arm_from_mapping(content)
+    link = arm.links[0]
+    assert (link.shape_mass, link.shape_inertia, link.damping_ratio) == (1.5, 0.25, 0.02)
+    assert [limits.tolist() for limits in arm.angle_limits()] == [[-1.0, -math.inf],
+                                                                 [2.0, math.inf]]
+
+
+@pytest.mark.parametrize('field', ['shape_mass', 'shape_inertia'])
+def test_shapes_with_a_load_need_to_be_told_it(field: str) -> None:
+    link = {'length': 0.5, 'mass': 3.0, 'flexural_rigidity': 50.0, 'modes': 2,
+            'mode_family': 'clamped_mass', 'shape_mass': 1.5, 'shape_inertia': 0.25}
+    del link[field]
+    with pytest.raises(InvalidValueError, match=rf'^links\[0\]\.{field} is None'):
+        arm_from_mapping(changed('links/0', link))
+
+
+def test_preset_of_section_5_4_carries_the_numbers_of_table_6() -> None:
+    arm = load_arm('korayem_table6')
+    first, second = arm.links
+    # E = 6.9e10 N/m^2, 2700 kg/m^3; 0.1524 x 0.005537 m and 0.0762 x 0.001574 m
+    assert (first.flexural_rigidity, second.flexural_rigidity) == pytest.approx(
+        (148.7566, 1.708587), rel=1e-6)
+    assert (first.linear_density, second.linear_density) == pytest.approx((2.278365, 0.3238348),
+                                                                          rel=1e-6)
+    assert (first.length, second.length) == (0.5969, 0.4842)
+    assert [joint.motor.stall_torque for joint in arm.joints] == [13.5, 4.0]
+    assert [joint.motor.torque_slope for joint in arm.joints] == [0.0, 0.0]
+    assert [(node.mass, node.inertia) for node in arm.nodes] == [(0, 1), (5.415, 1), (0.83, 1)]
+
+
+def test_preset_of_de_luca_and_siciliano_knows_what_its_first_link_carries() -> None:
+    arm = load_arm('de_luca_siciliano')
+    first, second = arm.links
+    payload, inertia = 0.1, 0.0005  # of the paper, not part of the arm
+    assert first.shape_mass == pytest.approx(arm.nodes[1].mass + second.mass + payload)
+    assert first.shape_inertia == pytest.approx(
+        arm.nodes[1].inertia + second.mass * 0.5**2 / 3 + payload * 0.5**2 + inertia)
+    assert (second.shape_mass, second.shape_inertia) == (payload, inertia)
 
 
 def test_constant_torque_limit_needs_no_speed() -> None:

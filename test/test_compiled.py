@@ -7,6 +7,7 @@ import dataclasses
 import logging
 import os
 from pathlib import Path
+import platform
 import subprocess
 import sys
 import threading
@@ -15,7 +16,7 @@ from typing import Any
 
 import flex_planner
 from flex_planner import compiled
-from flex_planner.arm import Arm, Node
+from flex_planner.arm import Arm, Motor, Node
 from flex_planner.compiled import cache_folder, content_key, load_functions
 from flex_planner.model import ArmModel, Parameters
 import numpy as np
@@ -229,6 +230,28 @@ def test_key_tells_apart_where_one_part_ends() -> None:
     assert len(keys) == 4  # bytes and text of the same content are the same
 
 
+def test_key_tells_processors_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    # the code is compiled for one kind, and a home folder may serve several
+    keys = []
+    for flags in ('x86_64 flags: sse4_2 avx2', 'x86_64 flags: sse4_2', 'aarch64 Features: asimd'):
+        monkeypatch.setattr(compiled, '_processor', lambda flags=flags: flags)
+        keys.append(content_key('same'))
+    assert len(set(keys)) == 3
+
+
+def test_processor_is_known_by_its_flags_or_at_least_its_kind(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    find = compiled._processor.__wrapped__
+    monkeypatch.setattr(Path, 'read_text', lambda self: 'model: x\nflags\t: sse avx\nflags\t: no')
+    assert find() == f'{platform.machine()} flags\t: sse avx'
+
+    def missing(self: Path) -> str:
+        raise FileNotFoundError(self)
+
+    monkeypatch.setattr(Path, 'read_text', missing)
+    assert find() == f'{platform.machine()} '
+
+
 def test_key_of_an_arm_holds_all_that_is_compiled_and_no_more(
         workshop_arm: Arm, monkeypatch: pytest.MonkeyPatch) -> None:
     keys: list[str] = []
@@ -237,17 +260,20 @@ def test_key_of_an_arm_holds_all_that_is_compiled_and_no_more(
     link, joint = workshop_arm.links[0], workshop_arm.joints[0]
     links = [dataclasses.replace(link, **change) for change in (
         {}, {'flexural_rigidity': 99.0}, {'length': 0.7}, {'linear_density': 5.0},
-        {'modes': 2})]
+        {'modes': 2}, {'mode_family': 'clamped_free'}, {'shape_mass': 1.0},
+        {'shape_inertia': 1.0}, {'damping_ratio': 0.1})]
     arms = [dataclasses.replace(workshop_arm, links=(changed, workshop_arm.links[1]))
             for changed in links]
     stiffer = dataclasses.replace(joint, viscous_friction=0.4)
+    limited = dataclasses.replace(joint, motor=Motor(), upper_limit=1.0)
     arms += [dataclasses.replace(workshop_arm, **change) for change in (
         {'name': 'other'}, {'gravity': [0.0, 0.0]}, {'nodes': (Node(),) * 3},
-        {'joints': (stiffer, workshop_arm.joints[1])})]
+        {'joints': (stiffer, workshop_arm.joints[1])},
+        {'joints': (limited, workshop_arm.joints[1])})]
     for arm in arms:
         ArmModel(arm)
-    # the rigidity and the name are not compiled in
-    assert [keys.index(key) for key in keys] == [0, 0, 2, 3, 4, 0, 6, 7, 8]
+    # the rigidity, the name and limits are not compiled in
+    assert [keys.index(key) for key in keys] == [0, 0, 2, 3, 4, 5, 6, 7, 8, 0, 10, 11, 12, 0]
 
 
 @pytest.mark.parametrize('inputs', [

@@ -27,7 +27,7 @@ shares = pytest.mark.parametrize('share', SHARES, ids=['free', 'first', 'second'
 OFFSETS, WEIGHTS = np.array([-2, -1, 1, 2]), np.array([1, -8, 8, -1]) / 12
 
 
-@pytest.fixture(scope='module', params=['workshop', 'ei50', 'rigid'])
+@pytest.fixture(scope='module', params=['workshop', 'crane', 'ei50', 'rigid'])
 def model(request: pytest.FixtureRequest) -> ArmModel:
     found: ArmModel = request.getfixturevalue(f'{request.param}_model')
     return found
@@ -36,7 +36,7 @@ def model(request: pytest.FixtureRequest) -> ArmModel:
 def parameters(arm: Arm) -> Parameters:
     """Return parameters in which no two entries are alike."""
     n_t = arm.n_coordinates
-    return Parameters.of(arm, payload_mass=1.3, effort_weights=EFFORT,
+    return Parameters.of(arm, payload_mass=1.3, payload_inertia=0.07, effort_weights=EFFORT,
                          position_weights=0.2 + 0.1 * np.arange(n_t),
                          velocity_weights=0.7 + 0.2 * np.arange(n_t))
 
@@ -73,7 +73,8 @@ def step_sizes(model: ArmModel, z: Array) -> Array:
     """Return steps that leave truncation h^4 and rounding 1e-16 / h alike."""
     half = z.shape[1] // 2
     costates = np.abs(z[:, half:]).max(axis=0)
-    return 1e-3 * np.concatenate([sizes(model.arm), costates])
+    # everything is a parabola in the costates; light modes turn small ones into large torques
+    return np.concatenate([1e-3 * sizes(model.arm), 1e-5 * costates])
 
 
 def assert_close(found: Array, expected: Array, rounding: Array | float) -> None:
