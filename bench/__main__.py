@@ -10,9 +10,8 @@ from pathlib import Path
 import platform
 import subprocess
 
-import numpy as np
-
 from bench import model
+import numpy as np
 
 DOCS = Path(__file__).parents[1] / 'docs'
 

@@ -18,13 +18,12 @@ import tempfile
 import time
 from typing import Any
 
+from bench.brute_force import brute_force_rate
 from flex_planner.arm import Arm
 from flex_planner.arm_files import load_arm
 from flex_planner.model import ArmModel, Parameters
 from flex_planner.validation import Array
 import numpy as np
-
-from bench.brute_force import brute_force_rate
 
 POINTS = 300
 SIZES = [(n, m) for n in range(1, 5) for m in range(4)]

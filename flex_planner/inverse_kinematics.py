@@ -173,7 +173,7 @@ def _starts(near: Array, lower: Array, upper: Array) -> list[Array]:
     """Return postures to start from: the given one, then others, always the same."""
     random = np.random.default_rng(0)
     middle = np.clip(near, lower, upper)
-    low, high = np.maximum(lower, middle - 2), np.minimum(upper, middle + 2)
+    low, high = np.maximum(lower, middle - np.pi), np.minimum(upper, middle + np.pi)
     return [middle, *random.uniform(low, high, (_CANDIDATES, near.size))]
 
 

@@ -201,8 +201,8 @@ def test_loads_of_shapes_damping_and_limits_are_read() -> None:
     arm = arm_from_mapping(content)
     link = arm.links[0]
     assert (link.shape_mass, link.shape_inertia, link.damping_ratio) == (1.5, 0.25, 0.02)
-    assert [limits.tolist() for limits in arm.angle_limits()] == [[-1.0, -math.inf],
-                                                                 [2.0, math.inf]]
+    lower, upper = arm.angle_limits()
+    assert (lower.tolist(), upper.tolist()) == ([-1.0, -math.inf], [2.0, math.inf])
 
 
 @pytest.mark.parametrize('field', ['shape_mass', 'shape_inertia'])

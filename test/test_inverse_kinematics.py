@@ -17,6 +17,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
+from scipy.optimize import minimize
 
 FREE = (-math.inf, math.inf)
 
@@ -168,8 +169,12 @@ def test_three_links_stay_near_a_posture(near: list[float], shift: float) -> Non
     assume(np.linalg.svd(J)[1][1] > 0.1)
     step = 0.02 * np.array([np.cos(shift), np.sin(shift)])
     found = inverse_kinematics(arm, tip_position(arm, posture) + step, 1, near=posture)
-    # the least norm to first order; the second order is 0.2^2 at the worst J allowed
-    np.testing.assert_allclose(found - posture, np.linalg.pinv(J) @ step, atol=0.05)
+    nearest = minimize(
+        lambda q: ((q - posture) ** 2).sum(), posture, method='SLSQP', constraints=[{
+            'type': 'eq', 'fun': lambda q: tip_position(arm, q) - tip_position(arm, found)}])
+    assert nearest.success
+    # the solver's weight on nearness vanishes: it may end a little farther than the nearest
+    assert np.linalg.norm(found - posture) <= 1.05 * np.linalg.norm(nearest.x - posture) + 1e-6
 
 
 def test_first_joint_takes_the_turn_nearest_to_a_posture() -> None:
