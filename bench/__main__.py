@@ -29,9 +29,8 @@ pinned-pinned modes on each. *z'* is the right-hand side of the optimality condi
 full Jacobian. *First build* is a fresh process with an empty cache, *later start* a fresh process
 that finds the compiled functions. *CasADi VM* evaluates the same functions (z' with dz'/dz) by
 CasADi's virtual machine. *SymPy* is the same z' as one would first write it: energies with
-quadrature inside, differentiated by SymPy, lambdified with common subexpressions. Sizes above
-{most} coordinates are counted but not compiled here, which takes minutes; SymPy's derivation does
-so from {brute} on.
+quadrature inside, differentiated by SymPy, lambdified with common subexpressions; its derivation
+takes minutes from 2 links with 2 modes on, and was not run there.
 
 {table}
 """
@@ -58,8 +57,7 @@ def main() -> None:
         rows.append(model.measure(links, modes))
     used = versions()
     text = INTRODUCTION.format(
-        date=date.today().isoformat(), points=model.POINTS, most=model.MOST_COORDINATES,
-        brute='2 links with 2 modes', table=model.table(rows),
+        date=date.today().isoformat(), points=model.POINTS, table=model.table(rows),
         versions=', '.join(f'{name} {value}' for name, value in used.items()))
     (DOCS / 'benchmarks.md').write_text(text)
     figures = {'versions': used, 'model': [asdict(row) for row in rows]}

@@ -27,25 +27,23 @@ import numpy as np
 
 POINTS = 300
 SIZES = [(n, m) for n in range(1, 5) for m in range(4)]
-# compiling beyond this many coordinates takes minutes
-MOST_COORDINATES = 12
 BRUTE_FORCE = [(1, 0), (1, 1), (2, 0), (2, 1)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
-    """Figures of one arm; times per point [us], None where not run."""
+    """Figures of one arm; evaluation times per point [us]; None where not run."""
 
     links: int
     modes: int
     coordinates: int
     rate_operations: int
     jacobian_operations: int
-    first_build_seconds: float | None = None
-    later_start_seconds: float | None = None
-    compiled_rate: float | None = None
-    compiled_jacobian: float | None = None
-    interpreted_jacobian: float | None = None
+    first_build_seconds: float
+    later_start_seconds: float
+    compiled_rate: float
+    compiled_jacobian: float
+    interpreted_jacobian: float
     brute_force_rate: float | None = None
 
 
@@ -106,18 +104,16 @@ def measure(links: int, modes: int) -> Row:
 
     arm = uniform_arm(links, modes)
     built = build_functions(arm)
-    row = Row(links=links, modes=modes, coordinates=arm.n_coordinates,
-              rate_operations=built['optimality'][0].n_instructions(),
-              jacobian_operations=built['optimality_jacobian'][0].n_instructions())
-    if arm.n_coordinates > MOST_COORDINATES:
-        return row
     with tempfile.TemporaryDirectory() as cache:
         first, later = start_seconds(arm, cache), start_seconds(arm, cache)
     z, p = random_points(arm)
     model = ArmModel(arm)
     micro = 1e6 / POINTS
-    row = replace(
-        row, first_build_seconds=first, later_start_seconds=later,
+    row = Row(
+        links=links, modes=modes, coordinates=arm.n_coordinates,
+        rate_operations=built['optimality'][0].n_instructions(),
+        jacobian_operations=built['optimality_jacobian'][0].n_instructions(),
+        first_build_seconds=first, later_start_seconds=later,
         compiled_rate=median_seconds(lambda: model.optimality(z, p)) * micro,
         compiled_jacobian=median_seconds(lambda: model.optimality_jacobian(z, p)) * micro,
         interpreted_jacobian=interpreted_seconds(arm, z, p) * micro)

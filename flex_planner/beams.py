@@ -13,7 +13,6 @@ import math
 
 from flex_planner.validation import Array, number
 import numpy as np
-from scipy.optimize import brentq
 
 # below it, 1 - cos cosh and its companions lose digits and are summed as power series
 _SERIES_BELOW = 1.0
@@ -104,6 +103,8 @@ def clamped_eigenvalue(order: int, load: TipLoad) -> float:
         else:
             low = middle
     low, high = low * (1 - _BRACKET), high * (1 + _BRACKET)
+    from scipy.optimize import brentq  # half a start's time, and not every arm needs it
+
     if frequency_equation(low, load) * frequency_equation(high, load) < 0:
         return float(brentq(frequency_equation, low, high, (load,), xtol=1e-300, rtol=_EPSILON))
     return (low + high) / 2
