@@ -7,17 +7,15 @@ from dataclasses import dataclass, replace
 
 from builtin_interfaces.msg import Time
 from flex_planner.arm import Arm
-from flex_planner.arm_files import load_arm
 from flex_planner.kinematics import tip_position
 from flex_planner.model import ArmModel
 from flex_planner.plant import Gains, JointReference, Plant
-from flex_planner.ros.parameters import declare, described
+from flex_planner.ros.parameters import declare, declare_arm, described
 from flex_planner.ros.running import run_node
 from flex_planner.trajectory_rules import trajectory_violations
 from flex_planner.validation import Array, vector
 from geometry_msgs.msg import PointStamped
 import numpy as np
-from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
@@ -95,11 +93,7 @@ class ArmSimulator(Node):  # type: ignore[misc]
 
     def __init__(self) -> None:
         super().__init__('arm_simulator')
-        description = ParameterDescriptor(
-            description='Name of a preset in config/arms, or path of an arm file.',
-            read_only=True)
-        self._arm = load_arm(str(
-            self.declare_parameter('arm', 'korayem_ei50', description).value))
+        self._arm = declare_arm(self)
         self._settings = declare(self, SimulatorSettings.for_arm(self._arm))
         self._plant = self._new_plant()
         self._joints = self.create_publisher(JointState, 'joint_states', 10)

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, TypeVar
 
+from flex_planner.arm import Arm
+from flex_planner.arm_files import load_arm
 from flex_planner.errors import FlexPlannerError, InvalidValueError
 from rcl_interfaces.msg import (
     FloatingPointRange,
@@ -17,6 +19,8 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 Settings = TypeVar('Settings')
+
+_DEFAULT_ARM = 'korayem_ei50'
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,6 +88,22 @@ def declare(node: Node, settings: Settings) -> Settings:
             raise InvalidValueError(entry.name, value, 'a value, or left out')
         values[entry.name] = _plain(value)
     return replace(settings, **values)  # type: ignore[type-var]
+
+
+def declare_arm(node: Node) -> Arm:
+    """
+    Declare the read-only parameter ``arm`` and return the arm that it names.
+
+    Raises
+    ------
+    ArmFileError
+        If there is no such arm, or its file is wrong.
+
+    """
+    description = Description(
+        text='Name of a preset in config/arms, or path of an arm file.', read_only=True)
+    name = str(node.declare_parameter('arm', _DEFAULT_ARM, description.descriptor('')).value)
+    return load_arm(name)
 
 
 def validated_changes(settings: Settings, changes: list[Parameter]) -> Settings:

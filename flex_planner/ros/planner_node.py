@@ -5,9 +5,8 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from flex_planner.arm_files import load_arm
 from flex_planner.model import ArmModel
-from flex_planner.ros.parameters import declare, judge_changes, validated_changes
+from flex_planner.ros.parameters import declare, declare_arm, judge_changes, validated_changes
 from flex_planner.ros.planning import busy, Outcome, Planning, unknown_failure
 from flex_planner.ros.recorder import OutcomeRecorder
 from flex_planner.ros.running import run_node
@@ -15,7 +14,7 @@ from flex_planner.ros.settings import PlannerSettings
 from flex_planner.ros.worker import Worker
 from flex_planner_interfaces.msg import FlexibleTrajectory
 from flex_planner_interfaces.srv import PlanPath
-from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -50,7 +49,7 @@ class PlannerNode(Node):  # type: ignore[misc]
 
     def __init__(self) -> None:
         super().__init__('flex_planner')
-        arm = load_arm(self._arm_parameter())
+        arm = declare_arm(self)
         self._settings = declare(self, PlannerSettings.for_arm(arm))
         self._settings.check_joints(arm.n_joints)
         self.add_on_set_parameters_callback(self._judge_parameters)
@@ -66,13 +65,6 @@ class PlannerNode(Node):  # type: ignore[misc]
         self.create_service(PlanPath, '~/plan_path', self._on_plan_path,
                             callback_group=ReentrantCallbackGroup())
         self.get_logger().info(f'ready to plan for {arm.name}')
-
-    def _arm_parameter(self) -> str:
-        description = ParameterDescriptor(
-            description='Name of a preset in config/arms, or path of an arm file.',
-            read_only=True)
-        value = self.declare_parameter('arm', 'korayem_ei50', description).value
-        return str(value)
 
     def _judge_parameters(self, changes: list[Parameter]) -> SetParametersResult:
         return judge_changes(self._settings, changes)
