@@ -17,6 +17,7 @@ import time
 from flex_planner.arm import Arm
 from flex_planner.arm_files import load_arm
 from flex_planner.plotting import draw_motion, Execution, Motion
+from flex_planner.ros.conversions import duration_seconds
 from flex_planner.ros.processes import NodeProcess
 from flex_planner.task import postures_from_points
 from flex_planner.validation import Array
@@ -117,8 +118,7 @@ def motion_from_message(trajectory: FlexibleTrajectory) -> Motion:
     def rows(points: list[object], field: str) -> Array:
         return np.array([list(getattr(point, field)) for point in points])
 
-    times = [point.time_from_start.sec + point.time_from_start.nanosec * 1e-9
-             for point in joints]
+    times = [duration_seconds(point.time_from_start) for point in joints]
     return Motion(
         times=np.array(times),
         coordinates=np.hstack([rows(joints, 'positions'), rows(bending, 'modal_displacements')]),
@@ -132,7 +132,7 @@ def _table(arm: Arm, report: PlanReport, delay: float, execution: Execution,
     """Return what the demonstration found, as lines of text."""
     late = execution.tip[execution.tip_times > DURATION + SETTLING / 2]
     errors = np.linalg.norm(late - GOAL, axis=1) * 1e3
-    planning = report.planning_time.sec + report.planning_time.nanosec * 1e-9
+    planning = duration_seconds(report.planning_time)
     rows = [
         ('arm', arm.name),
         ('motion', f'{START} m to {GOAL} m in {DURATION:g} s with {PAYLOAD:g} kg'),

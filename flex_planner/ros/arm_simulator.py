@@ -10,6 +10,7 @@ from flex_planner.arm import Arm
 from flex_planner.kinematics import tip_position
 from flex_planner.model import ArmModel
 from flex_planner.plant import Gains, JointReference, Plant
+from flex_planner.ros.conversions import duration_seconds
 from flex_planner.ros.parameters import declare, declare_arm, described
 from flex_planner.ros.running import run_node
 from flex_planner.trajectory_rules import trajectory_violations
@@ -166,8 +167,7 @@ def _reference(trajectory: JointTrajectory, names: list[str]) -> JointReference:
     def column(field: str) -> Array:
         return np.array([getattr(point, field) for point in points])[:, order]
 
-    times = [point.time_from_start.sec + point.time_from_start.nanosec * 1e-9
-             for point in points]
+    times = [duration_seconds(point.time_from_start) for point in points]
     return JointReference(times=np.array(times), positions=column('positions'),
                           velocities=column('velocities'), torques=column('effort'))
 

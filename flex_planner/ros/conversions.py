@@ -140,6 +140,11 @@ def duration_message(nanoseconds: int) -> Duration:
     return Duration(sec=seconds, nanosec=rest)
 
 
+def duration_seconds(duration: Duration) -> float:
+    """Return a duration message in seconds."""
+    return float(duration.sec + duration.nanosec * 1e-9)
+
+
 def joint_trajectory(reference: Reference, joint_names: Sequence[str]) -> JointTrajectory:
     """Return what a joint_trajectory_controller with an effort interface takes."""
     samples, n = reference.samples, len(joint_names)

@@ -6,6 +6,7 @@ import time
 from typing import Any
 
 from flex_planner.model import ArmModel
+from flex_planner.ros.conversions import duration_seconds
 from flex_planner.ros.parameters import declare, declare_arm, judge_changes, validated_changes
 from flex_planner.ros.planning import busy, Outcome, Planning, unknown_failure
 from flex_planner.ros.recorder import OutcomeRecorder
@@ -108,7 +109,7 @@ class PlannerNode(Node):  # type: ignore[misc]
 
     def _log(self, outcome: Outcome) -> None:
         report = outcome.report
-        seconds = report.planning_time.sec + report.planning_time.nanosec * 1e-9
+        seconds = duration_seconds(report.planning_time)
         if outcome.publishable:
             self.get_logger().info(
                 f'planned in {seconds:.2f} s ({report.strategy}): J = {report.cost:.6g}, tip '
