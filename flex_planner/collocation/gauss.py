@@ -1,4 +1,10 @@
-"""Gauss-Legendre collocation: nodes, Butcher matrix and the polynomial inside an interval."""
+"""
+Gauss-Legendre collocation: nodes, Butcher matrix and the polynomial inside an interval.
+
+Everything is built from Legendre polynomials on the interval, which stay well-conditioned at
+any order; powers of the time would lose a digit with every stage.
+
+"""
 
 from __future__ import annotations
 
@@ -6,10 +12,34 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.polynomial import Polynomial
+from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+FEWEST_STAGES, MOST_STAGES = 2, 12
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Spectrum:
+    """
+    Eigenvectors of a Butcher matrix, one of each conjugate pair: ``A = Re(V Lambda V^-1)``.
+
+    Attributes
+    ----------
+    eigenvalues : numpy.ndarray, shape (r,)
+        Those with an imaginary part >= 0, r = ceil(s / 2).
+    vectors : numpy.ndarray, shape (s, r)
+        Columns of V, doubled where they stand for a pair.
+    inverse : numpy.ndarray, shape (r, s)
+        Rows of V^-1.
+
+    """
+
+    eigenvalues: ComplexArray
+    vectors: ComplexArray
+    inverse: ComplexArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,31 +53,33 @@ class GaussRule:
         c_i and b_i.
     matrix : numpy.ndarray, shape (s, s)
         a_ij: integral of the j-th Lagrange polynomial from 0 to c_i.
-    integrals : numpy.ndarray, shape (s, s + 1)
-        Coefficients, lowest power first, of the integral of each Lagrange polynomial.
+    transform : numpy.ndarray, shape (s, s)
+        Values at the nodes to coefficients of the Legendre polynomials on [0, 1].
+    spectrum : Spectrum
+        Of `matrix`.
 
     """
 
     nodes: Array
     weights: Array
     matrix: Array
-    integrals: Array
+    transform: Array
+    spectrum: Spectrum
 
     @staticmethod
     @cache
     def of(stages: int) -> GaussRule:
-        """Return the rule with a number of stages, from 2 to 8."""
-        if not 2 <= stages <= 8:
-            raise ValueError(f'stages is {stages}, but must be from 2 to 8')
-        points, weights = np.polynomial.legendre.leggauss(stages)
-        nodes = (points + 1) / 2
-        coefficients = np.zeros((stages, stages + 1))
-        for j in range(stages):
-            others = np.delete(nodes, j)
-            lagrange = Polynomial.fromroots(others) / np.prod(nodes[j] - others)
-            coefficients[j] = lagrange.integ().coef
-        matrix = np.vander(nodes, stages + 1, increasing=True) @ coefficients.T
-        return GaussRule(nodes, weights / 2, matrix, coefficients)
+        """Return the rule with a number of stages, from 2 to 12."""
+        if not FEWEST_STAGES <= stages <= MOST_STAGES:
+            raise ValueError(f'stages is {stages}, but must be from {FEWEST_STAGES} to '
+                             f'{MOST_STAGES}')
+        points, weights = legendre.leggauss(stages)
+        nodes, degrees = (points + 1) / 2, np.arange(stages)
+        # Gauss quadrature is exact for the products of Legendre polynomials that this needs
+        transform = ((2 * degrees + 1)[:, None] * legendre.legvander(points, stages - 1).T
+                     * weights / 2)
+        matrix = _integrated(points, stages) @ transform
+        return GaussRule(nodes, weights / 2, matrix, transform, _spectrum(matrix))
 
     @property
     def stages(self) -> int:
@@ -56,12 +88,30 @@ class GaussRule:
 
     def basis(self, theta: Array) -> Array:
         """Return the integrals of the Lagrange polynomials up to theta, shape (k, s)."""
-        basis: Array = np.vander(theta, self.stages + 1, increasing=True) @ self.integrals.T
+        basis: Array = _integrated(2 * theta - 1, self.stages) @ self.transform
         return basis
 
     def basis_rate(self, theta: Array) -> Array:
         """Return the Lagrange polynomials at theta, shape (k, s)."""
-        powers = np.vander(theta, self.stages, increasing=True)
-        degrees = np.arange(1, self.stages + 1, dtype=np.float64)
-        rate: Array = powers @ (self.integrals[:, 1:] * degrees).T
+        rate: Array = legendre.legvander(2 * theta - 1, self.stages - 1) @ self.transform
         return rate
+
+
+def _integrated(x: Array, count: int) -> Array:
+    """Return the integrals up to theta = (1 + x) / 2 of the first Legendre polynomials in x."""
+    values = legendre.legvander(x, count)
+    integrals = np.empty((x.size, count))
+    integrals[:, 0] = (1 + x) / 2
+    for k in range(1, count):
+        integrals[:, k] = (values[:, k + 1] - values[:, k - 1]) / (2 * (2 * k + 1))
+    return integrals
+
+
+def _spectrum(matrix: Array) -> Spectrum:
+    """Return the eigenvectors that a real system needs."""
+    eigenvalues, vectors = np.linalg.eig(matrix)
+    inverse = np.linalg.inv(vectors)
+    kept = eigenvalues.imag > -1e-9 * np.abs(eigenvalues)
+    doubled = np.where(eigenvalues[kept].imag > 1e-9 * np.abs(eigenvalues[kept]), 2, 1)
+    return Spectrum(*(part.astype(complex) for part in (
+        eigenvalues[kept], vectors[:, kept] * doubled, inverse[kept])))

@@ -1,41 +1,108 @@
-"""Where the mesh needs more nodes: defects of the polynomial and meshes that level them."""
+"""Where the mesh needs its nodes: defects, switches of F, and meshes that level the error."""
 
 from __future__ import annotations
 
-from flex_planner.collocation.newton import magnitudes
+from functools import cache
+
+from flex_planner.collocation.equations import magnitudes
 from flex_planner.collocation.problem import BoundaryValueProblem
 from flex_planner.collocation.solution import CollocationSolution
 import numpy as np
+from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# between the collocation points, where the defect vanishes
-_PROBES = np.array([0.02, 0.3, 0.7, 0.98])
-_MOST_REFINED = 6.0
+# density of nodes: at least this share of the largest, so that nothing is overlooked
+_LEAST_DENSITY = 0.1
+_ROOT_STEPS = 12
+# nodes closer than this share of the span are one
+_CLOSEST = 1e-9
+
+
+@cache
+def _probes(stages: int) -> Array:
+    """
+    Return where the defect is largest: both ends and inner extrema of the Legendre polynomial.
+
+    The defect of a resolved interval is a multiple of the polynomial whose zeros are the Gauss
+    points.
+
+    """
+    extrema = (legendre.legroots(legendre.legder([0] * stages + [1])) + 1) / 2
+    inner = [extrema[0], extrema[(stages - 1) // 2], extrema[-1]]
+    probes: Array = np.unique(np.concatenate([[0.0], inner, [1.0]]))
+    return probes
 
 
 def defects(problem: BoundaryValueProblem, solution: CollocationSolution) -> Array:
     """
     Return how far each interval's polynomial is from solving z' = F, shape (N,).
 
-    Per interval: step times root mean square of ``z' - F(t, z)``, of the worst unknown, in
-    units of the unknown's magnitude. Falls with the power s + 1 of the step, so it
-    overestimates the error at the nodes, which falls with 2 s.
+    Per interval: step times largest ``z' - F(t, z)``, of the worst unknown, in units of the
+    unknown's magnitude. Falls with the power s + 1 of the step, so it overestimates the error at
+    the nodes, which falls with 2 s.
 
     """
-    times = (solution.mesh[:-1, None] + solution.steps[:, None] * _PROBES).ravel()
-    defect = solution.rate(times) - problem.rate(times, solution(times))
-    squares = defect.reshape(solution.intervals, _PROBES.size, -1) ** 2
-    sizes = np.sqrt(squares.mean(axis=1)) * solution.steps[:, None]
+    theta = _probes(solution.rule.stages)
+    values = solution.values_at(theta)
+    rate = problem.rate(solution.times_at(theta).ravel(), values.reshape(-1, problem.size))
+    defect = np.abs(solution.rates_at(theta) - rate.reshape(values.shape)).max(axis=1)
+    sizes = defect * solution.steps[:, None]
     worst: Array = (sizes / magnitudes(problem, solution)).max(axis=1)
-    return np.nan_to_num(worst, nan=np.inf)  # F may be undefined between the points
+    # F may be undefined between the points
+    finite: Array = np.where(np.isfinite(worst), worst, np.inf)
+    return finite
 
 
-def levelled(solution: CollocationSolution, defect: Array, tolerance: float, *, fewest: int,
-             most: int) -> Array:
+def switching_times(problem: BoundaryValueProblem, solution: CollocationSolution) -> Array:
+    """Return the times inside the mesh at which a switching function changes sign."""
+    theta = np.concatenate([[0.0], solution.rule.nodes, [1.0]])
+    times, unknowns = solution.times_at(theta), solution.values_at(theta)
+    # the next node itself: a change of sign between it and the polynomial's end would be lost
+    times[:, -1], unknowns[:, -1] = solution.mesh[1:], solution.nodes[1:]
+    values = problem.switches(times.ravel(), unknowns.reshape(-1, problem.size))
+    sign = (values >= 0).reshape(*times.shape, -1)
+    k, i, e = np.nonzero(sign[:, 1:] != sign[:, :-1])
+    if not k.size:
+        return np.zeros(0)
+    values = values.reshape(*times.shape, -1)
+    roots = _roots(problem, solution, e, (times[k, i], values[k, i, e]),
+                   (times[k, i + 1], values[k, i + 1, e]))
+    return _distinct(np.sort(roots), solution.mesh[0], solution.mesh[-1])
+
+
+def _roots(problem: BoundaryValueProblem, solution: CollocationSolution,
+           which: NDArray[np.intp], low: tuple[Array, Array],
+           high: tuple[Array, Array]) -> Array:
+    """Return the zeros of bracketed functions: false position with Illinois' correction."""
+    (a, f_a), (b, f_b) = low, high
+    kept: Array = np.zeros(a.size)  # 1 where b was kept by the step before, -1 where a was
+    for _ in range(_ROOT_STEPS):
+        gap = np.where(f_a == f_b, 1.0, f_b - f_a)
+        c = np.clip(np.where(f_a == f_b, a, b - f_b * (b - a) / gap), a, b)
+        f_c = problem.switches(c, solution(c))[np.arange(c.size), which]
+        left = (f_c >= 0) == (f_a >= 0)
+        # an end kept twice in a row counts half, else it would stay for ever
+        f_a, f_b = np.where(kept == -1, f_a / 2, f_a), np.where(kept == 1, f_b / 2, f_b)
+        a, f_a = np.where(left, c, a), np.where(left, f_c, f_a)
+        b, f_b = np.where(left, b, c), np.where(left, f_b, f_c)
+        kept = np.where(left, 1.0, -1.0)
+    return c
+
+
+def _distinct(times: Array, start: float, end: float) -> Array:
+    """Return sorted times without those that coincide with one another or an end."""
+    least = _CLOSEST * (end - start)
+    inside = times[(times > start + least) & (times < end - least)]
+    apart: Array = inside[np.diff(inside, prepend=start) > least]
+    return apart
+
+
+def levelled(solution: CollocationSolution, defect: Array, growth: float, switches: Array, *,
+             fewest: int, most: int) -> Array:
     """
-    Return a mesh on which every interval is expected to have the same, tolerable defect.
+    Return a mesh with nodes on the switches that spreads the error evenly between them.
 
     Parameters
     ----------
@@ -43,17 +110,55 @@ def levelled(solution: CollocationSolution, defect: Array, tolerance: float, *, 
         On the present mesh.
     defect : numpy.ndarray, shape (N,)
         From :func:`defects`.
-    tolerance : float
-        Largest defect wanted.
+    growth : float
+        How many times smaller than the worst of now, in step, every interval should be.
+    switches : numpy.ndarray
+        From :func:`switching_times`.
     fewest, most : int
-        Bounds of the number of intervals.
+        Bounds of the number of intervals; the switches may need some more than `most`.
 
     """
-    needed = (defect / (0.3 * tolerance)) ** (1 / (solution.rule.stages + 1))
-    needed = np.clip(needed, 1 / _MOST_REFINED, _MOST_REFINED)
-    padded = np.pad(needed, 1, mode='edge')
-    needed = np.maximum(needed, (padded[:-2] + padded[2:]) / 2)
-    total = np.concatenate([[0.0], np.cumsum(needed)])
-    count = int(np.clip(np.ceil(total[-1]), fewest, most))
-    mesh: Array = np.interp(np.linspace(0, total[-1], count + 1), total, solution.mesh)
-    return mesh
+    density = _density(solution, defect, switches)
+    # intervals wanted up to each node; the worst interval of now is cut into `growth`
+    wanted = np.concatenate([[0.0], np.cumsum(density)]) * growth
+    total = float(np.clip(wanted[-1], fewest, most))
+    wanted *= total / wanted[-1]
+    breaks = np.concatenate([solution.mesh[:1], switches, solution.mesh[-1:]])
+    at_breaks = np.interp(breaks, solution.mesh, wanted)
+    pieces = [np.interp(np.linspace(a, b, max(1, round(float(b - a))) + 1), wanted,
+                        solution.mesh) for a, b in zip(at_breaks, at_breaks[1:], strict=False)]
+    for piece, first, last in zip(pieces, breaks, breaks[1:], strict=False):
+        piece[0], piece[-1] = first, last
+    return np.concatenate([pieces[0][:1], *(piece[1:] for piece in pieces)])
+
+
+def _density(solution: CollocationSolution, defect: Array, switches: Array) -> Array:
+    """Return how many intervals each interval deserves, the worst one 1."""
+    finite = np.where(np.isfinite(defect), defect, 1.0)
+    density = np.maximum(finite, 1e-300) ** (1 / (solution.rule.stages + 1))
+    # a switch inside an interval spoils its defect, but not once there is a node
+    cut = np.unique(np.searchsorted(solution.mesh, switches, side='right') - 1)
+    smooth = np.setdiff1d(np.arange(density.size), cut)
+    if cut.size and smooth.size:
+        on_node = np.isclose(solution.mesh[cut], switches[:, None], atol=_CLOSEST, rtol=0)
+        spoilt = cut[~on_node.any(axis=0)]
+        density[spoilt] = np.interp(spoilt, smooth, density[smooth])
+    density = np.maximum(density / density.max(), _LEAST_DENSITY)
+    padded = np.pad(density, 1, mode='edge')
+    graded: Array = np.maximum(density, (padded[:-2] + padded[2:]) / 2)
+    return graded
+
+
+def coarsened(problem: BoundaryValueProblem, solution: CollocationSolution, defect: float,
+              fewest: int) -> CollocationSolution:
+    """
+    Return a solution on as few intervals as leave a certain defect, expected to be coarse.
+
+    For the next of a family of problems: meshes that only ever grew would end it.
+
+    """
+    found = defects(problem, solution)
+    growth = float((found.max() / defect) ** (1 / (solution.rule.stages + 1)))
+    mesh = levelled(solution, found, growth, switching_times(problem, solution),
+                    fewest=fewest, most=solution.intervals)
+    return solution.on_mesh(mesh)

@@ -4,7 +4,8 @@ Newton's method for the collocation equations, damped by the natural monotonicit
 A step is accepted when the simplified correction, computed at the new point with the old
 matrix, has become smaller than the correction itself (Deuflhard, Newton Methods for Nonlinear
 Problems, 2004, section 3.3). Unlike the size of the residual this does not depend on how the
-equations are scaled, and long damped detours disappear.
+equations are scaled, and long damped detours disappear. Near the solution the matrix is kept
+while it pays: a correction with an old matrix costs a fifth of one with a new matrix.
 
 """
 
@@ -12,16 +13,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from flex_planner.collocation.equations import (
+    collocation_residual,
+    factorised,
+    linearised,
+    magnitudes,
+)
 from flex_planner.collocation.linear import NewtonSystem, Residual, SingularSystemError
 from flex_planner.collocation.problem import BoundaryValueProblem
 from flex_planner.collocation.solution import CollocationSolution
-from flex_planner.progress import Monitor, StopReason
+from flex_planner.progress import Monitor, StoppedError, StopReason
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
 _SMALLEST_STEP = 1e-4
+# an old matrix is kept while it shrinks the correction at least this much
+_KEPT = 0.25
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,10 +48,15 @@ class NewtonOutcome:
         Its size relative to the unknowns.
     iterations : int
         Linear systems factorised.
+    system : NewtonSystem or None
+        The last linear system.
     stopped : StopReason or None
         Set if the monitor ended it.
     message : str
         Why it ended, in words.
+    coarse : bool
+        Whether it failed because the matrix does not fit, and not because the problem bends: on a
+        finer mesh the mean Jacobian is a better one.
 
     """
 
@@ -50,56 +64,19 @@ class NewtonOutcome:
     converged: bool
     correction: float
     iterations: int
+    system: NewtonSystem | None
     stopped: StopReason | None
     message: str
+    coarse: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Step:
-    """A correction, its size and the function that measures sizes."""
+    """A correction and its size: root mean square relative to the unknowns."""
 
     nodes: Array
     stages: Array
     norm: float
-
-
-def collocation_residual(problem: BoundaryValueProblem,
-                         solution: CollocationSolution) -> Residual:
-    """Return the residual of the collocation equations at a point."""
-    stages, size = solution.rule.stages, problem.size
-    values = solution.stage_values().reshape(-1, size)
-    rate = problem.rate(solution.stage_times().ravel(), values)
-    return _residual(problem, solution, rate.reshape(-1, stages, size))
-
-
-def _residual(problem: BoundaryValueProblem, solution: CollocationSolution,
-              rate: Array) -> Residual:
-    increments = np.einsum('j,kjm->km', solution.rule.weights, solution.stages)
-    gaps = np.diff(solution.nodes, axis=0) - solution.steps[:, None] * increments
-    return Residual(solution.stages - rate, gaps, problem.left(solution.nodes[0])[0],
-                    problem.right(solution.nodes[-1])[0])
-
-
-def _linearise(problem: BoundaryValueProblem, solution: CollocationSolution,
-               scale: Array) -> tuple[Residual, NewtonSystem]:
-    """Return the residual and the factorised linear system at a point."""
-    count, stages, size = solution.stages.shape
-    values = solution.stage_values().reshape(-1, size)
-    rate, jacobian = problem.rate_jacobian(solution.stage_times().ravel(), values)
-    if not (np.isfinite(rate).all() and np.isfinite(jacobian).all()):
-        raise SingularSystemError('the right-hand side is not finite at the current point')
-    residual = _residual(problem, solution, rate.reshape(count, stages, size))
-    system = NewtonSystem(solution.rule, solution.steps,
-                          jacobian.reshape(count, stages, size, size),
-                          problem.left(solution.nodes[0])[1],
-                          problem.right(solution.nodes[-1])[1], scale)
-    return residual, system
-
-
-def magnitudes(problem: BoundaryValueProblem, solution: CollocationSolution) -> Array:
-    """Return the magnitude of each unknown that relative sizes refer to, shape (m,)."""
-    largest: Array = np.maximum(np.abs(solution.nodes).max(axis=0), problem.scale)
-    return largest
 
 
 def newton(problem: BoundaryValueProblem, guess: CollocationSolution, *, tolerance: float,
@@ -121,78 +98,111 @@ def newton(problem: BoundaryValueProblem, guess: CollocationSolution, *, toleran
         Told of every iteration; may stop it.
 
     """
-    solution, previous, step = guess, None, 1.0
-    norm = np.inf
-    for iteration in range(max_iterations):
-        stopped = monitor.stop_reason()
-        if stopped:
-            return NewtonOutcome(solution, False, norm, iteration, stopped, stopped.value)
-        try:
-            scale = magnitudes(problem, solution)
-            residual, system = _linearise(problem, solution, scale)
-            full = _measured(system.correction(residual), scale)
-        except SingularSystemError as error:
-            return NewtonOutcome(solution, False, norm, iteration, None, str(error))
-        norm = full.norm
-        monitor.step(norm, solution.intervals)
-        if norm <= tolerance:
-            return NewtonOutcome(_moved(solution, full, 1.0), True, norm, iteration + 1, None,
-                                 'converged')
-        if previous is not None:
-            step = _predicted(previous, full, step)
-        accepted = _damped(problem, solution, system, full, step, scale)
-        if accepted is None:
-            return NewtonOutcome(solution, False, norm, iteration + 1, None,
-                                 "no step of Newton's method reduces the error")
-        solution, step, simplified = accepted
-        if step == 1.0 and simplified.norm <= tolerance:
-            return NewtonOutcome(_moved(solution, simplified, 1.0), True, simplified.norm,
-                                 iteration + 1, None, 'converged')
-        previous = (full, simplified)
-    return NewtonOutcome(solution, False, norm, max_iterations, None,
-                         f'not converged after {max_iterations} iterations')
+    run = _Run(problem, guess, tolerance, monitor)
+    try:
+        while run.iterations < max_iterations:
+            if run.iterate():
+                return run.outcome('converged', converged=True)
+        return run.outcome(f'not converged after {max_iterations} iterations')
+    except StoppedError as stop:
+        return run.outcome(stop.reason.value, stopped=stop.reason)
+    except SingularSystemError as error:
+        return run.outcome(str(error))
 
 
-def _measured(correction: tuple[Array, Array], scale: Array) -> _Step:
-    nodes, stages = correction
-    norm = float(np.sqrt(np.mean((nodes / scale) ** 2)))
-    if not np.isfinite(norm):
-        raise SingularSystemError('the Newton correction is not finite')
-    return _Step(nodes, stages, norm)
+class _Run:
+    """The state of one call of `newton`."""
+
+    def __init__(self, problem: BoundaryValueProblem, guess: CollocationSolution,
+                 tolerance: float, monitor: Monitor) -> None:
+        self._problem, self._tolerance, self._monitor = problem, tolerance, monitor
+        self._solution = guess
+        self._system: NewtonSystem | None = None
+        self._norm, self._step, self.iterations = np.inf, 1.0, 0
+        self._previous: tuple[_Step, _Step] | None = None
+        self._coarse = False
+
+    def outcome(self, message: str, *, converged: bool = False,
+                stopped: StopReason | None = None) -> NewtonOutcome:
+        """Return where the run stands."""
+        return NewtonOutcome(self._solution, converged, self._norm, self.iterations,
+                             self._system, stopped, message, self._coarse)
+
+    def iterate(self) -> bool:
+        """Factorise once and move as far as the matrix is good for; True if converged."""
+        self._monitor.check()
+        self._scale = magnitudes(self._problem, self._solution)
+        residual, jacobians = linearised(self._problem, self._solution, self._monitor)
+        system = self._system = factorised(self._problem, self._solution, jacobians)
+        full = self._measured(system, residual)
+        self.iterations += 1
+        self._norm = full.norm
+        self._monitor.step(full.norm, self._solution.intervals)
+        if full.norm <= self._tolerance:
+            self._solution = _moved(self._solution, full, 1.0)
+            return True
+        return self._advance(system, full)
+
+    def _advance(self, system: NewtonSystem, full: _Step) -> bool:
+        """Take a damped step, then corrections with the same matrix while they converge."""
+        simplified = self._damped(system, full)
+        self._previous = (full, simplified)
+        last = full.norm
+        while self._step == 1.0 and simplified.norm <= max(_KEPT * last, self._tolerance):
+            self._norm, last = simplified.norm, simplified.norm
+            trial = _moved(self._solution, simplified, 1.0)
+            if last <= self._tolerance:
+                self._solution = trial
+                return True
+            following = self._measured(system, collocation_residual(self._problem, trial))
+            if following.norm > last:
+                break
+            self._solution, simplified, self._previous = trial, following, None
+        return False
+
+    def _damped(self, system: NewtonSystem, full: _Step) -> _Step:
+        """Move to the first point along the correction that passes the test."""
+        step = self._step = self._predicted(full)
+        bent, tried = 0.0, 1.0
+        while step >= _SMALLEST_STEP:
+            self._monitor.check()
+            trial = _moved(self._solution, full, step)
+            try:
+                simplified = self._measured(system, collocation_residual(self._problem, trial))
+            except SingularSystemError:
+                step /= 4
+                continue
+            if simplified.norm <= (1 - step / 4) * full.norm:
+                self._solution, self._step = trial, step
+                return simplified
+            bent, tried = self._size(simplified.nodes - (1 - step) * full.nodes), step
+            step = min(step / 2, max(step**2 * full.norm / (2 * bent), step / 10))
+        # a wrong matrix bends the correction with the step, nonlinearity with its square
+        self._coarse = bent > 0.5 * tried * full.norm
+        raise SingularSystemError("no step of Newton's method reduces the error")
+
+    def _predicted(self, full: _Step) -> float:
+        """Return the step that the observed nonlinearity allows."""
+        if self._previous is None:
+            return 1.0
+        before, simplified = self._previous
+        difference = float(np.linalg.norm(simplified.nodes - full.nodes))
+        if difference == 0:
+            return 1.0
+        ratio = float(np.linalg.norm(simplified.nodes)) * before.norm / (difference * full.norm)
+        return min(1.0, max(self._step * ratio, _SMALLEST_STEP))
+
+    def _measured(self, system: NewtonSystem, residual: Residual) -> _Step:
+        nodes, stages = system.correction(residual)
+        norm = self._size(nodes)
+        if not np.isfinite(norm):
+            raise SingularSystemError('the Newton correction is not finite')
+        return _Step(nodes, stages, norm)
+
+    def _size(self, nodes: Array) -> float:
+        return float(np.sqrt(np.mean((nodes / self._scale) ** 2)))
 
 
 def _moved(solution: CollocationSolution, step: _Step, factor: float) -> CollocationSolution:
     return CollocationSolution(solution.mesh, solution.nodes + factor * step.nodes,
                                solution.stages + factor * step.stages, solution.rule)
-
-
-def _predicted(previous: tuple[_Step, _Step], full: _Step, last: float) -> float:
-    """Return the step that the observed nonlinearity allows."""
-    before, simplified = previous
-    difference = float(np.linalg.norm(simplified.nodes - full.nodes))
-    if difference == 0:
-        return 1.0
-    size = float(np.linalg.norm(simplified.nodes))
-    ratio = size * before.norm / (difference * full.norm)
-    return min(1.0, max(last * ratio, _SMALLEST_STEP))
-
-
-def _damped(problem: BoundaryValueProblem, solution: CollocationSolution, system: NewtonSystem,
-            full: _Step, step: float,
-            scale: Array) -> tuple[CollocationSolution, float, _Step] | None:
-    """Return the first point along the correction that passes the test, or None."""
-    while step >= _SMALLEST_STEP:
-        trial = _moved(solution, full, step)
-        try:
-            residual = collocation_residual(problem, trial)
-            simplified = _measured(system.correction(residual), scale)
-        except SingularSystemError:
-            step /= 4
-            continue
-        if simplified.norm <= (1 - step / 4) * full.norm:
-            return trial, step, simplified
-        defect = float(np.sqrt(np.mean(
-            ((simplified.nodes - (1 - step) * full.nodes) / scale) ** 2)))
-        allowed = step**2 * full.norm / (2 * defect)
-        step = min(step / 2, max(allowed, step / 10))
-    return None

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
 
 
 class BoundaryValueProblem(Protocol):
@@ -21,6 +22,10 @@ class BoundaryValueProblem(Protocol):
     scale : numpy.ndarray, shape (m,)
         Smallest magnitude of each unknown that matters, > 0: changes are measured against it
         or against the largest value of the unknown, whichever is larger.
+    explicit : numpy.ndarray of int
+        Unknowns E that need no factorisation: dF_E/dz_E, taken at any two points, multiplies to
+        zero. Positions are such, whose rates are velocities. May be empty; a wrong claim slows
+        Newton's method down but falsifies nothing.
 
     """
 
@@ -32,11 +37,18 @@ class BoundaryValueProblem(Protocol):
     def scale(self) -> Array:
         """Return the smallest magnitudes that matter, shape (m,)."""
 
+    @property
+    def explicit(self) -> Indices:
+        """Return the unknowns that need no factorisation."""
+
     def rate(self, t: Array, z: Array) -> Array:
         """Return F(t, z) for times (k,) and unknowns (k, m), shape (k, m)."""
 
     def rate_jacobian(self, t: Array, z: Array) -> tuple[Array, Array]:
         """Return F and dF/dz, shapes (k, m) and (k, m, m)."""
+
+    def switches(self, t: Array, z: Array) -> Array:
+        """Return functions (k, e) at whose changes of sign F is not smooth; e may be 0."""
 
     def left(self, z: Array) -> tuple[Array, Array]:
         """Return residual (l,) and Jacobian (l, m) of the conditions at the first node."""

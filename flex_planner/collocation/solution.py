@@ -50,13 +50,29 @@ class CollocationSolution:
         """Return the number of intervals, N."""
         return self.mesh.size - 1
 
+    def times_at(self, theta: Array) -> Array:
+        """Return the times at the same positions, 0 to 1, of all intervals, shape (N, k)."""
+        times: Array = self.mesh[:-1, None] + self.steps[:, None] * theta
+        return times
+
+    def values_at(self, theta: Array) -> Array:
+        """Return z at the same positions of all intervals, shape (N, k, m)."""
+        increments = self.rule.basis(theta) @ self.stages
+        values: Array = self.nodes[:-1, None] + self.steps[:, None, None] * increments
+        return values
+
+    def rates_at(self, theta: Array) -> Array:
+        """Return dz/dt at the same positions of all intervals, shape (N, k, m)."""
+        rates: Array = self.rule.basis_rate(theta) @ self.stages
+        return rates
+
     def stage_times(self) -> Array:
         """Return the collocation times, shape (N, s)."""
-        return self.mesh[:-1, None] + self.steps[:, None] * self.rule.nodes
+        return self.times_at(self.rule.nodes)
 
     def stage_values(self) -> Array:
         """Return z at the collocation points, shape (N, s, m)."""
-        increments = np.einsum('ij,kjm->kim', self.rule.matrix, self.stages)
+        increments = self.rule.matrix @ self.stages
         values: Array = self.nodes[:-1, None] + self.steps[:, None, None] * increments
         return values
 
@@ -64,23 +80,22 @@ class CollocationSolution:
         """Return z at times (k,) within the mesh, shape (k, m)."""
         interval, theta = self._locate(times)
         basis = self.rule.basis(theta)
-        increments = np.einsum('ks,ksm->km', basis, self.stages[interval])
+        increments = (basis[:, None] @ self.stages[interval])[:, 0]
         values: Array = self.nodes[interval] + self.steps[interval, None] * increments
         return values
 
     def rate(self, times: Array) -> Array:
         """Return dz/dt at times (k,), shape (k, m)."""
         interval, theta = self._locate(times)
-        basis = self.rule.basis_rate(theta)
-        rate: Array = np.einsum('ks,ksm->km', basis, self.stages[interval])
+        rate: Array = (self.rule.basis_rate(theta)[:, None] @ self.stages[interval])[:, 0]
         return rate
 
-    def on_mesh(self, mesh: Array) -> CollocationSolution:
+    def on_mesh(self, mesh: Array, rule: GaussRule | None = None) -> CollocationSolution:
         """Return the same function sampled on another mesh of the same span."""
-        steps = np.diff(mesh)
-        stage_times = (mesh[:-1, None] + steps[:, None] * self.rule.nodes).ravel()
-        stages = self.rate(stage_times).reshape(steps.size, self.rule.stages, -1)
-        return CollocationSolution(mesh, self(mesh), stages, self.rule)
+        rule, steps = rule or self.rule, np.diff(mesh)
+        stage_times = (mesh[:-1, None] + steps[:, None] * rule.nodes).ravel()
+        stages = self.rate(stage_times).reshape(steps.size, rule.stages, -1)
+        return CollocationSolution(mesh, self(mesh), stages, rule)
 
     def _locate(self, times: Array) -> tuple[NDArray[np.intp], Array]:
         """Return the interval of each time and the position inside it, 0 to 1."""

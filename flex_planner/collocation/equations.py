@@ -1,0 +1,75 @@
+"""The collocation equations of a problem on a mesh: residual and linearisation."""
+
+from __future__ import annotations
+
+from flex_planner.collocation.linear import NewtonSystem, Residual, SingularSystemError
+from flex_planner.collocation.problem import BoundaryValueProblem
+from flex_planner.collocation.solution import CollocationSolution
+from flex_planner.progress import Monitor
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+# Jacobian entries evaluated between two looks at the monitor: some milliseconds, some MB
+_CHUNK = 400_000
+
+
+def magnitudes(problem: BoundaryValueProblem, solution: CollocationSolution) -> Array:
+    """Return the magnitude of each unknown that relative sizes refer to, shape (m,)."""
+    largest: Array = np.maximum(np.abs(solution.nodes).max(axis=0), problem.scale)
+    return largest
+
+
+def collocation_residual(problem: BoundaryValueProblem,
+                         solution: CollocationSolution) -> Residual:
+    """Return the residual of the collocation equations at a point."""
+    values = solution.stage_values().reshape(-1, problem.size)
+    rate = problem.rate(solution.stage_times().ravel(), values)
+    return _residual(problem, solution, rate.reshape(solution.stages.shape))
+
+
+def _residual(problem: BoundaryValueProblem, solution: CollocationSolution,
+              rate: Array) -> Residual:
+    increments = solution.rule.weights @ solution.stages
+    gaps = np.diff(solution.nodes, axis=0) - solution.steps[:, None] * increments
+    return Residual(solution.stages - rate, gaps, problem.left(solution.nodes[0])[0],
+                    problem.right(solution.nodes[-1])[0])
+
+
+def linearised(problem: BoundaryValueProblem, solution: CollocationSolution,
+               monitor: Monitor) -> tuple[Residual, Array]:
+    """
+    Return the residual and the mean of dF/dz over each interval, (N, m, m).
+
+    Raises
+    ------
+    SingularSystemError
+        If F or its Jacobian is not finite.
+    StoppedError
+        If the monitor stopped it.
+
+    """
+    count, stages, size = solution.stages.shape
+    times, values = solution.stage_times(), solution.stage_values()
+    rate, mean = np.empty_like(solution.stages), np.empty((count, size, size))
+    chunk = max(1, _CHUNK // (stages * size**2))
+    for first in range(0, count, chunk):
+        monitor.check()
+        part = slice(first, first + chunk)
+        rates, jacobian = problem.rate_jacobian(times[part].ravel(),
+                                                values[part].reshape(-1, size))
+        rate[part] = rates.reshape(rate[part].shape)
+        by_stage = jacobian.reshape(-1, stages, size * size)
+        mean[part] = (solution.rule.weights @ by_stage).reshape(-1, size, size)
+    if not (np.isfinite(rate).all() and np.isfinite(mean).all()):
+        raise SingularSystemError('the right-hand side is not finite at the current point')
+    return _residual(problem, solution, rate), mean
+
+
+def factorised(problem: BoundaryValueProblem, solution: CollocationSolution,
+               jacobians: Array) -> NewtonSystem:
+    """Return the linear system at a point, given its Jacobians."""
+    return NewtonSystem(solution.rule, solution.steps, jacobians,
+                        problem.left(solution.nodes[0])[1], problem.right(solution.nodes[-1])[1],
+                        magnitudes(problem, solution), problem.explicit)
