@@ -79,6 +79,14 @@ class BatchFunction(Protocol):
     def __call__(self, *inputs: Array) -> tuple[Array, ...]:
         """Evaluate all points."""
 
+    def chained(self, *inputs: Array) -> tuple[Array, ...]:
+        """
+        Evaluate points one after another, each from the first output of the one before.
+
+        As ``__call__``, but only the first point of the first input is read.
+
+        """
+
     def repeated(self, inputs: Sequence[Array], outputs: Sequence[Array]) -> Callable[[], None]:
         """
         Return a call that reads and writes the same arrays every time.
@@ -94,13 +102,19 @@ class _NativeFunction:
 
     def __init__(self, library: ctypes.CDLL, name: str, signature: Signature) -> None:
         self._call = getattr(library, f'{name}_batch')
-        self._call.argtypes = (ctypes.c_longlong, _POINTERS, _POINTERS)
+        self._call.argtypes = (ctypes.c_longlong, ctypes.c_int, _POINTERS, _POINTERS)
         self._call.restype = ctypes.c_int
         self._signature = signature
 
     def __call__(self, *inputs: Array) -> tuple[Array, ...]:
+        return self._evaluated(inputs, chain=False)
+
+    def chained(self, *inputs: Array) -> tuple[Array, ...]:
+        return self._evaluated(inputs, chain=True)
+
+    def _evaluated(self, inputs: Sequence[Array], *, chain: bool) -> tuple[Array, ...]:
         arrays, outputs = self._signature.prepare(inputs)
-        if self._call(len(arrays[0]), _pointers(arrays), _pointers(outputs)):
+        if self._call(len(arrays[0]), chain, _pointers(arrays), _pointers(outputs)):
             raise MemoryError('no memory to evaluate a compiled function')
         return tuple(outputs)
 
@@ -110,7 +124,7 @@ class _NativeFunction:
         kept = (inputs, outputs)  # the addresses are good only while the arrays live
 
         def run() -> None:
-            if call(count, sources, targets) or not kept:
+            if call(count, False, sources, targets) or not kept:
                 raise MemoryError('no memory to evaluate a compiled function')
 
         return run
@@ -129,9 +143,17 @@ class _InterpretedFunction:
         self._signature = signature
 
     def __call__(self, *inputs: Array) -> tuple[Array, ...]:
+        return self._evaluated(inputs, chain=False)
+
+    def chained(self, *inputs: Array) -> tuple[Array, ...]:
+        return self._evaluated(inputs, chain=True)
+
+    def _evaluated(self, inputs: Sequence[Array], *, chain: bool) -> tuple[Array, ...]:
         arrays, outputs = self._signature.prepare(inputs)
-        batched = self._signature.batched
+        batched, arrays[0] = self._signature.batched, arrays[0].copy()
         for point in range(len(arrays[0])):
+            if chain and point:
+                arrays[0][point] = outputs[0][point - 1]
             row = [array[point] for array in arrays[:batched]] + arrays[batched:]
             results = self._function.call(row)
             for output, result in zip(outputs, results, strict=True):
@@ -155,7 +177,9 @@ def cache_folder() -> Path:
 def content_key(*parts: str | bytes) -> str:
     """Return a short digest of what a library is made of, for its name on disk."""
     digest = hashlib.sha256()
-    for part in (*parts, ' '.join(_FLAGS), platform.system(), _processor()):
+    # this file writes the loops around the functions, and calls them
+    own = (Path(__file__).read_bytes(), ' '.join(_FLAGS), platform.system(), _processor())
+    for part in (*parts, *own):
         data = part.encode() if isinstance(part, str) else part
         digest.update(len(data).to_bytes(8, 'little') + data)
     return digest.hexdigest()[:24]
@@ -225,14 +249,15 @@ def _loop(name: str, function: Any, batched: int) -> str:
     results = ''.join(f'    res[{i}] = out[{i}] + k*{rows * columns};\n'
                       for i, (rows, columns) in enumerate(signature.outputs))
     return f"""
-int {name}_batch(long long n, const double *const *in, double *const *out) {{
+int {name}_batch(long long n, int chain, const double *const *in, double *const *out) {{
   const double *arg[{function.sz_arg() + 1}];
   double *res[{function.sz_res() + 1}];
   long long iw[{function.sz_iw() + 1}];
   double *w = malloc(sizeof(double) * {function.sz_w() + 1});
   if (!w) return 1;
   for (long long k = 0; k < n; ++k) {{
-{arguments}{results}    {name}(arg, res, iw, w, 0);
+{arguments}    if (chain && k) arg[0] = res[0];
+{results}    {name}(arg, res, iw, w, 0);
   }}
   free(w);
   return 0;

@@ -17,7 +17,10 @@ from flex_planner.arm import Arm
 from flex_planner.compiled import Array, BatchFunction, content_key, load_functions
 import numpy as np
 
-_SOURCES = ('arm.py', 'beams.py', 'modes.py', 'dynamics.py', 'pontryagin.py', 'compiled.py')
+RungeKuttaSteps = Callable[[Array, Array, float], tuple[Array, Array, Array]]
+
+RUNGE_KUTTA_STAGES = 12
+_SOURCES = ('arm.py', 'beams.py', 'modes.py', 'dynamics.py', 'pontryagin.py')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -158,6 +161,29 @@ class ArmModel:
             return result
 
         return evaluate
+
+    def payload_sensitivity(self, z: Array, p: Array) -> tuple[Array, Array, Array]:
+        """Return dz'/dm_p (k, 4 n_t), dH/dm_p and d2H/dm_p2 (k,)."""
+        rate, share, bend = self._functions['payload_sensitivity'](z, p)
+        return rate, share[:, 0], bend[:, 0]
+
+    def runge_kutta_steps(self, p: Array) -> RungeKuttaSteps:
+        """
+        Return steps of the Dormand-Prince method of order 8 as a quick function.
+
+        From a state (2 n_t,), torques at the twelve stages of k steps (k, 12 n) and the length of
+        a step it makes the states after each step and their two error estimates, (k, 2 n_t) each.
+
+        """
+        function = self._functions['runge_kutta_step']
+
+        def advance(state: Array, torques: Array, length: float) -> tuple[Array, Array, Array]:
+            first = np.broadcast_to(state, (len(torques), state.size))
+            after, fifth, third = function.chained(
+                first, torques, np.full((len(torques), 1), length), p)
+            return after, fifth, third
+
+        return advance
 
     def inverse_dynamics(self, x: Array, acceleration: Array, p: Array) -> Array:
         """Return M q'' + h, shape (k, n_t), eq. (3)."""

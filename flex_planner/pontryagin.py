@@ -63,7 +63,10 @@ def build_functions(arm: Arm) -> dict[str, tuple[Any, int]]:
         - ``optimality_jacobian`` z -> z', dz'/dz
         - ``control`` z -> torque, torque without bounds, running cost L, Hamiltonian H,
           dH/dm_p, accelerations
+        - ``payload_sensitivity`` z -> dz'/dm_p, dH/dm_p, d2H/dm_p2
         - ``forward_dynamics`` (x, u) -> x', eq. (5)
+        - ``runge_kutta_step`` (x, torques at the stages, step) -> next x and the two error
+          estimates of the Dormand-Prince method of order 8
         - ``inverse_dynamics`` (x, a) -> generalized forces
         - ``mass_and_energy`` x -> M, kinetic energy, potential energy
         - ``static_forces`` q -> dV/dq, d2V/dq2 with V the potential energy
@@ -73,6 +76,7 @@ def build_functions(arm: Arm) -> dict[str, tuple[Any, int]]:
     par = _Parameters.of(chain, arm.n_joints)
     p = par.stacked()
     z, F, outputs = _optimality(par, arm.n_joints)
+    share, payload = outputs[4], chain.payload_mass
     q = chain.coordinates
     x = ca.vertcat(q, chain.rates)
     u, a = ca.SX.sym('u', arm.n_joints), ca.SX.sym('a', arm.n_coordinates)
@@ -84,18 +88,43 @@ def build_functions(arm: Arm) -> dict[str, tuple[Any, int]]:
         dense = [ca.densify(result) for result in results]
         return ca.Function(name, [*inputs, p], dense), len(inputs)
 
+    forward_dynamics = function('forward_dynamics', [x, u], [state_rate])
     return {
         'optimality': function('optimality', [z], [F]),
         # transposed: CasADi stores columns, NumPy rows
         'optimality_jacobian': function('optimality_jacobian', [z], [F, ca.jacobian(F, z).T]),
         'control': function('control', [z], list(outputs)),
-        'forward_dynamics': function('forward_dynamics', [x, u], [state_rate]),
+        'payload_sensitivity': function('payload_sensitivity', [z], [
+            ca.jacobian(F, payload), share, ca.jacobian(share, payload)]),
+        'forward_dynamics': forward_dynamics,
+        'runge_kutta_step': _runge_kutta_step(forward_dynamics[0]),
         'inverse_dynamics': function('inverse_dynamics', [x, a], [chain.inverse_dynamics(a)]),
         'mass_and_energy': function('mass_and_energy', [x],
                                     [M, chain.kinetic, chain.potential]),
         'static_forces': function('static_forces', [q], [ca.gradient(chain.potential, q),
                                                          ca.hessian(chain.potential, q)[0]]),
     }
+
+
+def _runge_kutta_step(rate: Any) -> tuple[Any, int]:
+    """Return one step of DOP853, with SciPy's coefficients, of x' = rate(x, u, p)."""
+    from scipy.integrate import DOP853
+
+    x, u = ca.MX.sym('x', rate.size1_in(0)), ca.MX.sym('u', rate.size1_in(1), DOP853.n_stages)
+    step, p = ca.MX.sym('h'), ca.MX.sym('p', rate.size1_in(2))
+    slopes: list[Any] = []
+    for i in range(DOP853.n_stages):
+        slopes.append(rate(x + step * _combined(DOP853.A[i, :i], slopes), u[:, i], p))
+    following = x + step * _combined(DOP853.B, slopes)
+    # the last stage of the error estimate is at the end of the step, as stage 12 is
+    slopes.append(rate(following, u[:, DOP853.n_stages - 1], p))
+    errors = [step * _combined(row, slopes) for row in (DOP853.E5, DOP853.E3)]
+    return ca.Function('runge_kutta_step', [x, ca.vec(u), step, p], [following, *errors]), 3
+
+
+def _combined(weights: Any, vectors: list[Any]) -> Any:
+    """Return the sum of weighted vectors; 0 for none."""
+    return sum((float(w) * v for w, v in zip(weights, vectors, strict=True) if w), 0)
 
 
 def _factorized(matrix: Any) -> tuple[Any, Any]:

@@ -9,6 +9,7 @@ from flex_planner.model import ArmModel
 from flex_planner.progress import Monitor
 from flex_planner.validation import Array
 import numpy as np
+from numpy.polynomial.legendre import legvander
 from scipy.integrate import solve_ivp
 
 
@@ -22,7 +23,7 @@ class PiecewisePolynomial:
     breaks : numpy.ndarray, shape (N + 1,)
         Increasing.
     coefficients : numpy.ndarray, shape (N, d + 1, k)
-        Lowest power first, of the time since the interval's start over its length.
+        Of the Legendre polynomials over each interval.
 
     """
 
@@ -32,19 +33,27 @@ class PiecewisePolynomial:
     @classmethod
     def through(cls, breaks: Array, theta: Array, values: Array) -> PiecewisePolynomial:
         """Interpolate values (N, d + 1, k) at positions theta (d + 1,) in each interval."""
-        powers = np.vander(theta, increasing=True)
-        coefficients = np.linalg.solve(powers[None], values)
-        return cls(breaks, coefficients.astype(np.float64))
+        polynomials = legvander(2 * theta - 1, theta.size - 1)
+        coefficients: Array = np.linalg.inv(polynomials) @ values
+        return cls(breaks, coefficients)
 
     def __call__(self, time: float) -> Array:
         """Return the value at one time, shape (k,)."""
         last = self.breaks.size - 2
         k = min(max(int(self.breaks.searchsorted(time, 'right')) - 1, 0), last)
         start, end = self.breaks[k], self.breaks[k + 1]
-        theta = (time - start) / (end - start)
-        pieces = self.coefficients[k]
-        value: Array = theta ** np.arange(len(pieces)) @ pieces
+        value: Array = self.within(k, np.array([(time - start) / (end - start)]))[0]
         return value
+
+    def within(self, interval: int, theta: Array) -> Array:
+        """Return the values at positions (k,), 0 to 1, of an interval."""
+        values: Array = self.basis(theta) @ self.coefficients[interval]
+        return values
+
+    def basis(self, theta: Array) -> Array:
+        """Return what turns coefficients into values at positions (k,), shape (k, d + 1)."""
+        basis = legvander(2 * theta - 1, self.coefficients.shape[1] - 1)
+        return basis.astype(np.float64, copy=False)
 
 
 def simulate(model: ArmModel, p: Array, state: Array, torque: Callable[[float], Array],
