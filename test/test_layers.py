@@ -88,7 +88,7 @@ def test_collocation_knows_nothing_of_arms(name: str) -> None:
 
 def test_casadi_is_imported_only_to_derive_and_to_compile() -> None:
     users = {name.removeprefix('flex_planner.') for name in PATHS if 'casadi' in imports(name)}
-    assert users == {'compiled', 'dynamics', 'pontryagin'}
+    assert users == {'compiled', 'dynamics', 'pontryagin', 'transcription'}
 
 
 def test_kinematics_and_dynamics_can_check_each_other() -> None:
