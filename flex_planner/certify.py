@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields
 
 from flex_planner.collocation import CollocationResult, CollocationSolution
@@ -10,7 +9,7 @@ from flex_planner.kinematics import tip_position
 from flex_planner.motion import MotionProblem
 from flex_planner.plan import Certificate
 from flex_planner.progress import Monitor
-from flex_planner.simulation import PiecewisePolynomial, simulate
+from flex_planner.resimulation import PlannedTorque, resimulated
 from flex_planner.statics import residual_vibration
 from flex_planner.validation import Array
 import numpy as np
@@ -50,49 +49,35 @@ def certify(problem: MotionProblem, result: CollocationResult, monitor: Monitor,
     ------
     StoppedError
         If the monitor stopped it.
+    ValueError
+        If the solution is of another duration than the task.
 
     """
-    final = simulate(problem.model, problem.p, problem.start,
-                     planned_torque(problem, result.solution), problem.task.duration, monitor,
-                     rtol=rtol, atol=rtol / 100)
+    if not np.isclose(result.solution.mesh[-1], problem.task.duration, rtol=1e-12):
+        raise ValueError('the solution does not last as long as its task')
+    final = resimulated(problem.model, problem.p, problem.start,
+                        PlannedTorque.of(problem, result.solution), monitor,
+                        rtol=rtol, atol=rtol / 100)
     if not np.isfinite(final).all():
         return Certificate(collocation_residual=result.residual)
     arm, n_t = problem.model.arm, problem.model.arm.n_coordinates
-    miss = final - problem.goal
-    tips = tip_position(arm, np.stack([final[:n_t], problem.goal[:n_t]]))
+    reached = problem.reached(result.solution.nodes[-1, :2 * n_t])
+    miss = final - reached
+    tips = tip_position(arm, np.stack([final[:n_t], reached[:n_t]]))
     return Certificate(
         collocation_residual=result.residual, boundary_error=float(miss @ miss / 2),
         hamiltonian_drift=hamiltonian_drift(problem, result.solution),
         tip_error=float(np.linalg.norm(tips[0] - tips[1])),
-        residual_vibration=residual_vibration(problem.model, final, problem.goal[:n_t],
-                                              problem.parameters))
+        residual_vibration=residual_vibration(problem.model, _at_rest(problem) + miss,
+                                              problem.goal[:n_t], problem.parameters),
+        state_error=float(result.errors[:2 * n_t].max()),
+        costate_error=float(result.errors[2 * n_t:].max()))
 
 
-def planned_torque(problem: MotionProblem,
-                   solution: CollocationSolution) -> Callable[[float], Array]:
-    """
-    Return the planned torque of eq. (14) as a quick function of one time.
-
-    The torque without bounds and the speeds are polynomials in every interval of the mesh; the
-    bounds of eq. (15) are applied last, so that the corners where a motor switches stay sharp.
-
-    """
-    n, n_t = problem.model.arm.n_joints, problem.model.arm.n_coordinates
-    theta = np.concatenate([[0.0], solution.rule.nodes, [1.0]])
-    times = solution.mesh[:-1, None] + solution.steps[:, None] * theta
-    z = solution(times.ravel())
-    free = problem.model.controls(z, problem.p).free_torque
-    values = np.hstack([free, z[:, n_t:n_t + n]]).reshape(solution.intervals, theta.size, 2 * n)
-    pieces = PiecewisePolynomial.through(solution.mesh, theta, values)
-    stall, slope = problem.parameters.stall_torque, problem.parameters.torque_slope
-
-    def torque(time: float) -> Array:
-        now = pieces(time)
-        shift = slope * now[n:]
-        bounded: Array = np.minimum(np.maximum(now[:n], -stall - shift), stall - shift)
-        return bounded
-
-    return torque
+def _at_rest(problem: MotionProblem) -> Array:
+    """Return the goal without its velocities."""
+    half = problem.goal.size // 2
+    return np.concatenate([problem.goal[:half], np.zeros(half)])
 
 
 def hamiltonian_drift(problem: MotionProblem, solution: CollocationSolution) -> float:
@@ -108,11 +93,17 @@ def hamiltonian_drift(problem: MotionProblem, solution: CollocationSolution) -> 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Totals:
-    """Integrals over a motion: J of eq. (6), effort [N^2 m^2 s] and energy [J], as in `Plan`."""
+    """
+    Integrals over a motion, as in `Plan`.
+
+    J of eq. (6), effort [N^2 m^2 s], energy [J], and the share of time of each motor on its limit.
+
+    """
 
     cost: float
     effort: float
     energy: float
+    saturation: Array
 
 
 def totals(problem: MotionProblem, solution: CollocationSolution) -> Totals:
@@ -126,5 +117,14 @@ def totals(problem: MotionProblem, solution: CollocationSolution) -> Totals:
         return float(weights @ values)
 
     power = np.abs(controls.torque * z[:, n_t:n_t + n]).sum(axis=1)
-    return Totals(cost=integral(controls.cost_rate), energy=integral(power),
-                  effort=integral((controls.torque ** 2).sum(axis=1)))
+    saturated = controls.torque != controls.free_torque
+    return Totals(cost=integral(controls.cost_rate) + _terminal_cost(problem, solution),
+                  effort=integral((controls.torque ** 2).sum(axis=1)), energy=integral(power),
+                  saturation=weights @ saturated / problem.task.duration)
+
+
+def _terminal_cost(problem: MotionProblem, solution: CollocationSolution) -> float:
+    """Return the first terms of eq. (6), and the price of the duration."""
+    miss = solution.nodes[-1, :problem.goal.size] - problem.goal
+    weights = np.where(np.isinf(problem.goal_weights), 0.0, problem.goal_weights)
+    return float(weights @ miss**2 / 2 + problem.task.time_weight * problem.task.duration)

@@ -5,17 +5,25 @@ from __future__ import annotations
 from flex_planner.collocation import CollocationSolution, GaussRule
 from flex_planner.errors import InvalidTaskError
 from flex_planner.model import ArmModel, Parameters
-from flex_planner.statics import equilibrium
+from flex_planner.statics import equilibrium, natural_modes
 from flex_planner.task import Task
 from flex_planner.validation import Array
 import numpy as np
+from numpy.typing import NDArray
+
+Indices = NDArray[np.intp]
+
+# of the highest natural frequency; an exact solution takes two or three times as many
+_POINTS_PER_CYCLE = 5.0
 
 
 class MotionProblem:
     """
     The optimality conditions of a task.
 
-    The unknowns are z = (q, q', psi_1, psi_2), 4 n_t of them; q and q' are given at both ends.
+    The unknowns are z = (q, q', psi_1, psi_2), 4 n_t of them. The state is given at the start.
+    At the goal each coordinate and rate is either given, eq. (16), or weighs in the cost by the
+    terminal term of eq. (6), whose derivative is its costate there (transversality).
 
     Parameters
     ----------
@@ -29,16 +37,20 @@ class MotionProblem:
     Attributes
     ----------
     start, goal : numpy.ndarray, shape (2 n_t,)
-        States at both ends: at rest, bent as gravity bends the arm.
+        States at both ends, bent as gravity bends the arm at rest.
+    goal_weights : numpy.ndarray, shape (2 n_t,)
+        Diagonals of W_p and W_v of eq. (6); infinite where the goal must be met.
     holding_torque : numpy.ndarray, shape (n,)
         Holds the arm at the goal [N m].
     p : numpy.ndarray
         Stacked parameters.
+    explicit : numpy.ndarray of int
+        q and psi_1, whose rates the collocation need not factorise.
 
     Raises
     ------
     InvalidTaskError
-        If a motor is too weak to hold the arm at the goal.
+        If a motor is too weak to hold the arm at a goal where it comes to rest.
 
     """
 
@@ -49,11 +61,16 @@ class MotionProblem:
         self.size = 4 * n_t
         start, _ = equilibrium(model, task.start_positions, parameters)
         goal, self.holding_torque = equilibrium(model, task.goal_positions, parameters)
-        _check_holding(self.holding_torque, parameters)
-        self.start = np.concatenate([start, np.zeros(n_t)])
-        self.goal = np.concatenate([goal, np.zeros(n_t)])
+        if task.ends_at_rest:
+            _check_holding(self.holding_torque, parameters)
+        self.start = np.concatenate([start, task.start_velocities])
+        self.goal = np.concatenate([goal, task.goal_velocities])
+        self.goal_weights = np.concatenate([task.goal_position_weights,
+                                            task.goal_velocity_weights])
         self.scale = self._scale()
-        self._rows = np.eye(2 * n_t, 4 * n_t)
+        self.explicit: Indices = np.r_[0:n_t, 2 * n_t:3 * n_t]
+        self._left_rows = np.eye(2 * n_t, 4 * n_t)
+        self._right_rows = _transversality(self.goal_weights)
 
     def rate(self, t: Array, z: Array) -> Array:
         """Return z'; the problem does not depend on time."""
@@ -63,13 +80,35 @@ class MotionProblem:
         """Return z' and its Jacobian."""
         return self.model.optimality_jacobian(z, self.p)
 
+    def switches(self, t: Array, z: Array, p: Array | None = None) -> Array:
+        """Return how far the unbounded torque is from each bound of eq. (15), (k, 2 n)."""
+        free = self.model.controls(z, self.p if p is None else p).free_torque
+        n_t, n = self.model.arm.n_coordinates, self.model.arm.n_joints
+        stall, slope = self.parameters.stall_torque, self.parameters.torque_slope
+        shifted = free + slope * z[:, n_t:n_t + n]
+        return np.hstack([shifted - stall, shifted + stall])
+
     def left(self, z: Array) -> tuple[Array, Array]:
         """Return the initial conditions of eq. (16)."""
-        return z[:self.start.size] - self.start, self._rows
+        return z[:self.start.size] - self.start, self._left_rows
 
     def right(self, z: Array) -> tuple[Array, Array]:
-        """Return the final conditions of eq. (16)."""
-        return z[:self.goal.size] - self.goal, self._rows
+        """Return the final conditions of eq. (16), or transversality of eq. (6)."""
+        half = self.goal.size
+        miss = np.concatenate([z[:half] - self.goal, z[half:]])
+        residual: Array = self._right_rows @ miss
+        return residual, self._right_rows
+
+    def reached(self, end: Array) -> Array:
+        """Return the state (2 n_t,) that a motion ending in `end` is to reach."""
+        return np.where(np.isinf(self.goal_weights), self.goal, end)
+
+    def fewest_intervals(self, stages: int) -> int:
+        """Return the intervals of a mesh that resolves nothing finely but overlooks nothing."""
+        rates, _ = natural_modes(self.model, self.start[:self.size // 4], self.parameters,
+                                 locked=False)
+        cycles = float(np.nan_to_num(rates).max()) * self.task.duration / (2 * np.pi)
+        return int(np.ceil(_POINTS_PER_CYCLE * cycles / stages))
 
     def straight_line(self, intervals: int, rule: GaussRule) -> CollocationSolution:
         """Return constant velocity from start to goal with zero costates, as a guess."""
@@ -105,6 +144,13 @@ class MotionProblem:
         scale: Array = np.concatenate([positions, positions / duration,
                                        velocity_costates / duration, velocity_costates]) / 10
         return scale
+
+
+def _transversality(weights: Array) -> Array:
+    """Return the rows of ``x - goal = 0``, or of ``psi - W (x - goal) = 0`` for finite W."""
+    given = np.isinf(weights)
+    states = np.where(given, 1.0, -np.where(given, 0.0, weights))
+    return np.hstack([np.diag(states), np.diag(np.where(given, 0.0, 1.0))])
 
 
 def _check_holding(torque: Array, parameters: Parameters) -> None:

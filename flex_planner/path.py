@@ -11,22 +11,33 @@ from dataclasses import replace
 
 from flex_planner.certify import CertificateLimits, certify, totals
 from flex_planner.collocation import CollocationResult, Settings, solve, Status
+from flex_planner.limits import freed_duration, walked_duration, walked_payload
 from flex_planner.model import ArmModel
 from flex_planner.motion import MotionProblem, task_parameters
 from flex_planner.plan import Plan, PlanStatus
 from flex_planner.progress import Monitor, StoppedError, StopReason
-from flex_planner.strategies import LADDER
-from flex_planner.task import Task
+from flex_planner.strategies import Attempt, QUICK, Strategy, THOROUGH, warm_start
+from flex_planner.task import MAX_DURATION, Task
+
+# the limits come before the thorough strategies: to refuse a task should not take minutes
+LADDER: tuple[tuple[str, Strategy], ...] = (
+    *QUICK,
+    ('payload walked up', walked_payload),
+    ('duration walked down', walked_duration),
+    *THOROUGH,
+)
 
 _STOPPED = {Status.TIMEOUT: PlanStatus.TIMEOUT, Status.CANCELED: PlanStatus.CANCELED}
 _STATUSES = {StopReason.TIMEOUT: PlanStatus.TIMEOUT, StopReason.CANCELED: PlanStatus.CANCELED}
 _REFINEMENTS = 2
 _REFINEMENT_FACTOR = 10.0
 _STRICTER = 100.0
+# strategies tried with each guess of a free duration, and longer guesses
+_FEW, _GUESSES = 4, (2.0, 4.0, 8.0)
 
 
 def plan_path(task: Task, *, model: ArmModel | None = None, settings: Settings | None = None,
-              monitor: Monitor | None = None) -> Plan:
+              monitor: Monitor | None = None, start_from: Plan | None = None) -> Plan:
     """
     Plan the motion of a task that minimises eq. (6) within the motor limits of eq. (15).
 
@@ -40,6 +51,9 @@ def plan_path(task: Task, *, model: ArmModel | None = None, settings: Settings |
         Of the boundary-value solver.
     monitor : Monitor, optional
         Receives progress, and may cancel or limit the time.
+    start_from : Plan, optional
+        A solved plan of a similar task, tried first; any mesh, any duration, the same number of
+        coordinates.
 
     Returns
     -------
@@ -55,51 +69,102 @@ def plan_path(task: Task, *, model: ArmModel | None = None, settings: Settings |
     settings, monitor = settings or Settings(), monitor or Monitor()
     model = model or ArmModel(task.arm)
     problem = MotionProblem(model, task, task_parameters(task))
-    strategy, result = _first_solution(problem, settings, monitor)
-    plan = Plan(task=task, status=PlanStatus.NOT_CONVERGED, message=result.message,
-                strategy=strategy, problem=problem, solution=None)
-    if result.status in _STOPPED:
-        plan = replace(plan, status=_STOPPED[result.status])
-    elif result.converged:
-        try:
-            plan = _certified(plan, result, settings, monitor)
-        except StoppedError as stop:
-            plan = replace(plan, status=_STATUSES[stop.reason], message=str(stop))
+    rungs = LADDER
+    if start_from is not None and start_from.solution is not None:
+        rungs = (('warm start', warm_start(start_from.solution)), *LADDER)
+    try:
+        plan = _planned(problem, rungs, settings, monitor)
+    except StoppedError as stop:
+        plan = Plan(task=task, status=_STATUSES[stop.reason], message=str(stop), strategy='',
+                    problem=problem, solution=None)
     return replace(plan, iterations=monitor.iteration, planning_time=monitor.elapsed)
 
 
-def _first_solution(problem: MotionProblem, settings: Settings,
-                    monitor: Monitor) -> tuple[str, CollocationResult]:
-    """Try the strategies in order; report the first that solves it, or all failures."""
-    failures = []
-    for name, strategy in LADDER:
+def _planned(problem: MotionProblem, rungs: tuple[tuple[str, Strategy], ...],
+             settings: Settings, monitor: Monitor) -> Plan:
+    """Solve and certify."""
+    if problem.task.time_weight:
+        return _planned_in_any_time(problem, rungs, settings, monitor)
+    strategy, attempt = _first_solution(problem, rungs, settings, monitor)
+    return _concluded(problem, strategy, attempt, settings, monitor)
+
+
+def _planned_in_any_time(problem: MotionProblem, rungs: tuple[tuple[str, Strategy], ...],
+                         settings: Settings, monitor: Monitor) -> Plan:
+    """Solve for the duration of the task or a longer one, then free it."""
+    limits = {walked_payload, walked_duration}  # what the guess forbids is no limit of the task
+    rungs = tuple(rung for rung in rungs if rung[1] not in limits)
+    strategy, attempt = _first_solution(problem, rungs[:_FEW], settings, monitor)
+    for factor in _GUESSES:
+        longer = factor * problem.task.duration
+        if attempt.result.status is not Status.NEWTON_FAILED or longer > MAX_DURATION:
+            break
+        slow = MotionProblem(problem.model, replace(problem.task, duration=longer),
+                             problem.parameters)
+        strategy, attempt = _first_solution(slow, rungs[:_FEW], settings, monitor)
+        problem = slow if attempt.result.converged else problem
+    if attempt.result.status is Status.NEWTON_FAILED:
+        strategy, attempt = _first_solution(problem, rungs[_FEW:], settings, monitor)
+    if attempt.result.converged:
+        monitor.phase = 'duration freed'
+        problem, result = freed_duration(problem, attempt.result, settings, monitor)
+        attempt = Attempt(result=result)
+    return _concluded(problem, strategy, attempt, settings, monitor)
+
+
+def _concluded(problem: MotionProblem, strategy: str, attempt: Attempt, settings: Settings,
+               monitor: Monitor) -> Plan:
+    """Return the plan of an attempt, certified if it solved the task."""
+    result = attempt.result
+    plan = Plan(task=problem.task, status=PlanStatus.NOT_CONVERGED, message=result.message,
+                strategy=strategy, problem=problem, solution=None)
+    if attempt.evidence:
+        return replace(plan, status=PlanStatus.INFEASIBLE, message=attempt.evidence)
+    if result.status in _STOPPED:
+        return replace(plan, status=_STOPPED[result.status])
+    return _certified(plan, result, settings, monitor) if result.converged else plan
+
+
+def _first_solution(problem: MotionProblem, rungs: tuple[tuple[str, Strategy], ...],
+                    settings: Settings, monitor: Monitor) -> tuple[str, Attempt]:
+    """Try the strategies in order; report the first that decides it, or all failures."""
+    failures, names = [], []
+    for name, strategy in rungs:
         monitor.phase = name
-        result = strategy(problem, settings, monitor)
-        if result.converged or result.status in _STOPPED:
-            return name, result
-        failures.append(f'{name}: {result.message}')
-    return ', '.join(name for name, _ in LADDER), replace(result, message='; '.join(failures))
+        attempt = strategy(problem, settings, monitor)
+        if attempt is None:
+            continue
+        last = attempt
+        if attempt.evidence or attempt.result.converged or attempt.result.status in _STOPPED:
+            return name, attempt
+        names.append(name)
+        failures.append(f'{name}: {attempt.result.message}')
+    return ', '.join(names), Attempt(result=replace(last.result, message='; '.join(failures)))
 
 
 def _certified(plan: Plan, result: CollocationResult, settings: Settings,
                monitor: Monitor) -> Plan:
-    """Certify a solution; where the certificate fails, solve on finer meshes."""
+    """Certify a solution; where the certificate fails, solve more exactly."""
     limits = CertificateLimits(boundary_error=plan.task.tolerance)
     problem, reasons = plan.problem, ['']
     for attempt in range(_REFINEMENTS + 1):
         # an arm that stands up magnifies the integrator's errors as it does those of the mesh
-        certificate = certify(problem, result, monitor, rtol=1e-8 / _STRICTER**attempt)
+        try:
+            certificate = certify(problem, result, monitor, rtol=1e-8 / _STRICTER**attempt)
+        except StoppedError as stop:
+            return replace(plan, status=_STATUSES[stop.reason], message=str(stop))
         total = totals(problem, result.solution)
         plan = replace(plan, solution=result.solution, certificate=certificate, cost=total.cost,
-                       effort=total.effort, energy=total.energy)
+                       effort=total.effort, energy=total.energy,
+                       switching_times=result.switches, saturation=total.saturation)
         reasons = limits.violations(certificate)
         if not reasons:
             return replace(plan, status=PlanStatus.SOLVED, message=PlanStatus.SOLVED.value)
         if attempt < _REFINEMENTS:
             monitor.phase = 'mesh refinement'
-            reached = min(settings.defect_tolerance, result.residual)
-            settings = replace(settings, defect_tolerance=max(
-                reached / _REFINEMENT_FACTOR, 1e-12))
+            reached = min(settings.error_tolerance, float(result.errors.max()))
+            settings = replace(settings, error_tolerance=max(
+                reached / _REFINEMENT_FACTOR, 1e-11))
             finer = solve(problem, result.solution, settings, monitor)
             if finer.status in _STOPPED:
                 return replace(plan, status=_STOPPED[finer.status], message=finer.message)

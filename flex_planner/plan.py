@@ -20,6 +20,7 @@ class PlanStatus(Enum):
 
     SOLVED = 'solved and certified'
     NOT_CONVERGED = 'not converged, which does not show that the motion is impossible'
+    INFEASIBLE = 'impossible within the limits of the motors'
     CERTIFICATE_FAILED = 'converged, but the re-simulated motion misses its tolerances'
     TIMEOUT = 'time limit reached'
     CANCELED = 'canceled'
@@ -42,6 +43,9 @@ class Certificate:
         Distance of the re-simulated tip from the goal [m].
     residual_vibration : float
         Largest bending after the joints are locked at the end of the re-simulation [m].
+    state_error, costate_error : float
+        Estimated largest error of states and costates at the nodes of the mesh, relative to
+        the largest value of each.
 
     """
 
@@ -50,6 +54,8 @@ class Certificate:
     hamiltonian_drift: float = np.inf
     tip_error: float = np.inf
     residual_vibration: float = np.inf
+    state_error: float = np.inf
+    costate_error: float = np.inf
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -116,6 +122,10 @@ class Plan:
         Integral of the squared torques [N^2 m^2 s].
     energy : float
         Integral of the absolute mechanical power of the motors [J].
+    switching_times : numpy.ndarray
+        When a motor reaches or leaves its limit [s].
+    saturation : numpy.ndarray, shape (n,)
+        Share of the time that each motor spends on its limit.
     iterations : int
         Newton iterations, failed strategies included.
     planning_time : float
@@ -133,6 +143,8 @@ class Plan:
     cost: float = np.inf
     effort: float = np.inf
     energy: float = np.inf
+    switching_times: Array = field(default_factory=lambda: np.zeros(0))
+    saturation: Array = field(default_factory=lambda: np.zeros(0))
     iterations: int = 0
     planning_time: float = 0.0
 

@@ -14,12 +14,16 @@ from numpy.typing import ArrayLike
 MAX_JOINT_ANGLE = 100.0
 MAX_DURATION = 1000.0
 MAX_PAYLOAD = 1e6
+MAX_VELOCITY = 1e3
+MAX_TIME_WEIGHT = 1e9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Task:
     """
-    A rest-to-rest motion between two postures, with the weights of eq. (7).
+    A motion between two postures, with the weights of eqs. (6) and (7).
+
+    By default it goes from rest to rest in a given time.
 
     Parameters
     ----------
@@ -28,7 +32,7 @@ class Task:
     start_positions, goal_positions : array_like, shape (n,)
         Joint angles, within +-100 rad.
     duration : float
-        t_f, > 0 and at most 1000 [s].
+        t_f, > 0 and at most 1000 [s]; a first guess of it if `time_weight` is not 0.
     payload_mass : float
         m_p, >= 0 and at most 1e6 [kg].
     payload_inertia : float
@@ -37,6 +41,15 @@ class Task:
         Diagonal of R, > 0; empty for ones.
     position_weights, velocity_weights : array_like, shape (n,) or (n_t,)
         Diagonals of W_1 and W_2, >= 0; empty for zeros, n entries for the joints alone.
+    start_velocities, goal_velocities : array_like, shape (n,) or (n_t,)
+        Rates at both ends [rad/s, m/s]; empty for zeros, n entries for the joints alone.
+    goal_position_weights, goal_velocity_weights : array_like, shape (n,) or (n_t,)
+        Diagonals of W_p and W_v of eq. (6): the goal is approached at this price, and is free
+        where the weight is 0. ``inf`` means that it must be met, and is the default; n entries
+        leave it so for the modal coordinates.
+    time_weight : float
+        Price of a second, >= 0 [1/s]: if not 0, the duration is free and this times t_f is
+        added to eq. (6). The larger it is, the nearer the motion comes to minimum time.
     tolerance : float
         eps of eq. (17) with W_p = W_v = 1, > 0 and at most 1.
 
@@ -56,6 +69,11 @@ class Task:
     effort_weights: Array = field(default_factory=lambda: np.zeros(0))
     position_weights: Array = field(default_factory=lambda: np.zeros(0))
     velocity_weights: Array = field(default_factory=lambda: np.zeros(0))
+    start_velocities: Array = field(default_factory=lambda: np.zeros(0))
+    goal_velocities: Array = field(default_factory=lambda: np.zeros(0))
+    goal_position_weights: Array = field(default_factory=lambda: np.zeros(0))
+    goal_velocity_weights: Array = field(default_factory=lambda: np.zeros(0))
+    time_weight: float = 0.0
     tolerance: float = 1e-3
 
     def __post_init__(self) -> None:
@@ -69,15 +87,49 @@ class Task:
         number('payload_inertia', self.payload_inertia, at_least=0, at_most=MAX_PAYLOAD,
                unit='kg m^2')
         number('tolerance', self.tolerance, above=0, at_most=1)
+        number('time_weight', self.time_weight, at_least=0, at_most=MAX_TIME_WEIGHT, unit='1/s')
         effort = vector('effort_weights', self.effort_weights, (0, n), above=0)
         self._set('effort_weights', effort if effort.size else vector('', np.ones(n), n))
         for name in ('position_weights', 'velocity_weights'):
-            given = vector(name, getattr(self, name), (0, n, n_t), at_least=0)
-            padded = np.concatenate([given, np.zeros(n_t - given.size)])
-            self._set(name, vector(name, padded, n_t))
+            self._set(name, _padded(name, getattr(self, name), n, n_t, 0.0, at_least=0))
+        for name in ('start_velocities', 'goal_velocities'):
+            self._set(name, _padded(name, getattr(self, name), n, n_t, 0.0,
+                                    at_least=-MAX_VELOCITY, at_most=MAX_VELOCITY))
+        for name in ('goal_position_weights', 'goal_velocity_weights'):
+            self._set(name, _goal_weights(name, getattr(self, name), n, n_t))
+
+    @property
+    def ends_at_rest(self) -> bool:
+        """Return whether the arm must come to rest at the goal, bent as gravity bends it."""
+        hard = np.isinf(self.goal_position_weights) & np.isinf(self.goal_velocity_weights)
+        return bool(hard.all()) and not bool(self.goal_velocities.any())
 
     def _set(self, name: str, value: Array) -> None:
         object.__setattr__(self, name, value)
+
+
+def _padded(name: str, values: ArrayLike, n: int, n_t: int, rest: float,
+            **bounds: float) -> Array:
+    """Return n_t checked entries; those that are not given are `rest`."""
+    given = vector(name, values, (0, n, n_t), **bounds)  # type: ignore[arg-type]
+    padded: Array = np.concatenate([given, np.full(n_t - given.size, rest)])
+    padded.setflags(write=False)
+    return padded
+
+
+def _goal_weights(name: str, values: ArrayLike, n: int, n_t: int) -> Array:
+    """Return n_t weights, >= 0 or infinite."""
+    try:
+        given = np.array(values, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        given = np.zeros(0)
+    hard = np.isposinf(given)
+    if given.ndim == 1 and hard.any():
+        checked = _padded(name, np.where(hard, 0.0, given), n, n_t, np.inf, at_least=0)
+        padded = np.where(np.pad(hard, (0, n_t - hard.size)), np.inf, checked)
+        padded.setflags(write=False)
+        return padded
+    return _padded(name, values, n, n_t, np.inf, at_least=0)
 
 
 def postures_from_points(arm: Arm, start: ArrayLike, goal: ArrayLike,

@@ -15,6 +15,8 @@ from typing import Any
 from flex_planner.arm import Arm, Joint, Link, Motor, Node
 from flex_planner.arm_files import load_arm
 from flex_planner.model import ArmModel
+from flex_planner.path import plan_path
+from flex_planner.plan import Plan
 from flex_planner.task import postures_from_points, Task
 from hypothesis import settings
 import pytest
@@ -27,6 +29,7 @@ settings.register_profile('repository', deadline=None, derandomize=True)
 settings.load_profile('repository')
 
 TaskFactory = Callable[..., Task]
+PlanFactory = Callable[..., Plan]
 
 
 @pytest.fixture(scope='session')
@@ -134,3 +137,18 @@ def paper_task() -> TaskFactory:
         return Task(arm=arm, **{**values, **changes})
 
     return build
+
+
+@pytest.fixture(scope='session')
+def plan_of(request: pytest.FixtureRequest, paper_task: TaskFactory) -> PlanFactory:
+    """Plan the paper's motion, once for each arm, payload and weight."""
+    known: dict[tuple[str, float, float], Plan] = {}
+
+    def plan(arm: str, payload_mass: float = 1.0, w_2: float = 0.0) -> Plan:
+        key = arm, payload_mass, w_2
+        if key not in known:
+            model = request.getfixturevalue(f'{arm}_model')
+            known[key] = plan_path(paper_task(model.arm, payload_mass, w_2), model=model)
+        return known[key]
+
+    return plan
