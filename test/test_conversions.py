@@ -7,6 +7,7 @@ import math
 from typing import Any
 
 from flex_planner.arm import Arm, Joint, Link
+from flex_planner.collocation import Settings
 from flex_planner.errors import (
     FlexPlannerError,
     InvalidSizeError,
@@ -156,7 +157,8 @@ def test_every_status_has_its_code() -> None:
 
 def test_report_of_a_failed_plan_is_infinite_and_says_why(rigid_arm: Arm, rigid_model: ArmModel,
                                                           paper_task: Any) -> None:
-    failed = plan_path(paper_task(rigid_arm, payload_mass=200.0), model=rigid_model)
+    settings = Settings(stages=2, intervals=4, max_intervals=4, error_tolerance=1e-11)
+    failed = plan_path(paper_task(rigid_arm), model=rigid_model, settings=settings)
     report = report_from_plan(failed)
     assert report.error_code == PlanReport.NOT_CONVERGED
     assert report.error_msg.startswith('not converged, which does not show that the motion is ')
@@ -164,6 +166,15 @@ def test_report_of_a_failed_plan_is_infinite_and_says_why(rigid_arm: Arm, rigid_
     assert report.iterations == failed.iterations > 0
     assert report.mesh_intervals == 0
     assert not (report.peak_torques or report.peak_speeds or report.recording)
+
+
+def test_report_of_an_impossible_motion_names_the_limit(rigid_arm: Arm, rigid_model: ArmModel,
+                                                        paper_task: Any) -> None:
+    report = report_from_plan(plan_path(paper_task(rigid_arm, payload_mass=200.0),
+                                        model=rigid_model))
+    assert report.error_code == PlanReport.INFEASIBLE
+    assert 'carries at most 5.855 kg' in report.error_msg
+    assert report.cost == math.inf
 
 
 @pytest.mark.parametrize(('monitor', 'code', 'word'), [

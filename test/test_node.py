@@ -247,7 +247,8 @@ def test_malformed_request_is_refused_by_field(rigid: Planner, wrong: dict[str, 
     ({'start_point': Point(x=-1.1, y=0.0)}, PlanReport.UNREACHABLE, 'start_point: '),
     ({'goal_point': Point(x=1.0, y=0.0)}, PlanReport.SINGULAR, 'goal_point: '),
     ({'start_point': Point()}, PlanReport.SINGULAR, 'start_point: '),
-    ({'payload_mass': 200.0}, PlanReport.NOT_CONVERGED, 'not converged'),
+    ({'payload_mass': 200.0}, PlanReport.INFEASIBLE,
+     'impossible within the limits of the motors: the arm carries at most 5.855 kg'),
 ], ids=str)
 def test_what_the_arm_cannot_do_has_its_own_code(rigid: Planner, wrong: dict[str, Any], code: int,
                                                  text: str) -> None:

@@ -159,7 +159,7 @@ def test_latched_topics_are_recorded_as_latched(answer: PlanPath.Response) -> No
 
 @pytest.mark.parametrize(('wrong', 'code'), [
     ({'duration': float('nan')}, PlanReport.NOT_FINITE),
-    ({'payload_mass': 200.0}, PlanReport.NOT_CONVERGED)])
+    ({'payload_mass': 200.0}, PlanReport.INFEASIBLE)])
 def test_failed_request_is_recorded_with_its_report(planner: Planner, wrong: dict[str, Any],
                                                     code: int) -> None:
     report = planner.report(**wrong)

@@ -43,6 +43,7 @@ ERROR_CODES: tuple[tuple[type[FlexPlannerError], int], ...] = (
 STATUS_CODES = {
     PlanStatus.SOLVED: PlanReport.NONE,
     PlanStatus.NOT_CONVERGED: PlanReport.NOT_CONVERGED,
+    PlanStatus.INFEASIBLE: PlanReport.INFEASIBLE,
     PlanStatus.CERTIFICATE_FAILED: PlanReport.CERTIFICATE_FAILED,
     PlanStatus.TIMEOUT: PlanReport.TIMEOUT,
     PlanStatus.CANCELED: PlanReport.CANCELED,
@@ -104,8 +105,8 @@ def failure_report(code: int, sentence: str) -> PlanReport:
     """Return a report without numbers."""
     report = PlanReport(error_code=code, error_msg=sentence)
     for name in ('cost', 'effort', 'energy', 'collocation_residual', 'boundary_error',
-                 'hamiltonian_drift', 'tip_error', 'residual_vibration',
-                 'torque_interpolation_error'):
+                 'hamiltonian_drift', 'tip_error', 'residual_vibration', 'state_error',
+                 'costate_error', 'torque_interpolation_error'):
         setattr(report, name, float('inf'))
     return report
 
@@ -120,6 +121,8 @@ def report_from_plan(plan: Plan) -> PlanReport:
         setattr(report, name, float(getattr(plan, name)))
     for name in plan.certificate.__slots__:
         setattr(report, name, float(getattr(plan.certificate, name)))
+    report.switching_times = plan.switching_times.tolist()
+    report.saturation = plan.saturation.tolist()
     return report
 
 

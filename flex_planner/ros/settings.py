@@ -41,15 +41,15 @@ class PlannerSettings:
         read_only=True)
     base_frame: str = described('base_link', 'Frame of tip paths.', read_only=True)
     stages: int = described(
-        3, 'Gauss points in a mesh interval; the order is twice that.', lowest=2, highest=8)
-    intervals: int = described(60, 'Intervals of the first mesh.', lowest=4, highest=20000)
+        8, 'Gauss points in a mesh interval; the order is twice that.', lowest=2, highest=11)
+    intervals: int = described(20, 'Intervals of the first mesh.', lowest=4, highest=20000)
     max_intervals: int = described(
-        1000, 'Most intervals of a mesh.', lowest=4, highest=20000)
+        2000, 'Most intervals of a mesh.', lowest=4, highest=20000)
     max_iterations: int = described(
         60, 'Newton iterations on one mesh.', lowest=1, highest=1000)
-    defect_tolerance: float = described(
-        0.05, 'Largest defect of a mesh interval relative to the unknowns.',
-        lowest=1e-9, highest=1.0)
+    error_tolerance: float = described(
+        1e-6, 'Largest estimated error of states and costates relative to their magnitude.',
+        lowest=1e-11, highest=1.0)
     sampling_step: float = described(
         0.01, 'Longest time between published samples [s].', lowest=2.5e-4, highest=1.0)
     torque_tolerance: float = described(
@@ -87,7 +87,7 @@ class PlannerSettings:
         """Return the settings of the boundary-value solver."""
         return Settings(stages=self.stages, intervals=self.intervals,
                         max_intervals=self.max_intervals, max_iterations=self.max_iterations,
-                        defect_tolerance=self.defect_tolerance)
+                        error_tolerance=self.error_tolerance)
 
     def sampling(self) -> SamplingSettings:
         """Return how trajectories are sampled."""
