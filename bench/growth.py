@@ -1,0 +1,120 @@
+"""How the cost of a plan grows with links and modes, and where its time goes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+import json
+import statistics
+import subprocess
+import sys
+import time
+
+from bench.model import uniform_arm
+from bench.solver import paper_problem
+from flex_planner.arm import Arm, Motor
+from flex_planner.certify import certify
+from flex_planner.collocation import Settings
+from flex_planner.collocation.equations import collocation_residual, factorised, linearised
+from flex_planner.collocation.estimate import estimated
+from flex_planner.collocation.mesh import defects
+from flex_planner.model import ArmModel
+from flex_planner.path import plan_path
+from flex_planner.plan import Plan
+from flex_planner.progress import Monitor
+from flex_planner.strategies import cold_start
+from flex_planner.task import Task
+import numpy as np
+
+SIZES = [(n, m) for n in range(1, 5) for m in range(5) if n * m <= 8]
+TIME_LIMIT = 20.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Growth:
+    """A plan of an arm of equal links; memory is what the whole process took at most [MB]."""
+
+    links: int
+    modes: int
+    unknowns: int
+    solved: bool
+    strategy: str
+    seconds: float
+    iterations: int
+    intervals: int
+    memory: float
+
+
+def growth_task(links: int, modes: int) -> Task:
+    """Return a motion whose torques do not saturate: every joint turns by 0.6 rad in 2 s."""
+    arm = uniform_arm(links, modes)
+    strong = replace(arm.joints[0], motor=Motor(stall_torque=1e3))
+    arm = Arm(name=arm.name, links=arm.links, joints=(strong,) * links)
+    start = np.resize([0.5, -0.8], links)
+    return Task(arm=arm, start_positions=start, goal_positions=start + 0.6, duration=2.0,
+                payload_mass=1.0)
+
+
+def measure(links: int, modes: int) -> Growth:
+    """Return a row, measured in a process of its own."""
+    code = f'from bench.growth import report; report({links}, {modes})'
+    done = subprocess.run([sys.executable, '-c', code], check=True, capture_output=True,
+                          text=True)
+    return Growth(**json.loads(done.stdout.splitlines()[-1]))
+
+
+def report(links: int, modes: int) -> None:
+    """Plan a few times and print a row as JSON."""
+    task = growth_task(links, modes)
+    model = ArmModel(task.arm)
+    plans: list[Plan] = []
+    while len(plans) < 5 and sum(plan.planning_time for plan in plans) < 10:
+        plans.append(plan_path(task, model=model, monitor=Monitor(time_limit=TIME_LIMIT)))
+    peak = next(line for line in open('/proc/self/status') if line.startswith('VmHWM'))
+    last = plans[-1]
+    print(json.dumps({
+        'links': links, 'modes': modes, 'unknowns': 4 * task.arm.n_coordinates,
+        'solved': last.solved, 'strategy': last.strategy, 'iterations': last.iterations,
+        'seconds': statistics.median(plan.planning_time for plan in plans),
+        'intervals': last.mesh_intervals, 'memory': int(peak.split()[1]) / 1024}))
+
+
+def table(rows: list[Growth]) -> str:
+    """Return the rows as Markdown."""
+    lines = ['| links x modes | unknowns | plan [s] | Newton iterations | intervals '
+             '| strategy | memory of the process [MB] |', '|' + '---|' * 7]
+    for row in rows:
+        how = row.strategy if row.solved else 'not solved'
+        lines.append(f'| {row.links} x {row.modes} | {row.unknowns} | {row.seconds:.3g} '
+                     f'| {row.iterations} | {row.intervals} | {how} | {row.memory:.0f} |')
+    return '\n'.join(lines)
+
+
+def shares(payload: float = 1.0, repeats: int = 15) -> dict[str, float]:
+    """Return the time of each part of a plan on its final mesh [ms]."""
+    problem = paper_problem(payload)
+    result = cold_start(problem, Settings(), Monitor()).result
+    solution = result.solution.on_mesh(result.solution.mesh, Settings().rule)
+    _, mean = linearised(problem, solution, Monitor())
+    system = factorised(problem, solution, mean)
+    residual = collocation_residual(problem, solution)
+    parts: dict[str, Callable[[], object]] = {
+        "z' and its Jacobian at all stages": lambda: linearised(problem, solution, Monitor()),
+        'stage elimination and banded LU': lambda: factorised(problem, solution, mean),
+        'one correction with a given matrix': lambda: system.correction(residual),
+        'residual of a correction': lambda: collocation_residual(problem, solution),
+        'error estimate': lambda: estimated(problem, solution, system),
+        'defects for the mesh': lambda: defects(problem, solution),
+        'certificate': lambda: certify(problem, result, Monitor()),
+    }
+    return {name: 1e3 * _median(call, repeats) for name, call in parts.items()}
+
+
+def _median(call: Callable[[], object], repeats: int) -> float:
+    """Return the median duration of a call."""
+    times = []
+    for _ in range(repeats):
+        began = time.perf_counter()
+        call()
+        times.append(time.perf_counter() - began)
+    return statistics.median(times)
