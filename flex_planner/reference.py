@@ -86,7 +86,8 @@ def sample_reference(plan: Plan, settings: SamplingSettings,
     Raises
     ------
     InvalidTaskError
-        If even the longest step makes more than 20000 samples.
+        If even the longest step makes more than 20000 samples, or the motion does not end at
+        rest: a controller holds the last sample for ever.
     StoppedError
         If the monitor stopped it.
     ValueError
@@ -94,6 +95,9 @@ def sample_reference(plan: Plan, settings: SamplingSettings,
 
     """
     watch, duration = monitor or Monitor(), plan.task.duration
+    if not plan.task.ends_at_rest:
+        raise InvalidTaskError('the motion does not end at rest at its goal, where a controller '
+                               'would hold the arm')
     count = int(np.ceil(duration / settings.longest_step))
     if count > MAX_SAMPLES:
         raise InvalidTaskError(

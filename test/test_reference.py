@@ -152,3 +152,12 @@ def test_more_samples_than_a_message_should_hold_are_refused(flexible: Plan) -> 
 def test_sampling_listens_to_the_monitor(flexible: Plan) -> None:
     with pytest.raises(StoppedError):
         sample_reference(flexible, SamplingSettings(), Monitor(canceled=lambda: True))
+
+
+@pytest.mark.parametrize('change', [
+    {'goal_velocities': [0.1, 0.0]}, {'goal_position_weights': [1.0, 1.0]}])
+def test_motion_that_does_not_end_at_rest_is_no_reference(flexible: Plan,
+                                                          change: dict[str, Any]) -> None:
+    with pytest.raises(InvalidTaskError, match='does not end at rest'):
+        sample_reference(replace(flexible, task=replace(flexible.task, **change)),
+                         SamplingSettings())
