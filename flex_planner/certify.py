@@ -55,13 +55,10 @@ def certify(problem: MotionProblem, result: CollocationResult, monitor: Monitor,
     """
     if not np.isclose(result.solution.mesh[-1], problem.task.duration, rtol=1e-12):
         raise ValueError('the solution does not last as long as its task')
-    final = resimulated(problem.model, problem.p, problem.start,
-                        PlannedTorque.of(problem, result.solution), monitor,
-                        rtol=rtol, atol=rtol / 100)
+    final, reached = final_state(problem, result.solution, monitor, rtol)
     if not np.isfinite(final).all():
         return Certificate(collocation_residual=result.residual)
     arm, n_t = problem.model.arm, problem.model.arm.n_coordinates
-    reached = problem.reached(result.solution.nodes[-1, :2 * n_t])
     miss = final - reached
     tips = tip_position(arm, np.stack([final[:n_t], reached[:n_t]]))
     return Certificate(
@@ -72,6 +69,22 @@ def certify(problem: MotionProblem, result: CollocationResult, monitor: Monitor,
                                               problem.goal[:n_t], problem.parameters),
         state_error=float(result.errors[:2 * n_t].max()),
         costate_error=float(result.errors[2 * n_t:].max()))
+
+
+def final_state(problem: MotionProblem, solution: CollocationSolution, monitor: Monitor,
+                rtol: float) -> tuple[Array, Array]:
+    """
+    Return where the planned torque leads, and where it should, shape (2 n_t,) each.
+
+    Raises
+    ------
+    StoppedError
+        If the monitor stopped it.
+
+    """
+    final = resimulated(problem.model, problem.p, problem.start,
+                        PlannedTorque.of(problem, solution), monitor, rtol=rtol, atol=rtol / 100)
+    return final, problem.reached(solution.nodes[-1, :problem.goal.size])
 
 
 def _at_rest(problem: MotionProblem) -> Array:

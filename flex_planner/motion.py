@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from flex_planner.collocation import CollocationSolution, GaussRule
-from flex_planner.errors import InvalidTaskError
+from flex_planner.errors import InvalidTaskError, NoEquilibriumError
 from flex_planner.model import ArmModel, Parameters
 from flex_planner.statics import equilibrium, natural_modes
-from flex_planner.task import Task
+from flex_planner.task import MAX_PAYLOAD, Task
 from flex_planner.validation import Array
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 Indices = NDArray[np.intp]
 
 # of the highest natural frequency; an exact solution takes two or three times as many
 _POINTS_PER_CYCLE = 5.0
+# share of its stall torque by which a motor is said to be too weak for a buckled arm
+_OVERLOADED = 1e3
 
 
 class MotionProblem:
@@ -160,6 +165,34 @@ def _check_holding(torque: Array, parameters: Parameters) -> None:
             raise InvalidTaskError(
                 f'joint {i} needs {abs(needed):.4g} N m to hold the arm with its payload at the '
                 f'goal, but the stall torque of its motor is {stall:.4g} N m')
+
+
+def holding_limit(problem: MotionProblem) -> tuple[float, int]:
+    """
+    Return the payload [kg] that the motors just hold at the goal, and the joint that is first.
+
+    The payload is infinite where gravity does not load the joints, or motors have no limits.
+
+    """
+    model, parameters = problem.model, problem.parameters
+
+    def load(payload: float) -> Array:
+        """Return the share of the stall torque that each motor needs."""
+        try:
+            torque = equilibrium(model, problem.task.goal_positions,
+                                 replace(parameters, payload_mass=payload))[1]
+        except NoEquilibriumError:
+            return np.full(model.arm.n_joints, _OVERLOADED)
+        share: Array = np.abs(torque) / parameters.stall_torque
+        return share
+
+    heavy = 1.0
+    while load(heavy).max() < 1:
+        heavy *= 2
+        if heavy > MAX_PAYLOAD:
+            return np.inf, 0
+    limit = float(brentq(lambda payload: load(payload).max() - 1, 0.0, heavy, xtol=1e-12))
+    return limit, int(load(limit).argmax())
 
 
 def task_parameters(task: Task) -> Parameters:

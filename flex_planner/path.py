@@ -27,8 +27,8 @@ LADDER: tuple[tuple[str, Strategy], ...] = (
     *THOROUGH,
 )
 
-_STOPPED = {Status.TIMEOUT: PlanStatus.TIMEOUT, Status.CANCELED: PlanStatus.CANCELED}
-_STATUSES = {StopReason.TIMEOUT: PlanStatus.TIMEOUT, StopReason.CANCELED: PlanStatus.CANCELED}
+STOPPED = {Status.TIMEOUT: PlanStatus.TIMEOUT, Status.CANCELED: PlanStatus.CANCELED}
+STATUSES = {StopReason.TIMEOUT: PlanStatus.TIMEOUT, StopReason.CANCELED: PlanStatus.CANCELED}
 _REFINEMENTS = 2
 _REFINEMENT_FACTOR = 10.0
 _STRICTER = 100.0
@@ -72,11 +72,17 @@ def plan_path(task: Task, *, model: ArmModel | None = None, settings: Settings |
     rungs = LADDER
     if start_from is not None and start_from.solution is not None:
         rungs = (('warm start', warm_start(start_from.solution)), *LADDER)
+    return planned(problem, rungs, settings, monitor)
+
+
+def planned(problem: MotionProblem, rungs: tuple[tuple[str, Strategy], ...], settings: Settings,
+            monitor: Monitor) -> Plan:
+    """Return the certified plan of a problem by the first strategy that solves it."""
     try:
         plan = _planned(problem, rungs, settings, monitor)
     except StoppedError as stop:
-        plan = Plan(task=task, status=_STATUSES[stop.reason], message=str(stop), strategy='',
-                    problem=problem, solution=None)
+        plan = Plan(task=problem.task, status=STATUSES[stop.reason], message=str(stop),
+                    strategy='', problem=problem, solution=None)
     return replace(plan, iterations=monitor.iteration, planning_time=monitor.elapsed)
 
 
@@ -120,8 +126,8 @@ def _concluded(problem: MotionProblem, strategy: str, attempt: Attempt, settings
                 strategy=strategy, problem=problem, solution=None)
     if attempt.evidence:
         return replace(plan, status=PlanStatus.INFEASIBLE, message=attempt.evidence)
-    if result.status in _STOPPED:
-        return replace(plan, status=_STOPPED[result.status])
+    if result.status in STOPPED:
+        return replace(plan, status=STOPPED[result.status])
     return _certified(plan, result, settings, monitor) if result.converged else plan
 
 
@@ -135,7 +141,7 @@ def _first_solution(problem: MotionProblem, rungs: tuple[tuple[str, Strategy], .
         if attempt is None:
             continue
         last = attempt
-        if attempt.evidence or attempt.result.converged or attempt.result.status in _STOPPED:
+        if attempt.evidence or attempt.result.converged or attempt.result.status in STOPPED:
             return name, attempt
         names.append(name)
         failures.append(f'{name}: {attempt.result.message}')
@@ -152,7 +158,7 @@ def _certified(plan: Plan, result: CollocationResult, settings: Settings,
         try:
             certificate = certify(problem, result, monitor, rtol=1e-8 / _STRICTER**attempt)
         except StoppedError as stop:
-            return replace(plan, status=_STATUSES[stop.reason], message=str(stop))
+            return replace(plan, status=STATUSES[stop.reason], message=str(stop))
         total = totals(problem, result.solution)
         plan = replace(plan, solution=result.solution, certificate=certificate, cost=total.cost,
                        effort=total.effort, energy=total.energy,
@@ -166,8 +172,8 @@ def _certified(plan: Plan, result: CollocationResult, settings: Settings,
             settings = replace(settings, error_tolerance=max(
                 reached / _REFINEMENT_FACTOR, 1e-11))
             finer = solve(problem, result.solution, settings, monitor)
-            if finer.status in _STOPPED:
-                return replace(plan, status=_STOPPED[finer.status], message=finer.message)
+            if finer.status in STOPPED:
+                return replace(plan, status=STOPPED[finer.status], message=finer.message)
             # where the mesh is at its limit, the stricter integrator may still do
             result = finer if finer.converged else result
     return replace(plan, status=PlanStatus.CERTIFICATE_FAILED, message='; '.join(reasons))

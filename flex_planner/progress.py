@@ -39,6 +39,8 @@ class Progress:
         Size of the last Newton correction relative to the unknowns.
     intervals : int
         Intervals of the mesh.
+    payload : float
+        Payload tried [kg]; 0 where none is searched.
 
     """
 
@@ -46,6 +48,7 @@ class Progress:
     iteration: int
     residual: float
     intervals: int
+    payload: float = 0.0
 
 
 @dataclass(slots=True, kw_only=True)
@@ -68,6 +71,7 @@ class Monitor:
     canceled: Callable[[], bool] = lambda: False
     report: Callable[[Progress], None] = lambda progress: None
     phase: str = ''
+    payload: float = 0.0
     iteration: int = 0
     started: float = field(default_factory=time.monotonic)
 
@@ -94,4 +98,4 @@ class Monitor:
         """Count and report an iteration."""
         self.iteration += 1
         self.report(Progress(phase=self.phase, iteration=self.iteration, residual=residual,
-                             intervals=intervals))
+                             intervals=intervals, payload=self.payload))

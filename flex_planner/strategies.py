@@ -74,29 +74,35 @@ def _straight(problem: MotionProblem, settings: Settings) -> CollocationSolution
 def lifted_rigid_motion(problem: MotionProblem, settings: Settings,
                         monitor: Monitor) -> Attempt | None:
     """Start from the motion of the same arm made rigid, bent as gravity bends the ends."""
-    arm = problem.task.arm
-    if not arm.n_modes:
+    if not problem.task.arm.n_modes:
         return None
-    rigid = solve_rigid(problem, settings, monitor)
+    rigid = cold_start(rigid_problem(problem), settings, monitor).result
     if not rigid.converged:
         return Attempt(result=rigid)
+    guess = lifted(problem, rigid.solution, settings)
+    return Attempt(result=solve(problem, guess, settings, monitor))
+
+
+def lifted(problem: MotionProblem, rigid: CollocationSolution,
+           settings: Settings) -> CollocationSolution:
+    """Return a motion of the rigid arm as a guess for the flexible one."""
+    arm = problem.task.arm
     mesh = _straight(problem, settings).mesh
-    coarse = rigid.solution.on_mesh(mesh, settings.rule)
+    coarse = rigid.on_mesh(mesh, settings.rule)
     n, n_t = arm.n_joints, arm.n_coordinates
     joints = (np.arange(4)[:, None] * n_t + np.arange(n)).ravel()
 
-    def lifted(values: Array) -> Array:
+    def widened(values: Array) -> Array:
         full = np.zeros((*values.shape[:-1], 4 * n_t))
         full[..., joints] = values
         return full
 
-    nodes, stages = lifted(coarse.nodes), lifted(coarse.stages)
+    nodes, stages = widened(coarse.nodes), widened(coarse.stages)
     bends = problem.start[n:n_t], problem.goal[n:n_t]  # as gravity bends the arm
     way = (mesh / mesh[-1])[:, None]
     nodes[:, n:n_t] = bends[0] + way * (bends[1] - bends[0])
     stages[..., n:n_t] = (bends[1] - bends[0]) / mesh[-1]
-    guess = CollocationSolution(mesh, nodes, stages, coarse.rule)
-    return Attempt(result=solve(problem, guess, settings, monitor))
+    return CollocationSolution(mesh, nodes, stages, coarse.rule)
 
 
 def coarse_mesh(problem: MotionProblem, settings: Settings, monitor: Monitor) -> Attempt:
@@ -123,28 +129,52 @@ def coarse_mesh(problem: MotionProblem, settings: Settings, monitor: Monitor) ->
     return Attempt(result=result)
 
 
-def solve_rigid(problem: MotionProblem, settings: Settings,
-                monitor: Monitor) -> CollocationResult:
-    """Solve the task for the same arm made rigid, with the weights of the joints."""
+def rigid_problem(problem: MotionProblem) -> MotionProblem:
+    """Return the task for the same arm made rigid, with the weights of the joints."""
     task, n = problem.task, problem.task.arm.n_joints
     entries = ('position_weights', 'velocity_weights', 'start_velocities', 'goal_velocities',
                'goal_position_weights', 'goal_velocity_weights')
     rigid_task = replace(task, arm=task.arm.rigid(), **{
         name: getattr(task, name)[:n] for name in entries})
     parameters = replace(problem.parameters, rigidity=np.zeros(n),
-                         position_weights=rigid_task.position_weights,
-                         velocity_weights=rigid_task.velocity_weights)
-    rigid = MotionProblem(ArmModel(rigid_task.arm), rigid_task, parameters)
-    return cold_start(rigid, settings, monitor).result
+                         position_weights=problem.parameters.position_weights[:n],
+                         velocity_weights=problem.parameters.velocity_weights[:n])
+    return MotionProblem(ArmModel(rigid_task.arm), rigid_task, parameters)
 
 
 def walked_weights(problem: MotionProblem, settings: Settings,
                    monitor: Monitor) -> Attempt | None:
     """Start without position and velocity weights and raise them tenfold at a time."""
+    if not has_weights(problem):
+        return None
+    at, first_step = _weighted(problem)
+    return _walked(at, settings, monitor, first_step)
+
+
+def weights_raised(problem: MotionProblem, solution: CollocationSolution, settings: Settings,
+                   monitor: Monitor) -> CollocationResult:
+    """Start from the motion of the same task without position and velocity weights."""
+    if not has_weights(problem):
+        return solve(problem, solution, settings, monitor)
+    at, first_step = _weighted(problem)
+    return walk(at, solution, settings, monitor, first_step)
+
+
+def has_weights(problem: MotionProblem) -> bool:
+    """Return whether anything but effort counts on the way."""
+    parameters = problem.parameters
+    return bool(parameters.position_weights.any() or parameters.velocity_weights.any())
+
+
+def without_weights(problem: MotionProblem) -> MotionProblem:
+    """Return the problem with nothing but effort to count on the way."""
+    return _weighted(problem)[0](0.0)
+
+
+def _weighted(problem: MotionProblem) -> tuple[Callable[[float], MotionProblem], float]:
+    """Return the problem with its weights raised a share of the way, and the first share."""
     parameters = problem.parameters
     weights = np.concatenate([parameters.position_weights, parameters.velocity_weights])
-    if not weights.any():
-        return None
     decades = np.log10(max(float(weights.max()) / _FIRST_WEIGHT, 1.0))
 
     def at(way: float) -> MotionProblem:
@@ -152,7 +182,7 @@ def walked_weights(problem: MotionProblem, settings: Settings,
         return _with(problem, position_weights=share * parameters.position_weights,
                      velocity_weights=share * parameters.velocity_weights)
 
-    return _walked(at, settings, monitor, first_step=1 / (1 + decades))
+    return at, 1 / (1 + decades)
 
 
 def walked_vibration(problem: MotionProblem, settings: Settings,

@@ -103,8 +103,6 @@ def test_monitor_hears_the_name_of_each_strategy(
 def test_every_strategy_is_canceled_between_its_iterations(
         monkeypatch: pytest.MonkeyPatch, ei5_model: ArmModel, paper_task: TaskFactory,
         label: str, strategy: Strategy) -> None:
-    if label == 'duration walked down':
-        pytest.skip('the rigid arm makes it in time; test_limits.py cancels it')
     for last in (0, 1, 3):
         monitor = Monitor()
         monitor.canceled = lambda count=last, watch=monitor: watch.iteration >= count

@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 
 # density of nodes: at least this share of the largest, so that nothing is overlooked
 _LEAST_DENSITY = 0.1
+_SETTLED = 1e-13
 _ROOT_STEPS = 12
 # nodes closer than this share of the span are one
 _CLOSEST = 1e-9
@@ -78,9 +79,13 @@ def _roots(problem: BoundaryValueProblem, solution: CollocationSolution,
     """Return the zeros of bracketed functions: false position with Illinois' correction."""
     (a, f_a), (b, f_b) = low, high
     kept: Array = np.zeros(a.size)  # 1 where b was kept by the step before, -1 where a was
+    before, span = a, solution.mesh[-1] - solution.mesh[0]
     for _ in range(_ROOT_STEPS):
         gap = np.where(f_a == f_b, 1.0, f_b - f_a)
         c = np.clip(np.where(f_a == f_b, a, b - f_b * (b - a) / gap), a, b)
+        if np.abs(c - before).max() <= _SETTLED * span:
+            break
+        before = c
         f_c = problem.switches(c, solution(c))[np.arange(c.size), which]
         left = (f_c >= 0) == (f_a >= 0)
         # an end kept twice in a row counts half, else it would stay for ever
@@ -115,7 +120,7 @@ def levelled(solution: CollocationSolution, defect: Array, growth: float, switch
     switches : numpy.ndarray
         From :func:`switching_times`.
     fewest, most : int
-        Bounds of the number of intervals; the switches may need some more than `most`.
+        Bounds of the number of intervals, which is at least one more than the switches.
 
     """
     density = _density(solution, defect, switches)
@@ -125,8 +130,11 @@ def levelled(solution: CollocationSolution, defect: Array, growth: float, switch
     wanted *= total / wanted[-1]
     breaks = np.concatenate([solution.mesh[:1], switches, solution.mesh[-1:]])
     at_breaks = np.interp(breaks, solution.mesh, wanted)
-    pieces = [np.interp(np.linspace(a, b, max(1, round(float(b - a))) + 1), wanted,
-                        solution.mesh) for a, b in zip(at_breaks, at_breaks[1:], strict=False)]
+    counts = np.maximum(1, np.rint(np.diff(at_breaks))).astype(int)
+    while counts.sum() > most and counts.max() > 1:  # rounding made too many
+        counts[counts.argmax()] -= 1
+    pieces = [np.interp(np.linspace(a, b, count + 1), wanted, solution.mesh)
+              for a, b, count in zip(at_breaks, at_breaks[1:], counts, strict=False)]
     for piece, first, last in zip(pieces, breaks, breaks[1:], strict=False):
         piece[0], piece[-1] = first, last
     return np.concatenate([pieces[0][:1], *(piece[1:] for piece in pieces)])

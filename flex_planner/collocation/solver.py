@@ -254,8 +254,9 @@ class _Solver:
             return False
         self._placements += 1
         count = self._point.intervals
+        most = min(count + switches.size, max(count, self._settings.max_intervals))
         mesh = levelled(self._point, defects(self._problem, self._point), 1.0, switches,
-                        fewest=count, most=count)
+                        fewest=count, most=most)
         self._point = self._point.on_mesh(mesh)
         return True
 

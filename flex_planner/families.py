@@ -1,0 +1,394 @@
+"""
+Families of motions: heavier and heavier payloads, shorter and shorter durations.
+
+Each is followed at a rising price. With a payload at a price sigma per kilogram, the motion of
+least J - sigma m_p is one of least J for its payload, and dJ/dm_p is sigma there; as sigma grows
+without bound the payload comes to the most that the arm carries. So with the duration.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+from flex_planner.collocation import (
+    CollocationResult,
+    CollocationSolution,
+    Settings,
+    solve,
+    Status,
+)
+from flex_planner.continuation import STOPPED
+from flex_planner.errors import FlexPlannerError
+from flex_planner.extended_motion import FreeDurationProblem, payload_price, PayloadProblem
+from flex_planner.motion import MotionProblem
+from flex_planner.progress import Monitor
+from flex_planner.strategies import (
+    coarse_mesh,
+    cold_start,
+    DIRECTLY,
+    lifted,
+    rigid_problem,
+    warm_start,
+)
+from flex_planner.task import MAX_DURATION
+import numpy as np
+
+# from a payload or duration to how far from the limit is near enough
+Enough = Callable[[float], float]
+Family = Callable[[MotionProblem, CollocationResult, Settings, Monitor, Enough],
+                  Iterator['Stop']]
+Step = Callable[['Stop', float, Settings, Monitor], 'Stop | None']
+
+# errors on the way: payloads and durations are some hundred times as exact
+_TOLERANCE = 1e-2
+# of the price from one motion to the next; grows where that is easy, shrinks where it fails
+_FACTOR, _LARGEST_FACTOR, _SMALLEST_FACTOR = 4.0, 16.0, 1.02
+_EASY = 8
+# near a limit the price is raised to what leaves this share of the room that is wanted
+_CLOSE, _SURE, _LEAST_FACTOR = 0.2, 0.5, 1.5
+_SHORTER = 0.85
+_HEAVIER, _LEAST_MORE = 0.25, 0.1
+# largest mesh of a first motion, in units of the coarsest that overlooks nothing
+_FIRST_MESHES = 4
+# a rigid motion is lifted when its payload is so near to its limit, and few before are tried
+_LIFT, _LIFTS, _MOST_RIGID = 0.03, 3, 15
+
+
+def no_aim(value: float) -> float:
+    """Go as far as the prices lead."""
+    return 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Stop:
+    """
+    A motion on the way to a limit.
+
+    Attributes
+    ----------
+    value : float
+        Payload [kg] or duration [s].
+    price : float
+        What a little more payload, or a little less time, adds to J [1/kg, 1/s].
+    result : CollocationResult
+        Of the motion with this payload and duration; where it is not a solution, the family ends
+        for want of one.
+    problem : MotionProblem
+        That it solves.
+
+    """
+
+    value: float
+    price: float
+    result: CollocationResult
+    problem: MotionProblem
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the monitor ended the search here."""
+        return self.result.status in STOPPED
+
+    @property
+    def room(self) -> float:
+        """
+        How far the limit is at most: what the motors have left over the price of more.
+
+        J is convex along the family where no weights but R count, and cannot grow by more than
+        `reserve` as long as the motion stays of its kind.
+
+        """
+        return reserve(self.problem, self.result.solution) / self.price
+
+
+def reserve(problem: MotionProblem, solution: CollocationSolution) -> float:
+    """
+    Return what the cost of a motion would grow by with every motor on its limit all the time.
+
+    At the speeds and in the directions that it has; infinite for motors without limits.
+
+    """
+    model, parameters = problem.model, problem.parameters
+    n, n_t = model.arm.n_joints, model.arm.n_coordinates
+    z = solution.stage_values().reshape(-1, problem.size)
+    torque = model.controls(z, problem.p).torque
+    slowed = parameters.torque_slope * z[:, n_t:n_t + n]
+    bound = parameters.stall_torque - np.where(torque >= 0, slowed, -slowed)
+    weights = (solution.steps[:, None] * solution.rule.weights).ravel()
+    return float(weights @ ((bound**2 - torque**2) @ parameters.effort_weights)) / 2
+
+
+def heaviest(problem: MotionProblem, settings: Settings, monitor: Monitor, *,
+             enough: Enough = no_aim) -> Iterator[Stop]:
+    """
+    Yield heavier and heavier payloads from that of the problem on.
+
+    A flexible arm starts from the heavy end of the same arm made rigid: where the payload is free
+    at a price its motion is near, while with a given payload the phase of what rings is not.
+    Where that fails it starts from the payload of the problem.
+
+    """
+    return _family(problem, payloads, settings, monitor, enough)
+
+
+def quickest(problem: MotionProblem, settings: Settings, monitor: Monitor, *,
+             enough: Enough = no_aim) -> Iterator[Stop]:
+    """Yield shorter and shorter durations from that of the problem on, see `heaviest`."""
+    return _family(problem, durations, settings, monitor, enough)
+
+
+def _family(problem: MotionProblem, family: Family, settings: Settings, monitor: Monitor,
+            enough: Enough) -> Iterator[Stop]:
+    """Yield the motions of a family, the first one included."""
+    if problem.model.arm.n_modes:
+        first = _lifted_first(problem, family, settings, monitor)
+        if first is not None:
+            yield first
+            if not first.stopped:
+                yield from family(first.problem, first.result, settings, monitor, enough)
+            return
+    result = first_motion(problem, settings, monitor)
+    payload = family is payloads
+    yield Stop(value=problem.task.payload_mass if payload else problem.task.duration,
+               price=0.0, problem=problem, result=result)
+    if result.converged:
+        yield from family(problem, result, settings, monitor, enough)
+
+
+def _lifted_first(problem: MotionProblem, family: Family, settings: Settings,
+                  monitor: Monitor) -> Stop | None:
+    """Return the flexible motion at the price of a rigid one that is near its limit, or None."""
+    rigid = rigid_problem(problem)
+    first = cold_start(rigid, settings, monitor).result
+    if not first.converged:
+        return None
+    stops: list[Stop] = []
+    for stop in family(rigid, first, settings, monitor, lambda value: _LIFT * value):
+        stops.append(stop)
+        if stop.stopped or stop.room < _LIFT * stop.value or len(stops) == _MOST_RIGID:
+            break
+    for stop in reversed(stops[-_LIFTS:]):
+        if stop.stopped:
+            return stop
+        try:
+            found = _flexible(problem, stop, family is payloads, settings, monitor)
+        except FlexPlannerError:  # too heavy to hold
+            continue
+        if found is not None:
+            return found
+    return None
+
+
+def _flexible(problem: MotionProblem, stop: Stop, payload: bool, settings: Settings,
+              monitor: Monitor) -> Stop | None:
+    """Return the flexible motion at the price of a rigid one; None if there is none beyond."""
+    near = changed(problem, payload_mass=stop.problem.task.payload_mass,
+                   duration=stop.problem.task.duration)
+    guess, price = lifted(near, stop.result.solution, settings), stop.price
+    if payload:
+        found = _worth(near, guess, price, settings, monitor)
+        beyond = found is not None and found.value > problem.task.payload_mass
+    else:
+        found = _worth_time(near, guess, price, settings, monitor)
+        beyond = found is not None and found.value < problem.task.duration
+    return found if beyond or (found is not None and found.stopped) else None
+
+
+def payloads(problem: MotionProblem, first: CollocationResult, settings: Settings,
+             monitor: Monitor, enough: Enough = no_aim) -> Iterator[Stop]:
+    """
+    Yield heavier and heavier payloads, each with the motion of least effort that carries it.
+
+    Ends where no heavier one is found; if the monitor stops it, with a stop that says so. Where no
+    step in price succeeds, the payload is raised by itself.
+
+    Parameters
+    ----------
+    problem : MotionProblem
+        The motion with the first payload.
+    first : CollocationResult
+        Its solution.
+    settings, monitor
+        Of the solver, see `on_the_way`.
+    enough : callable
+        From a value to the room that is wanted there, see `Stop.room`; 0 for as little as there
+        is.
+
+    """
+    start = Stop(value=problem.task.payload_mass, result=first, problem=problem,
+                 price=_payload_price(problem, first.solution))
+    return _followed(start, _heavier, settings, monitor, enough)
+
+
+def durations(problem: MotionProblem, first: CollocationResult, settings: Settings,
+              monitor: Monitor, enough: Enough = no_aim) -> Iterator[Stop]:
+    """
+    Yield shorter and shorter durations, see `payloads`.
+
+    The phase of what rings in a flexible motion changes fast with its duration; where no step in
+    price succeeds, the duration is shortened by itself.
+
+    """
+    start = Stop(value=problem.task.duration, result=first, problem=problem,
+                 price=time_price(problem, first.solution))
+    return _followed(start, _quicker, settings, monitor, enough)
+
+
+def _followed(here: Stop, further: Step, settings: Settings, monitor: Monitor,
+              enough: Enough) -> Iterator[Stop]:
+    """Yield stops at higher and higher prices, as far apart as Newton's method allows."""
+    factor = _FACTOR if here.problem.model.arm.n_modes else _LARGEST_FACTOR
+    while factor > _SMALLEST_FACTOR:
+        monitor.payload = here.problem.task.payload_mass
+        try:
+            stop = further(here, min(factor, _aim(here, enough)), settings, monitor)
+        except FlexPlannerError:  # too heavy to hold, or absurd
+            stop = None
+        if stop is None:
+            factor **= 0.5
+            continue
+        yield stop
+        if stop.stopped:
+            return
+        if stop.result.iterations <= _EASY:
+            factor = min(factor**1.5, _LARGEST_FACTOR)
+        here = stop
+
+
+def _aim(here: Stop, enough: Enough) -> float:
+    """Return the factor in price that leaves about so much room: room goes with its square."""
+    room, wanted = here.room, enough(here.value)
+    if not wanted or not room < _CLOSE * here.value:
+        return _LARGEST_FACTOR
+    return max(float(np.sqrt(room / (_SURE * wanted))), _LEAST_FACTOR)
+
+
+def _heavier(here: Stop, factor: float, settings: Settings, monitor: Monitor) -> Stop | None:
+    """Return the next stop, a factor in price away or else a step in payload."""
+    price = here.price * factor
+    found = _worth(here.problem, here.result.solution, price, settings, monitor)
+    if found is not None and (found.stopped or found.value > here.value):
+        return found
+    more = max(_HEAVIER * here.value, _LEAST_MORE)
+    heavier = changed(here.problem, payload_mass=here.value + more)
+    there = solve(heavier, here.result.solution, settings, monitor)
+    if not there.converged:
+        return None
+    price = _payload_price(heavier, there.solution)
+    stop = Stop(value=here.value + more, result=there, problem=heavier, price=price)
+    return stop if price > here.price else None
+
+
+def _worth(problem: MotionProblem, guess: CollocationSolution, price: float, settings: Settings,
+           monitor: Monitor) -> Stop | None:
+    """Return the motion whose payload is worth a price, or None."""
+    ahead = PayloadProblem(problem.model, problem.task, problem.parameters, price)
+    found = solve(ahead, ahead.extended(guess), settings, monitor)
+    payload, inner = ahead.restricted(found.solution)
+    if found.status in STOPPED:
+        return Stop(value=payload, price=price, result=found, problem=problem)
+    if not found.converged or payload < 0:
+        return None
+    return Stop(value=payload, price=price, result=replace(found, solution=inner),
+                problem=ahead.with_payload(payload))
+
+
+def _quicker(here: Stop, factor: float, settings: Settings, monitor: Monitor) -> Stop | None:
+    """Return the next stop, a factor in price away or else a step in duration."""
+    price = here.price * factor
+    found = _worth_time(here.problem, here.result.solution, price, settings, monitor)
+    if found is not None and (found.stopped or found.value < here.value):
+        return found
+    shorter = changed(here.problem, duration=here.value * _SHORTER)
+    there = stretched(shorter, here.result.solution, settings, monitor)
+    if not there.converged:
+        return None
+    price = time_price(shorter, there.solution)
+    stop = Stop(value=shorter.task.duration, result=there, problem=shorter, price=price)
+    return stop if price > here.price else None
+
+
+def _worth_time(problem: MotionProblem, guess: CollocationSolution, price: float,
+                settings: Settings, monitor: Monitor) -> Stop | None:
+    """Return the motion whose duration is worth a price, or None."""
+    ahead = free(problem, price)
+    found = solve(ahead, ahead.extended(guess), settings, monitor)
+    duration = float(found.solution.nodes[0, -1])
+    if found.status in STOPPED:
+        return Stop(value=duration, price=price, result=found, problem=problem)
+    if not found.converged or not duration > 0:
+        return None
+    return Stop(value=duration, price=price, problem=ahead.fixed(duration),
+                result=replace(found, solution=ahead.restricted(found.solution)))
+
+
+def longer_durations(problem: MotionProblem, first: CollocationResult, settings: Settings,
+                     monitor: Monitor) -> Iterator[Stop]:
+    """Yield longer and longer durations, whose prices fall."""
+    here = first
+    while problem.task.duration / _SHORTER <= MAX_DURATION:
+        problem = changed(problem, duration=problem.task.duration / _SHORTER)
+        here = stretched(problem, here.solution, settings, monitor)
+        if not here.converged and here.status not in STOPPED:
+            return
+        yield Stop(value=problem.task.duration, price=time_price(problem, here.solution),
+                   result=here, problem=problem)
+
+
+def free(problem: MotionProblem, price: float) -> FreeDurationProblem:
+    """Return the motion with a free duration at a price per second."""
+    task = replace(problem.task, time_weight=price)
+    return FreeDurationProblem(MotionProblem(problem.model, task, problem.parameters))
+
+
+def stretched(problem: MotionProblem, solution: CollocationSolution, settings: Settings,
+              monitor: Monitor) -> CollocationResult:
+    """Solve a motion, starting from one of another duration, or else from nothing."""
+    for strategy in (warm_start(solution), cold_start, coarse_mesh):
+        attempt = strategy(problem, settings, monitor)
+        if attempt is not None and attempt.result.status is not Status.NEWTON_FAILED:
+            break
+    assert attempt is not None
+    return attempt.result
+
+
+def first_motion(problem: MotionProblem, settings: Settings,
+                 monitor: Monitor) -> CollocationResult:
+    """Return the first solution that strategies find, or the last failure: soon."""
+    most = max(_FIRST_MESHES * problem.fewest_intervals(settings.stages), 200)
+    quick = replace(settings, max_iterations=min(15, settings.max_iterations),
+                    max_intervals=min(most, settings.max_intervals),
+                    intervals=min(most, settings.intervals))
+    result = cold_start(problem, quick, monitor).result
+    for _, strategy in DIRECTLY:
+        if result.converged or result.status in STOPPED:
+            break
+        attempt = None if strategy is cold_start else strategy(problem, quick, monitor)
+        result = result if attempt is None else attempt.result
+    return result
+
+
+def changed(problem: MotionProblem, **changes: float) -> MotionProblem:
+    """Return the problem of a task changed in payload or duration."""
+    task = replace(problem.task, **changes)  # type: ignore[arg-type]
+    parameters = replace(problem.parameters, payload_mass=task.payload_mass)
+    return MotionProblem(problem.model, task, parameters)
+
+
+def on_the_way(settings: Settings, tolerance: float = _TOLERANCE) -> Settings:
+    """Return settings for motions on the way to a limit: exact and patient enough."""
+    wanted = max(min(tolerance, _TOLERANCE), settings.error_tolerance)
+    return replace(settings, error_tolerance=wanted,
+                   max_iterations=min(25, settings.max_iterations))
+
+
+def time_price(problem: MotionProblem, solution: CollocationSolution) -> float:
+    """Return -dJ/dt_f of a motion, -H, at least something positive."""
+    hamiltonian = problem.model.controls(solution.nodes, problem.p).hamiltonian
+    return max(-float(np.mean(hamiltonian)), 1e-3)
+
+
+def _payload_price(problem: MotionProblem, solution: CollocationSolution) -> float:
+    """Return dJ/dm_p of a motion, at least something positive."""
+    return max(payload_price(problem, solution), 1e-3)

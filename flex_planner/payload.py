@@ -1,0 +1,335 @@
+"""
+Maximum payload between two postures: Korayem et al. 2009, section 4.2.
+
+`find_max_payload` answers with a bracket: a payload that a certified plan carries, and one that
+is too much for the motors. What can be carried does not depend on the weights of the task: the
+direct search minimises effort alone, and the weights shape the plan at the end.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from enum import Enum
+
+from flex_planner.certify import totals
+from flex_planner.collocation import CollocationSolution, Settings, solve
+from flex_planner.errors import InvalidTaskError
+from flex_planner.families import changed, heaviest, on_the_way, payloads, Stop
+from flex_planner.incremental import PayloadTrial, raised_payload
+from flex_planner.limits import steady
+from flex_planner.model import ArmModel
+from flex_planner.motion import holding_limit, MotionProblem, task_parameters
+from flex_planner.path import LADDER, planned, STATUSES, STOPPED
+from flex_planner.plan import Plan, PlanStatus
+from flex_planner.progress import Monitor, StoppedError
+from flex_planner.strategies import Attempt, QUICK, Strategy, weights_raised, without_weights
+from flex_planner.task import MAX_PAYLOAD, Task
+from flex_planner.validation import Array, number
+import numpy as np
+
+_MOST_STOPS = 100
+_MIN_ACCURACY, _MAX_ACCURACY = 1e-6, 1e3
+# of the payload that the motors can just hold, kept clear of rounding
+_HELD = 1 - 1e-9
+# of motions on the way, by accuracy of the payload [1/kg]
+_EXACTNESS = 10.0
+
+
+class PayloadMethod(Enum):
+    """How the maximum payload is found; the value is shown to people."""
+
+    DIRECT = 'payload as an unknown at a rising price'
+    INCREMENTAL = 'payload raised step by step'
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PayloadFront:
+    """
+    What each payload costs, met on the way to the largest.
+
+    Attributes
+    ----------
+    payloads : numpy.ndarray, shape (k,)
+        Ascending [kg].
+    efforts : numpy.ndarray, shape (k,)
+        Least integral of R-weighted squared torques that carries it, J of eq. (6) without
+        weights but R [N^2 m^2 s].
+    prices : numpy.ndarray, shape (k,)
+        dJ/dm_p [N^2 m^2 s/kg].
+
+    """
+
+    payloads: Array = field(default_factory=lambda: np.zeros(0))
+    efforts: Array = field(default_factory=lambda: np.zeros(0))
+    prices: Array = field(default_factory=lambda: np.zeros(0))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MaxPayload:
+    """
+    The outcome of a search for the maximum payload, whether it succeeded or not.
+
+    Attributes
+    ----------
+    task : Task
+        What was asked; its payload is the least that is of interest.
+    method : PayloadMethod
+        How it was searched.
+    status : PlanStatus
+        ``SOLVED`` if the largest payload is in the bracket, ``INFEASIBLE`` if not even the task's
+        own payload can be carried.
+    message : str
+        The status in more words.
+    payload : float
+        Lower end of the bracket: the largest payload with a certified plan; 0 if there is
+        none [kg].
+    upper : float
+        Upper end: too much, see `Stop.room`, or what was tried in vain; ``inf`` if unknown [kg].
+    plan : Plan or None
+        The motion with `payload`.
+    limiting_joint : int or None
+        Index of the joint whose motor is on its limit for the largest share of the time, see
+        `Plan.saturation`, or that can hold no more at the goal.
+    held : bool
+        Whether the limit is what the motors hold at the goal.
+    front : PayloadFront
+        Payloads and their cost; empty if not searched by the direct method.
+    trials : tuple of PayloadTrial
+        Payloads tried; empty if not searched by the incremental method.
+    iterations : int
+        Newton iterations.
+    planning_time : float
+        [s].
+
+    """
+
+    task: Task
+    method: PayloadMethod
+    status: PlanStatus
+    message: str
+    payload: float = 0.0
+    upper: float = np.inf
+    plan: Plan | None = None
+    limiting_joint: int | None = None
+    held: bool = False
+    front: PayloadFront = field(default_factory=PayloadFront)
+    trials: tuple[PayloadTrial, ...] = ()
+    iterations: int = 0
+    planning_time: float = 0.0
+
+    @property
+    def solved(self) -> bool:
+        """Return whether the largest payload is known to the accuracy asked for."""
+        return self.status is PlanStatus.SOLVED
+
+
+def find_max_payload(task: Task, *, model: ArmModel | None = None,
+                     settings: Settings | None = None, monitor: Monitor | None = None,
+                     method: PayloadMethod = PayloadMethod.DIRECT, accuracy: float = 1e-3,
+                     step: float = 1.0) -> MaxPayload:
+    """
+    Find the largest payload that the arm can carry from start to goal in the task's duration.
+
+    Parameters
+    ----------
+    task : Task
+        The motion; the search starts at its payload.
+    model : ArmModel, optional
+        Of the task's arm; compiled or read from disk if not given.
+    settings : Settings, optional
+        Of the boundary-value solver.
+    monitor : Monitor, optional
+        Receives progress, and may cancel or limit the time.
+    method : PayloadMethod
+        ``DIRECT`` has the payload as an unknown, ``INCREMENTAL`` is that of the paper's fig. 2.
+    accuracy : float
+        Largest width of the bracket, 1e-6 to 1e3 [kg].
+    step : float
+        First step of the incremental method, `accuracy` to 1e6 [kg].
+
+    Returns
+    -------
+    MaxPayload
+        Check `MaxPayload.solved`: a failure is a status, not an exception.
+
+    Raises
+    ------
+    InvalidTaskError
+        If no motor has a limit, if the duration is free, if the arm need not come to rest at
+        the goal, or if a motor is too weak to hold the arm with the task's payload there.
+    InvalidValueError
+        If accuracy or step breaks its bound.
+
+    """
+    number('accuracy', accuracy, at_least=_MIN_ACCURACY, at_most=_MAX_ACCURACY, unit='kg')
+    number('step', step, at_least=accuracy, at_most=MAX_PAYLOAD, unit='kg')
+    _check(task)
+    monitor = monitor or Monitor()
+    search = _Search(MotionProblem(model or ArmModel(task.arm), task, task_parameters(task)),
+                     settings or Settings(), monitor, accuracy)
+    try:
+        found = (search.direct() if method is PayloadMethod.DIRECT else search.incremental(step))
+    except StoppedError as stop:
+        found = search.failed(method, STATUSES[stop.reason], str(stop))
+    return replace(found, iterations=monitor.iteration, planning_time=monitor.elapsed)
+
+
+def _check(task: Task) -> None:
+    """Refuse a task that has no largest payload."""
+    if not np.isfinite([joint.motor.stall_torque for joint in task.arm.joints]).any():
+        raise InvalidTaskError('no motor of the arm has a stall torque, so no payload is the '
+                               'largest')
+    if task.time_weight:
+        raise InvalidTaskError(f'time_weight is {task.time_weight:g}, but must be 0: the largest '
+                               'payload is that of a given duration')
+    if not task.ends_at_rest:
+        raise InvalidTaskError('the largest payload is that of a motion which ends at rest: '
+                               'goal_position_weights and goal_velocity_weights must be inf, '
+                               'goal_velocities 0')
+
+
+class _Search:
+    """What both methods share."""
+
+    def __init__(self, problem: MotionProblem, settings: Settings, monitor: Monitor,
+                 accuracy: float) -> None:
+        self._problem, self._settings, self._monitor = problem, settings, monitor
+        self._accuracy = accuracy
+        self._stops: list[Stop] = []
+
+    def failed(self, method: PayloadMethod, status: PlanStatus, message: str,
+               trials: Iterable[PayloadTrial] = ()) -> MaxPayload:
+        """Return the outcome of a search that found no plan."""
+        return MaxPayload(task=self._problem.task, method=method, status=status, message=message,
+                          front=_front(self._stops), trials=tuple(trials))
+
+    def direct(self) -> MaxPayload:
+        """Follow the price to the limit, then plan there."""
+        failure = self._follow_price()
+        if failure is not None:
+            return failure
+        last = self._stops[-1]
+        if last.stopped:
+            return self.failed(PayloadMethod.DIRECT, STOPPED[last.result.status],
+                               last.result.message)
+        near = _near(self._stops, self._accuracy)
+        plan = self._plan(last.value, last.result.solution)
+        found = MaxPayload(task=self._problem.task, method=PayloadMethod.DIRECT,
+                           status=plan.status, message=plan.message, front=_front(self._stops),
+                           payload=last.value, upper=last.value + last.room, plan=plan)
+        if not near:
+            found = self._held(last, found)
+        if not plan.solved:
+            return replace(found, payload=0.0)
+        if not near and not found.held:
+            return replace(found, status=PlanStatus.NOT_CONVERGED, message=(
+                f'{found.payload:.6g} kg can be carried, but it was not shown that no more can'))
+        return _described(found)
+
+    def _follow_price(self) -> MaxPayload | None:
+        """Collect stops up to the limit; return the failure if there is no first motion."""
+        bare, monitor = without_weights(self._problem), self._monitor
+        way = on_the_way(self._settings, _EXACTNESS * self._accuracy)
+        monitor.phase = 'payload at a rising price'
+        self._collect(heaviest(bare, way, monitor, enough=self._enough))
+        if self._stops[-1].result.converged or self._stops[-1].stopped:
+            return None
+        plan = planned(bare, LADDER, self._settings, monitor)
+        if plan.solution is None or not plan.solved:
+            return self.failed(PayloadMethod.DIRECT, plan.status, plan.message)
+        first = solve(bare, plan.solution, way, monitor)
+        self._stops = [Stop(value=bare.task.payload_mass, price=0.0, result=first, problem=bare)]
+        monitor.phase = 'payload at a rising price'
+        self._collect(payloads(bare, first, way, monitor, self._enough))
+        return None
+
+    def _enough(self, payload: float) -> float:
+        """Return the room that is near enough."""
+        return self._accuracy
+
+    def _collect(self, stops: Iterable[Stop]) -> None:
+        """Keep the stops up to the limit."""
+        for stop in stops:
+            self._stops.append(stop)
+            if (not stop.result.converged or len(self._stops) == _MOST_STOPS
+                    or _near(self._stops, self._accuracy)):
+                break
+
+    def _held(self, last: Stop, found: MaxPayload) -> MaxPayload:
+        """Return the outcome where the goal is what the motors can just hold, if it is."""
+        limit, joint = holding_limit(self._problem)
+        if not np.isfinite(limit) or limit * _HELD <= last.value:
+            return found
+        plan = self._plan(limit * _HELD, last.result.solution)
+        if not plan.solved:
+            return found
+        return replace(found, status=plan.status, payload=limit * _HELD, upper=limit, plan=plan,
+                       held=True, limiting_joint=joint)
+
+    def _plan(self, payload: float, start: CollocationSolution) -> Plan:
+        """Return the plan with a payload, from the motion of one like it."""
+        def found(problem: MotionProblem, settings: Settings, monitor: Monitor) -> Attempt:
+            return Attempt(result=weights_raised(problem, start, settings, monitor))
+
+        rungs: tuple[tuple[str, Strategy], ...] = (('payload found', found), *QUICK)
+        return planned(changed(self._problem, payload_mass=payload), rungs, self._settings,
+                       self._monitor)
+
+    def incremental(self, step: float) -> MaxPayload:
+        """Raise the payload of the task step by step."""
+        method = PayloadMethod.INCREMENTAL
+        first = planned(self._problem, LADDER, self._settings, self._monitor)
+        if first.solution is None or not first.solved:
+            return self.failed(method, first.status, first.message)
+        self._monitor.phase = 'payload raised'
+        trials, best, upper = [], (self._problem.task.payload_mass, first.solution), np.inf
+        for trial in raised_payload(self._problem, first.solution, step=step,
+                                    accuracy=self._accuracy, settings=self._settings,
+                                    monitor=self._monitor):
+            trials.append(trial)
+            if trial.stopped:
+                return self.failed(method, STOPPED[trial.result.status], trial.result.message,
+                                   trials)
+            if trial.solved:
+                best = trial.payload, trial.result.solution
+            else:
+                upper = trial.payload
+        plan = self._plan(*best)
+        found = MaxPayload(task=self._problem.task, method=method, status=plan.status,
+                           message=plan.message, payload=best[0] if plan.solved else 0.0,
+                           upper=upper, plan=plan, trials=tuple(trials))
+        return _described(found) if plan.solved else found
+
+
+def _near(stops: list[Stop], accuracy: float) -> bool:
+    """Return whether the last payload is the largest, to an accuracy."""
+    last = stops[-1]
+    if not last.price:
+        return False
+    if np.isfinite(last.room):
+        return last.room <= accuracy
+    return steady(stops, accuracy / (10 * last.value))  # a motor without limit is never full
+
+
+def _front(stops: list[Stop]) -> PayloadFront:
+    """Return what the payloads cost."""
+    priced = [stop for stop in stops if stop.price and stop.result.converged]
+    efforts = [totals(stop.problem, stop.result.solution).cost for stop in priced]
+    return PayloadFront(payloads=np.array([stop.value for stop in priced]),
+                        efforts=np.array(efforts), prices=np.array([s.price for s in priced]))
+
+
+def _described(found: MaxPayload) -> MaxPayload:
+    """Return a solved search in words, with its limiting motor."""
+    assert found.plan is not None
+    joint, shares = found.limiting_joint, found.plan.saturation
+    if joint is None:
+        joint = int(shares.argmax())
+        reason = f'joint {joint + 1} is on its limit for {shares[joint]:.1%} of the time'
+    else:
+        reason = f'joint {joint + 1} can hold no more at the goal'
+    return replace(found, limiting_joint=joint, message=(
+        f'{found.payload:.6g} kg can be carried, {found.upper:.6g} kg cannot: '
+        f'the motor of {reason}'))
