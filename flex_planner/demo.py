@@ -16,6 +16,7 @@ import time
 
 from flex_planner.arm import Arm
 from flex_planner.arm_files import load_arm
+from flex_planner.motion_report import certificate_rows, joint_rows, planning_row, table
 from flex_planner.plotting import draw_motion, Execution, Motion
 from flex_planner.ros.conversions import duration_seconds
 from flex_planner.ros.processes import NodeProcess
@@ -133,29 +134,19 @@ def _table(arm: Arm, report: PlanReport, delay: float, execution: Execution,
     late = execution.tip[execution.tip_times > DURATION + SETTLING / 2]
     errors = np.linalg.norm(late - GOAL, axis=1) * 1e3
     planning = duration_seconds(report.planning_time)
-    rows = [
+    return table([
         ('arm', arm.name),
         ('motion', f'{START} m to {GOAL} m in {DURATION:g} s with {PAYLOAD:g} kg'),
-        ('planned in', f'{planning:.2f} s ({report.strategy}, {report.iterations} iterations, '
-                       f'{report.mesh_intervals} intervals)'),
+        planning_row(planning, report.strategy, f'{report.iterations} iterations',
+                     f'{report.mesh_intervals} intervals'),
         ('on the topic after', f'{delay:.2f} s'),
-        ('cost J', f'{report.cost:.6f}')]
-    rows += [(f'joint {i}', f'peak speed {speed:.3f} rad/s ({share:.0%} of no-load speed), '
-                            f'peak torque {torque:.3f} N m (up to {part:.0%} of its limit)')
-             for i, (speed, share, torque, part) in enumerate(zip(
-                 report.peak_speeds, report.peak_speed_shares, report.peak_torques,
-                 report.peak_torque_shares, strict=True), 1)]
-    rows += [
-        ('certificate', 'every plan is checked by means that did not make it'),
-        ('  collocation residual', f'{report.collocation_residual:.1e}'),
-        ('  boundary error (eq. 17)', f'{report.boundary_error:.1e}'),
-        ('  Hamiltonian drift', f'{report.hamiltonian_drift:.1e}'),
-        ('  re-simulated tip error', f'{report.tip_error * 1e3:.1e} mm'),
-        ('  residual vibration', f'{report.residual_vibration * 1e3:.1e} mm'),
+        ('cost J', f'{report.cost:.6f}'),
+        *joint_rows(report.peak_speeds, report.peak_speed_shares, report.peak_torques,
+                    report.peak_torque_shares),
+        *certificate_rows(report),
         ('simulated arm, at rest', f'tip error {errors.max():.1e} mm, '
-                                   f'vibration {np.ptp(errors):.1e} mm')]
-    rows += [(name, str(path)) for name, path in files.items()]
-    return '\n'.join(f'{name:<26} {value}' for name, value in rows)
+                                   f'vibration {np.ptp(errors):.1e} mm'),
+        *((name, str(path)) for name, path in files.items())])
 
 
 def run(folder: Path) -> str:

@@ -9,7 +9,7 @@ It needs no costates to start from and returns them, from the multipliers of the
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 import time
 from typing import Any
@@ -49,6 +49,8 @@ class DirectSettings:
         Of IPOPT, 1 to 100000.
     tolerance : float
         Of IPOPT's scaled optimality error, 1e-14 to 1e-2.
+    free_payload : bool
+        Whether the payload is an unknown with a price, see `DirectProblem.solve`.
 
     Raises
     ------
@@ -62,6 +64,7 @@ class DirectSettings:
     intervals: int = 40
     max_iterations: int = 500
     tolerance: float = 1e-8
+    free_payload: bool = False
 
     def __post_init__(self) -> None:
         if self.scheme not in SCHEMES:
@@ -93,6 +96,8 @@ class DirectResult:
         What IPOPT says, or why it was stopped.
     cost : float
         J of eq. (6), by the quadrature of the scheme.
+    payload : float
+        m_p [kg].
     times, states, costates : numpy.ndarray, shapes (N + 1,), (N + 1, 2 n_t) twice
         (q, q') and (psi_1, psi_2) at the nodes of the mesh.
     point_times, point_states, point_costates : numpy.ndarray, shapes (k,), (k, 2 n_t) twice
@@ -112,6 +117,7 @@ class DirectResult:
     status: DirectStatus
     message: str
     cost: float
+    payload: float
     times: Array
     states: Array
     costates: Array
@@ -156,17 +162,19 @@ class DirectProblem:
         began = time.perf_counter()
         self.model, self.settings = model, settings or DirectSettings()
         self._mesh = Mesh.of(self.settings.scheme, self.settings.degree, self.settings.intervals)
-        self._programme = Programme.of(model.arm, self._mesh)
+        self._programme = Programme.of(model.arm, self._mesh, self.settings.free_payload)
         self._watch = self._programme.watch(self.settings.intervals)
         self._solvers: dict[bool, Any] = {}
         self._solver(warm=False)
         self.build_seconds = time.perf_counter() - began
 
     def solve(self, parameters: Parameters, start: Array, goal: Array, duration: float, *,
-              guess: Guess | None = None, warm: DirectResult | None = None,
+              guess: Guess | None = None, warm: DirectResult | None = None, price: float = 0.0,
               monitor: Monitor | None = None) -> DirectResult:
         """
         Minimise eq. (6) between two states within the motor limits of eq. (15).
+
+        With a free payload, minimise that less price times payload, from the given one on.
 
         Parameters
         ----------
@@ -181,6 +189,8 @@ class DirectProblem:
             straight line if not given.
         warm : DirectResult, optional
             Of this problem with other data: IPOPT starts from its unknowns and multipliers.
+        price : float
+            sigma of a free payload [1/kg].
         monitor : Monitor, optional
             Receives every iteration with the largest violation of a row, and may stop it.
 
@@ -198,14 +208,19 @@ class DirectProblem:
         iterate = warm.iterate if warm else {
             'x0': self._guessed(guess, parameters, duration) if guess
             else self._straight_line(start, goal, duration)}
+        prices = [price] if self.settings.free_payload else []
+        if prices and not warm:
+            iterate = {'x0': np.append(iterate['x0'], parameters.payload_mass)}
         self._watch.follow(monitor or Monitor())
         found = solver(**iterate, lbx=lower, ubx=upper, lbg=0, ubg=0,
-                       p=np.concatenate([parameters.stacked(), start, goal, [duration]]))
+                       p=np.concatenate([parameters.stacked(), start, goal, [duration], prices]))
         if self._watch.error is not None:
             raise self._watch.error
         arrays = {name: np.array(found[name])[:, 0] for name in ('x', 'lam_x', 'lam_g')}
-        return self._result(arrays, float(found['f']), solver.stats(), parameters, duration,
-                            time.perf_counter() - began)
+        payload = float(arrays['x'][-1]) if prices else parameters.payload_mass
+        cost = float(found['f']) + price * payload * len(prices)
+        return self._result(arrays, cost, solver.stats(), replace(
+            parameters, payload_mass=payload), duration, time.perf_counter() - began)
 
     def _solver(self, *, warm: bool) -> Any:
         """Return IPOPT for the programme, created once for each kind of start."""
@@ -222,7 +237,8 @@ class DirectProblem:
         upper[:, -arm.n_joints:] = parameters.stall_torque
         others = (mesh.P.shape[1] - mesh.points.size) * 2 * arm.n_coordinates
         both = np.concatenate([upper.ravel(), np.full(others, np.inf)])
-        return -both, both
+        free = int(self.settings.free_payload)
+        return np.append(-both, [0.0] * free), np.append(both, [np.inf] * free)
 
     def _guessed(self, guess: Guess, parameters: Parameters, duration: float) -> Array:
         """Return the unknowns on a motion with costates."""
@@ -259,12 +275,13 @@ class DirectProblem:
         arm, mesh = self.model.arm, self._mesh
         n, n_t, K = arm.n_joints, arm.n_coordinates, mesh.points.size
         y = arrays['x'][:K * (3 * n_t + n)].reshape(K, -1)
-        values = np.vstack([y[:, :2 * n_t], arrays['x'][y.size:].reshape(-1, 2 * n_t)])
+        others = arrays['x'][y.size:arrays['x'].size - self.settings.free_payload]
+        values = np.vstack([y[:, :2 * n_t], others.reshape(-1, 2 * n_t)])
         rows = arrays['lam_g'][:mesh.P.shape[0] * 2 * n_t].reshape(-1, 2 * n_t)
         costates, point_costates = mesh.costates(rows)
         status, message = _outcome(stats, self._watch.stopped)
         return DirectResult(
-            status=status, message=message, cost=cost,
+            status=status, message=message, cost=cost, payload=parameters.payload_mass,
             times=np.linspace(0, duration, mesh.nodes.size, dtype=np.float64),
             states=values[mesh.nodes], costates=costates, point_times=duration * mesh.points,
             point_states=values[:K], point_costates=point_costates,

@@ -27,9 +27,6 @@ from flex_planner.progress import Monitor
 from flex_planner.strategies import (
     coarse_mesh,
     cold_start,
-    DIRECTLY,
-    lifted,
-    rigid_problem,
     warm_start,
 )
 from flex_planner.task import MAX_DURATION
@@ -47,13 +44,11 @@ _TOLERANCE = 1e-2
 _FACTOR, _LARGEST_FACTOR, _SMALLEST_FACTOR = 4.0, 16.0, 1.02
 _EASY = 8
 # near a limit the price is raised to what leaves this share of the room that is wanted
-_CLOSE, _SURE, _LEAST_FACTOR = 0.2, 0.5, 1.5
+_CLOSE, _SURE, _LEAST_FACTOR = 0.2, 0.6, 1.5
+# the room falls with this power of the price: 2 for rigid arms, less where links ring
+_POWER = 1.5
 _SHORTER = 0.85
 _HEAVIER, _LEAST_MORE = 0.25, 0.1
-# largest mesh of a first motion, in units of the coarsest that overlooks nothing
-_FIRST_MESHES = 4
-# a rigid motion is lifted when its payload is so near to its limit, and few before are tried
-_LIFT, _LIFTS, _MOST_RIGID = 0.03, 3, 15
 
 
 def no_aim(value: float) -> float:
@@ -119,82 +114,6 @@ def reserve(problem: MotionProblem, solution: CollocationSolution) -> float:
     return float(weights @ ((bound**2 - torque**2) @ parameters.effort_weights)) / 2
 
 
-def heaviest(problem: MotionProblem, settings: Settings, monitor: Monitor, *,
-             enough: Enough = no_aim) -> Iterator[Stop]:
-    """
-    Yield heavier and heavier payloads from that of the problem on.
-
-    A flexible arm starts from the heavy end of the same arm made rigid: where the payload is free
-    at a price its motion is near, while with a given payload the phase of what rings is not.
-    Where that fails it starts from the payload of the problem.
-
-    """
-    return _family(problem, payloads, settings, monitor, enough)
-
-
-def quickest(problem: MotionProblem, settings: Settings, monitor: Monitor, *,
-             enough: Enough = no_aim) -> Iterator[Stop]:
-    """Yield shorter and shorter durations from that of the problem on, see `heaviest`."""
-    return _family(problem, durations, settings, monitor, enough)
-
-
-def _family(problem: MotionProblem, family: Family, settings: Settings, monitor: Monitor,
-            enough: Enough) -> Iterator[Stop]:
-    """Yield the motions of a family, the first one included."""
-    if problem.model.arm.n_modes:
-        first = _lifted_first(problem, family, settings, monitor)
-        if first is not None:
-            yield first
-            if not first.stopped:
-                yield from family(first.problem, first.result, settings, monitor, enough)
-            return
-    result = first_motion(problem, settings, monitor)
-    payload = family is payloads
-    yield Stop(value=problem.task.payload_mass if payload else problem.task.duration,
-               price=0.0, problem=problem, result=result)
-    if result.converged:
-        yield from family(problem, result, settings, monitor, enough)
-
-
-def _lifted_first(problem: MotionProblem, family: Family, settings: Settings,
-                  monitor: Monitor) -> Stop | None:
-    """Return the flexible motion at the price of a rigid one that is near its limit, or None."""
-    rigid = rigid_problem(problem)
-    first = cold_start(rigid, settings, monitor).result
-    if not first.converged:
-        return None
-    stops: list[Stop] = []
-    for stop in family(rigid, first, settings, monitor, lambda value: _LIFT * value):
-        stops.append(stop)
-        if stop.stopped or stop.room < _LIFT * stop.value or len(stops) == _MOST_RIGID:
-            break
-    for stop in reversed(stops[-_LIFTS:]):
-        if stop.stopped:
-            return stop
-        try:
-            found = _flexible(problem, stop, family is payloads, settings, monitor)
-        except FlexPlannerError:  # too heavy to hold
-            continue
-        if found is not None:
-            return found
-    return None
-
-
-def _flexible(problem: MotionProblem, stop: Stop, payload: bool, settings: Settings,
-              monitor: Monitor) -> Stop | None:
-    """Return the flexible motion at the price of a rigid one; None if there is none beyond."""
-    near = changed(problem, payload_mass=stop.problem.task.payload_mass,
-                   duration=stop.problem.task.duration)
-    guess, price = lifted(near, stop.result.solution, settings), stop.price
-    if payload:
-        found = _worth(near, guess, price, settings, monitor)
-        beyond = found is not None and found.value > problem.task.payload_mass
-    else:
-        found = _worth_time(near, guess, price, settings, monitor)
-        beyond = found is not None and found.value < problem.task.duration
-    return found if beyond or (found is not None and found.stopped) else None
-
-
 def payloads(problem: MotionProblem, first: CollocationResult, settings: Settings,
              monitor: Monitor, enough: Enough = no_aim) -> Iterator[Stop]:
     """
@@ -257,17 +176,17 @@ def _followed(here: Stop, further: Step, settings: Settings, monitor: Monitor,
 
 
 def _aim(here: Stop, enough: Enough) -> float:
-    """Return the factor in price that leaves about so much room: room goes with its square."""
+    """Return the factor in price that leaves about so much room."""
     room, wanted = here.room, enough(here.value)
     if not wanted or not room < _CLOSE * here.value:
         return _LARGEST_FACTOR
-    return max(float(np.sqrt(room / (_SURE * wanted))), _LEAST_FACTOR)
+    return max(float((room / (_SURE * wanted)) ** (1 / _POWER)), _LEAST_FACTOR)
 
 
 def _heavier(here: Stop, factor: float, settings: Settings, monitor: Monitor) -> Stop | None:
     """Return the next stop, a factor in price away or else a step in payload."""
     price = here.price * factor
-    found = _worth(here.problem, here.result.solution, price, settings, monitor)
+    found = worth(here.problem, here.result.solution, price, settings, monitor)
     if found is not None and (found.stopped or found.value > here.value):
         return found
     more = max(_HEAVIER * here.value, _LEAST_MORE)
@@ -280,8 +199,8 @@ def _heavier(here: Stop, factor: float, settings: Settings, monitor: Monitor) ->
     return stop if price > here.price else None
 
 
-def _worth(problem: MotionProblem, guess: CollocationSolution, price: float, settings: Settings,
-           monitor: Monitor) -> Stop | None:
+def worth(problem: MotionProblem, guess: CollocationSolution, price: float, settings: Settings,
+          monitor: Monitor) -> Stop | None:
     """Return the motion whose payload is worth a price, or None."""
     ahead = PayloadProblem(problem.model, problem.task, problem.parameters, price)
     found = solve(ahead, ahead.extended(guess), settings, monitor)
@@ -297,7 +216,7 @@ def _worth(problem: MotionProblem, guess: CollocationSolution, price: float, set
 def _quicker(here: Stop, factor: float, settings: Settings, monitor: Monitor) -> Stop | None:
     """Return the next stop, a factor in price away or else a step in duration."""
     price = here.price * factor
-    found = _worth_time(here.problem, here.result.solution, price, settings, monitor)
+    found = worth_time(here.problem, here.result.solution, price, settings, monitor)
     if found is not None and (found.stopped or found.value < here.value):
         return found
     shorter = changed(here.problem, duration=here.value * _SHORTER)
@@ -309,8 +228,8 @@ def _quicker(here: Stop, factor: float, settings: Settings, monitor: Monitor) ->
     return stop if price > here.price else None
 
 
-def _worth_time(problem: MotionProblem, guess: CollocationSolution, price: float,
-                settings: Settings, monitor: Monitor) -> Stop | None:
+def worth_time(problem: MotionProblem, guess: CollocationSolution, price: float,
+               settings: Settings, monitor: Monitor) -> Stop | None:
     """Return the motion whose duration is worth a price, or None."""
     ahead = free(problem, price)
     found = solve(ahead, ahead.extended(guess), settings, monitor)
@@ -351,22 +270,6 @@ def stretched(problem: MotionProblem, solution: CollocationSolution, settings: S
             break
     assert attempt is not None
     return attempt.result
-
-
-def first_motion(problem: MotionProblem, settings: Settings,
-                 monitor: Monitor) -> CollocationResult:
-    """Return the first solution that strategies find, or the last failure: soon."""
-    most = max(_FIRST_MESHES * problem.fewest_intervals(settings.stages), 200)
-    quick = replace(settings, max_iterations=min(15, settings.max_iterations),
-                    max_intervals=min(most, settings.max_intervals),
-                    intervals=min(most, settings.intervals))
-    result = cold_start(problem, quick, monitor).result
-    for _, strategy in DIRECTLY:
-        if result.converged or result.status in STOPPED:
-            break
-        attempt = None if strategy is cold_start else strategy(problem, quick, monitor)
-        result = result if attempt is None else attempt.result
-    return result
 
 
 def changed(problem: MotionProblem, **changes: float) -> MotionProblem:

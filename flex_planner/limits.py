@@ -18,14 +18,13 @@ from flex_planner.families import (
     changed,
     durations,
     free,
-    heaviest,
     longer_durations,
     on_the_way,
-    quickest,
     Stop,
     stretched,
     time_price,
 )
+from flex_planner.family_starts import heaviest, quickest
 from flex_planner.motion import MotionProblem
 from flex_planner.progress import Monitor
 from flex_planner.strategies import (

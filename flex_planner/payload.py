@@ -16,25 +16,27 @@ from enum import Enum
 from flex_planner.certify import totals
 from flex_planner.collocation import CollocationSolution, Settings, solve
 from flex_planner.errors import InvalidTaskError
-from flex_planner.families import changed, heaviest, on_the_way, payloads, Stop
+from flex_planner.families import changed, on_the_way, payloads, Stop
+from flex_planner.family_starts import heaviest
 from flex_planner.incremental import PayloadTrial, raised_payload
-from flex_planner.limits import steady
+from flex_planner.ladder import LADDER, planned, STATUSES, STOPPED
+from flex_planner.limit_search import collected, is_near, plan_near
 from flex_planner.model import ArmModel
 from flex_planner.motion import holding_limit, MotionProblem, task_parameters
-from flex_planner.path import LADDER, planned, STATUSES, STOPPED
 from flex_planner.plan import Plan, PlanStatus
 from flex_planner.progress import Monitor, StoppedError
-from flex_planner.strategies import Attempt, QUICK, Strategy, weights_raised, without_weights
+from flex_planner.strategies import without_weights
 from flex_planner.task import MAX_PAYLOAD, Task
 from flex_planner.validation import Array, number
 import numpy as np
 
-_MOST_STOPS = 100
 _MIN_ACCURACY, _MAX_ACCURACY = 1e-6, 1e3
 # of the payload that the motors can just hold, kept clear of rounding
 _HELD = 1 - 1e-9
 # of motions on the way, by accuracy of the payload [1/kg]
 _EXACTNESS = 10.0
+# share of the payload that the room of a start should be
+_MIDDLE = 0.01
 
 
 class PayloadMethod(Enum):
@@ -98,6 +100,8 @@ class MaxPayload:
         Payloads and their cost; empty if not searched by the direct method.
     trials : tuple of PayloadTrial
         Payloads tried; empty if not searched by the incremental method.
+    stops : tuple of Stop
+        The motions of the front.
     iterations : int
         Newton iterations.
     planning_time : float
@@ -116,6 +120,7 @@ class MaxPayload:
     held: bool = False
     front: PayloadFront = field(default_factory=PayloadFront)
     trials: tuple[PayloadTrial, ...] = ()
+    stops: tuple[Stop, ...] = field(default=(), repr=False)
     iterations: int = 0
     planning_time: float = 0.0
 
@@ -124,11 +129,17 @@ class MaxPayload:
         """Return whether the largest payload is known to the accuracy asked for."""
         return self.status is PlanStatus.SOLVED
 
+    @property
+    def middle(self) -> Stop | None:
+        """Return the last motion that leaves some room: a start for searches of its kind."""
+        roomy = [stop for stop in self.stops if stop.room >= _MIDDLE * stop.value]
+        return roomy[-1] if roomy else next(iter(self.stops), None)
+
 
 def find_max_payload(task: Task, *, model: ArmModel | None = None,
                      settings: Settings | None = None, monitor: Monitor | None = None,
                      method: PayloadMethod = PayloadMethod.DIRECT, accuracy: float = 1e-3,
-                     step: float = 1.0) -> MaxPayload:
+                     step: float = 1.0, start_from: MaxPayload | None = None) -> MaxPayload:
     """
     Find the largest payload that the arm can carry from start to goal in the task's duration.
 
@@ -148,6 +159,8 @@ def find_max_payload(task: Task, *, model: ArmModel | None = None,
         Largest width of the bracket, 1e-6 to 1e3 [kg].
     step : float
         First step of the incremental method, `accuracy` to 1e6 [kg].
+    start_from : MaxPayload, optional
+        A search of a similar task by the direct method, tried first.
 
     Returns
     -------
@@ -167,13 +180,18 @@ def find_max_payload(task: Task, *, model: ArmModel | None = None,
     number('step', step, at_least=accuracy, at_most=MAX_PAYLOAD, unit='kg')
     _check(task)
     monitor = monitor or Monitor()
+    before = monitor.iteration, monitor.elapsed
     search = _Search(MotionProblem(model or ArmModel(task.arm), task, task_parameters(task)),
                      settings or Settings(), monitor, accuracy)
     try:
-        found = (search.direct() if method is PayloadMethod.DIRECT else search.incremental(step))
+        if method is PayloadMethod.DIRECT:
+            found = search.direct(start_from.middle if start_from else None)
+        else:
+            found = search.incremental(step)
     except StoppedError as stop:
         found = search.failed(method, STATUSES[stop.reason], str(stop))
-    return replace(found, iterations=monitor.iteration, planning_time=monitor.elapsed)
+    return replace(found, iterations=monitor.iteration - before[0],
+                   planning_time=monitor.elapsed - before[1])
 
 
 def _check(task: Task) -> None:
@@ -203,21 +221,23 @@ class _Search:
                trials: Iterable[PayloadTrial] = ()) -> MaxPayload:
         """Return the outcome of a search that found no plan."""
         return MaxPayload(task=self._problem.task, method=method, status=status, message=message,
-                          front=_front(self._stops), trials=tuple(trials))
+                          front=_front(self._stops), stops=_priced(self._stops),
+                          trials=tuple(trials))
 
-    def direct(self) -> MaxPayload:
+    def direct(self, start: Stop | None) -> MaxPayload:
         """Follow the price to the limit, then plan there."""
-        failure = self._follow_price()
+        failure = self._follow_price(start)
         if failure is not None:
             return failure
         last = self._stops[-1]
         if last.stopped:
             return self.failed(PayloadMethod.DIRECT, STOPPED[last.result.status],
                                last.result.message)
-        near = _near(self._stops, self._accuracy)
+        near = is_near(self._stops, self._accuracy)
         plan = self._plan(last.value, last.result.solution)
         found = MaxPayload(task=self._problem.task, method=PayloadMethod.DIRECT,
-                           status=plan.status, message=plan.message, front=_front(self._stops),
+                           status=plan.status, message=plan.message,
+                           front=_front(self._stops), stops=_priced(self._stops),
                            payload=last.value, upper=last.value + last.room, plan=plan)
         if not near:
             found = self._held(last, found)
@@ -228,12 +248,13 @@ class _Search:
                 f'{found.payload:.6g} kg can be carried, but it was not shown that no more can'))
         return _described(found)
 
-    def _follow_price(self) -> MaxPayload | None:
+    def _follow_price(self, start: Stop | None) -> MaxPayload | None:
         """Collect stops up to the limit; return the failure if there is no first motion."""
         bare, monitor = without_weights(self._problem), self._monitor
         way = on_the_way(self._settings, _EXACTNESS * self._accuracy)
         monitor.phase = 'payload at a rising price'
-        self._collect(heaviest(bare, way, monitor, enough=self._enough))
+        self._stops = collected(heaviest(bare, way, monitor, start=start, enough=self._enough),
+                                self._accuracy)
         if self._stops[-1].result.converged or self._stops[-1].stopped:
             return None
         plan = planned(bare, LADDER, self._settings, monitor)
@@ -242,20 +263,13 @@ class _Search:
         first = solve(bare, plan.solution, way, monitor)
         self._stops = [Stop(value=bare.task.payload_mass, price=0.0, result=first, problem=bare)]
         monitor.phase = 'payload at a rising price'
-        self._collect(payloads(bare, first, way, monitor, self._enough))
+        self._stops += collected(payloads(bare, first, way, monitor, self._enough),
+                                 self._accuracy)
         return None
 
     def _enough(self, payload: float) -> float:
         """Return the room that is near enough."""
         return self._accuracy
-
-    def _collect(self, stops: Iterable[Stop]) -> None:
-        """Keep the stops up to the limit."""
-        for stop in stops:
-            self._stops.append(stop)
-            if (not stop.result.converged or len(self._stops) == _MOST_STOPS
-                    or _near(self._stops, self._accuracy)):
-                break
 
     def _held(self, last: Stop, found: MaxPayload) -> MaxPayload:
         """Return the outcome where the goal is what the motors can just hold, if it is."""
@@ -270,12 +284,8 @@ class _Search:
 
     def _plan(self, payload: float, start: CollocationSolution) -> Plan:
         """Return the plan with a payload, from the motion of one like it."""
-        def found(problem: MotionProblem, settings: Settings, monitor: Monitor) -> Attempt:
-            return Attempt(result=weights_raised(problem, start, settings, monitor))
-
-        rungs: tuple[tuple[str, Strategy], ...] = (('payload found', found), *QUICK)
-        return planned(changed(self._problem, payload_mass=payload), rungs, self._settings,
-                       self._monitor)
+        return plan_near(changed(self._problem, payload_mass=payload), start, self._settings,
+                         self._monitor)
 
     def incremental(self, step: float) -> MaxPayload:
         """Raise the payload of the task step by step."""
@@ -303,19 +313,14 @@ class _Search:
         return _described(found) if plan.solved else found
 
 
-def _near(stops: list[Stop], accuracy: float) -> bool:
-    """Return whether the last payload is the largest, to an accuracy."""
-    last = stops[-1]
-    if not last.price:
-        return False
-    if np.isfinite(last.room):
-        return last.room <= accuracy
-    return steady(stops, accuracy / (10 * last.value))  # a motor without limit is never full
+def _priced(stops: list[Stop]) -> tuple[Stop, ...]:
+    """Return the stops that are motions of least effort."""
+    return tuple(stop for stop in stops if stop.price and stop.result.converged)
 
 
 def _front(stops: list[Stop]) -> PayloadFront:
     """Return what the payloads cost."""
-    priced = [stop for stop in stops if stop.price and stop.result.converged]
+    priced = _priced(stops)
     efforts = [totals(stop.problem, stop.result.solution).cost for stop in priced]
     return PayloadFront(payloads=np.array([stop.value for stop in priced]),
                         efforts=np.array(efforts), prices=np.array([s.price for s in priced]))

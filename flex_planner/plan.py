@@ -10,6 +10,7 @@ from flex_planner.collocation import CollocationSolution
 from flex_planner.kinematics import tip_position
 from flex_planner.model import ArmModel
 from flex_planner.motion import MotionProblem
+from flex_planner.objectives import ObjectiveSearch
 from flex_planner.task import Task
 from flex_planner.validation import Array
 import numpy as np
@@ -22,6 +23,7 @@ class PlanStatus(Enum):
     NOT_CONVERGED = 'not converged, which does not show that the motion is impossible'
     INFEASIBLE = 'impossible within the limits of the motors'
     CERTIFICATE_FAILED = 'converged, but the re-simulated motion misses its tolerances'
+    OBJECTIVE_NOT_MET = 'an objective cannot be met, this is the closest motion'
     TIMEOUT = 'time limit reached'
     CANCELED = 'canceled'
 
@@ -126,6 +128,8 @@ class Plan:
         When a motor reaches or leaves its limit [s].
     saturation : numpy.ndarray, shape (n,)
         Share of the time that each motor spends on its limit.
+    objectives : ObjectiveSearch or None
+        How objectives were met; None if there are none.
     iterations : int
         Newton iterations, failed strategies included.
     planning_time : float
@@ -145,6 +149,7 @@ class Plan:
     energy: float = np.inf
     switching_times: Array = field(default_factory=lambda: np.zeros(0))
     saturation: Array = field(default_factory=lambda: np.zeros(0))
+    objectives: ObjectiveSearch | None = None
     iterations: int = 0
     planning_time: float = 0.0
 

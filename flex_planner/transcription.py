@@ -123,13 +123,17 @@ class _Point:
     CasADi functions of one point with unknowns y and parameters p.
 
     ``cost`` (y, p) -> L, dL/dy; ``force`` (y, p) -> M a + h - B u, its Jacobian; ``hessian``
-    (y, p, s, mu) -> upper triangle of the Hessian of s L + mu^T (M a + h - B u).
+    (y, p, s, mu) -> upper triangle of the Hessian of s L + mu^T (M a + h - B u); ``share``
+    (y, p) -> d(M a + h)/dm_p, in which the force is linear; ``bend`` (y, p, mu) -> the gradient
+    of mu^T times that.
 
     """
 
     cost: Any
     force: Any
     hessian: Any
+    share: Any
+    bend: Any
 
     @classmethod
     def of(cls, arm: Arm) -> _Point:
@@ -148,9 +152,13 @@ class _Point:
         L = (ca.dot(W_1 * q, q) + ca.dot(W_2 * v, v) + ca.dot(R * u, u)) / 2
         force = chain.inverse_dynamics(a) - ca.vertcat(u, ca.SX(n_t - n, 1))
         hessian = ca.triu(ca.hessian(s * L + ca.dot(mu, force), y)[0])
+        share = ca.densify(ca.jacobian(force, chain.payload_mass))
+        bend = ca.densify(ca.gradient(ca.dot(mu, share), y))
         return cls(ca.Function('cost', [y, p], [L, ca.densify(ca.gradient(L, y))]),
                    ca.Function('force', [y, p], [force, ca.jacobian(force, y)]),
-                   ca.Function('hessian', [y, p, s, mu], [hessian]))
+                   ca.Function('hessian', [y, p, s, mu], [hessian]),
+                   ca.Function('share', [y, p], [share]),
+                   ca.Function('bend', [y, p, mu], [bend]))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -158,8 +166,9 @@ class Programme:
     """
     A nonlinear programme and its derivatives, as CasADi's ``nlpsol`` takes them.
 
-    Unknowns are y at the points, then x at the nodes that are no points; parameters are p, x at
-    both ends and the duration. All rows are equations: those of the mesh, then eq. (3).
+    Unknowns are y at the points, then x at the nodes that are no points, then the payload if it
+    is free; parameters are p, x at both ends, the duration, and the price of a free payload. All
+    rows are equations: those of the mesh, then eq. (3).
 
     """
 
@@ -167,32 +176,40 @@ class Programme:
     derivatives: dict[str, Any]
 
     @classmethod
-    def of(cls, arm: Arm, mesh: Mesh) -> Programme:
+    def of(cls, arm: Arm, mesh: Mesh, free_payload: bool = False) -> Programme:
         """Derive it."""
         import casadi as ca
 
-        point, K, n_x = _Point.of(arm), mesh.points.size, 2 * arm.n_coordinates
+        point, K, n_x, free = _Point.of(arm), mesh.points.size, 2 * arm.n_coordinates, free_payload
         size, outer = point.cost.numel_in(0), (mesh.P.shape[1] - K) * n_x
-        X, p = ca.MX.sym('X', K * size + outer), ca.MX.sym('p', point.cost.numel_in(1))
+        X = ca.MX.sym('X', K * size + outer + free)
+        p, price = ca.MX.sym('p', point.cost.numel_in(1)), ca.MX.sym('sigma', int(free))
         ends, duration = ca.MX.sym('ends', 2 * n_x), ca.MX.sym('t_f')
-        points = ca.reshape(X[:K * size], size, K), ca.repmat(p, 1, K)
+        used = ca.vertcat(X[-1], p[1:]) if free else p
+        points = ca.reshape(X[:K * size], size, K), ca.repmat(used, 1, K)
         weights, linear = duration * ca.DM(mesh.weights).T, _linear_rows(mesh, n_x, size, duration)
+        linear = ca.horzcat(linear, ca.MX(linear.size1(), int(free)))
         given = ca.vertcat(ca.MX(linear.size1() - 2 * n_x, 1), ends)
         L, L_slope = point.cost.map(K)(*points)
         force, force_slope = point.force.map(K)(*points)
         f, g = ca.dot(weights, L), ca.vertcat(linear @ X - given, ca.vec(force))
         s, multipliers = ca.MX.sym('s'), ca.MX.sym('lambda', g.numel())
         mu = ca.reshape(multipliers[linear.size1():], -1, K)
-        hessian = _diagonal(point.hessian.map(K)(*points, s * weights, mu), K)
-        f_slope = ca.vec(L_slope * ca.repmat(weights, size, 1))
-        g_slope = ca.vertcat(linear, ca.horzcat(_diagonal(force_slope, K),
-                                                ca.MX(force.numel(), outer)))
-        inputs = [X, ca.vertcat(p, ends, duration)]
+        hessian = ca.diagcat(_diagonal(point.hessian.map(K)(*points, s * weights, mu), K),
+                             ca.MX(outer, outer))
+        f_slope = ca.vertcat(ca.vec(L_slope * ca.repmat(weights, size, 1)), ca.DM.zeros(outer))
+        force_rows = ca.horzcat(_diagonal(force_slope, K), ca.MX(force.numel(), outer))
+        if free:
+            share, bend = point.share.map(K)(*points), point.bend.map(K)(*points, mu)
+            f, f_slope = f - price * X[-1], ca.vertcat(f_slope, -price)
+            force_rows = ca.horzcat(force_rows, ca.vec(share))
+            column = ca.vertcat(ca.vec(bend), ca.MX(outer, 1))
+            hessian = ca.blockcat(hessian, column, ca.MX(1, K * size + outer), ca.MX(1, 1))
+        inputs = [X, ca.vertcat(p, ends, duration, price)]
         return cls({'x': X, 'p': inputs[1], 'f': f, 'g': g}, {
-            'grad_f': ca.Function('grad_f', inputs, [f, ca.vertcat(f_slope, ca.DM.zeros(outer))]),
-            'jac_g': ca.Function('jac_g', inputs, [g, g_slope]),
-            'hess_lag': ca.Function('hess_lag', [*inputs, s, multipliers],
-                                    [ca.diagcat(hessian, ca.MX(outer, outer))])})
+            'grad_f': ca.Function('grad_f', inputs, [f, f_slope]),
+            'jac_g': ca.Function('jac_g', inputs, [g, ca.vertcat(linear, force_rows)]),
+            'hess_lag': ca.Function('hess_lag', [*inputs, s, multipliers], [hessian])})
 
     def ipopt(self, options: dict[str, Any], watch: Any) -> Any:
         """Return its solver, a CasADi function."""

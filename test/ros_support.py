@@ -21,7 +21,7 @@ import warnings
 
 from flex_planner.ros.processes import NodeProcess
 from flex_planner_interfaces.msg import MotionTask, PlanReport
-from flex_planner_interfaces.srv import PlanPath
+from flex_planner_interfaces.srv import FindMaxPayload, PlanPath
 from geometry_msgs.msg import Point
 from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import GetParameters, SetParameters
@@ -152,6 +152,17 @@ class Planner(Client):
         """Ask for the motion of the paper with some fields changed; return the report."""
         return self.plan(**fields).report
 
+    def send_search(self, **fields: Any) -> Future:
+        """Ask for the maximum payload of the motion of the paper; do not wait."""
+        return self.send(FindMaxPayload, f'{self.name}/find_max_payload',
+                         search_request(**fields))
+
+    def search(self, **fields: Any) -> FindMaxPayload.Response:
+        """Ask for the maximum payload of the motion of the paper, some fields changed."""
+        future = self.send_search(**fields)
+        self.wait('search', future.done, 40)
+        return future.result()
+
     def set_parameter(self, name: str, value: object) -> SetParametersResult:
         """Set a parameter as ``ros2 param set`` does."""
         change = Parameter(name, value=value).to_parameter_msg()
@@ -182,3 +193,10 @@ def task(**fields: Any) -> MotionTask:
              'goal_point': Point(x=0.5, y=0.5), 'elbow': -1, 'duration': 1.0,
              'payload_mass': 1.0, 'effort_weights': [1 / 8, 1 / 8]}
     return MotionTask(**{**paper, **fields})
+
+
+def search_request(**fields: Any) -> FindMaxPayload.Request:
+    """Return a request for the maximum payload, from 0 kg, some fields or the task's changed."""
+    own = FindMaxPayload.Request.get_fields_and_field_types().keys() - {'task'}
+    options = {name: fields.pop(name) for name in own & fields.keys()}
+    return FindMaxPayload.Request(task=task(**{'payload_mass': 0.0, **fields}), **options)

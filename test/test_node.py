@@ -16,7 +16,12 @@ from flex_planner.arm_files import load_arm
 from flex_planner.ros.processes import NodeProcess
 from flex_planner.task import postures_from_points
 from flex_planner.trajectory_rules import trajectory_violations
-from flex_planner_interfaces.msg import FlexibleTrajectory, MotionTask, PlanReport
+from flex_planner_interfaces.msg import (
+    FlexibleTrajectory,
+    MotionTask,
+    PayloadSearch,
+    PlanReport,
+)
 from geometry_msgs.msg import Point
 import pytest
 from rcl_interfaces.srv import DescribeParameters, ListParameters
@@ -314,6 +319,83 @@ def test_client_that_dies_leaves_the_node_serving(flexible: Planner) -> None:
     assert flexible.report().cost == pytest.approx(COST, abs=1e-4)
 
 
+# The maximum payload
+
+
+MOST = 5.855  # [kg], of the rigid arm in the paper's motion, to 2e-3
+
+
+def test_maximum_payload_is_found_and_its_motion_published(rigid: Planner) -> None:
+    heard = rigid.listen(JointTrajectory, '/rigid_planner/joint_trajectory')
+    bending = rigid.listen(FlexibleTrajectory, '/rigid_planner/flexible_trajectory')
+    answer = rigid.search(publish=True)
+    assert (answer.report.error_code, answer.report.error_msg) == (PlanReport.NONE, '')
+    assert answer.payload == pytest.approx(MOST, abs=2e-3)
+    assert answer.payload < answer.payload_upper <= answer.payload + 1e-3
+    assert (answer.limiting_joint, answer.held) == (0, False)
+    assert list(answer.front_payloads) == sorted(answer.front_payloads) != []
+    assert answer.trajectory.payload_mass == answer.payload
+    assert trajectory_violations(answer.trajectory.joint_trajectory, JOINTS) == []
+    rigid.wait('trajectories', lambda: answer.trajectory in bending and
+               answer.trajectory.joint_trajectory in heard)
+
+
+def test_maximum_payload_is_found_step_by_step(rigid: Planner) -> None:
+    answer = rigid.search(method=PayloadSearch.INCREMENTAL, payload_mass=4.0,
+                          payload_accuracy=1.0)
+    assert (answer.payload, answer.payload_upper) == (5.0, 6.0)
+    assert list(answer.tried_payloads) == [5.0, 6.0]
+    assert answer.tried_solved == [True, False]
+    assert answer.tried_errors[0] < 1e-8
+
+
+@pytest.mark.parametrize(('wrong', 'code', 'text'), [
+    ({'payload_mass': 7.0}, PlanReport.INFEASIBLE,
+     'impossible within the limits of the motors: the arm carries at most 5.855 kg'),
+    ({'method': 2}, PlanReport.OUT_OF_RANGE, 'method is 2, but must be'),
+    ({'payload_accuracy': math.nan}, PlanReport.NOT_FINITE, 'payload_accuracy is nan, but must'),
+    ({'payload_accuracy': 2e3}, PlanReport.OUT_OF_RANGE, 'payload_accuracy is 2000.0, but must'),
+    ({'payload_step': -1.0}, PlanReport.OUT_OF_RANGE, 'payload_step is -1.0, but must be'),
+    ({'duration': math.nan}, PlanReport.NOT_FINITE, 'duration is nan, but must be'),
+    ({'goal_point': Point(x=2.0)}, PlanReport.UNREACHABLE, 'goal_point: '),
+    ({'allowed_planning_time': 1e-6}, PlanReport.TIMEOUT, 'time limit reached'),
+], ids=str)
+def test_search_that_fails_says_why_and_publishes_nothing(rigid: Planner, wrong: dict[str, Any],
+                                                          code: int, text: str) -> None:
+    before = rigid.plan(publish=True).trajectory
+    answer = rigid.search(publish=True, **wrong)
+    assert answer.report.error_code == code
+    assert answer.report.error_msg.startswith(text)
+    assert (answer.payload, answer.limiting_joint, answer.held) == (0.0, -1, False)
+    assert answer.payload_upper == answer.report.cost == math.inf
+    assert answer.trajectory == FlexibleTrajectory()
+    assert rigid.latched(FlexibleTrajectory, '/rigid_planner/flexible_trajectory') == before
+
+
+def test_searches_and_plans_wait_in_one_queue(flexible: Planner) -> None:
+    futures = [flexible.send_plan(**LONG, allowed_planning_time=0.8)]
+    futures += [flexible.send_search(**LONG, allowed_planning_time=0.8) for _ in range(5)]
+    flexible.wait('all answers', lambda: all(future.done() for future in futures))
+    answers = [future.result() for future in futures]
+    codes = [answer.report.error_code for answer in answers]
+    assert codes.count(PlanReport.BUSY) >= 4  # one at work, one waiting
+    assert set(codes) == {PlanReport.TIMEOUT, PlanReport.BUSY}
+    refused = answers[max(k for k, code in enumerate(codes) if code == PlanReport.BUSY)]
+    assert 'queue_length' in refused.report.error_msg
+    assert (refused.payload, refused.payload_upper, refused.limiting_joint) == (0.0, math.inf, -1)
+
+
+def test_node_ends_at_once_while_it_searches(tmp_path: Path) -> None:
+    with Planner(tmp_path, 'korayem_ei50', 'searching') as planner:
+        planner.search(duration=-1.0)
+        planner.send_search(**LONG)
+        planner.spin(0.3)
+        code, seconds = planner.stop()
+        assert code == 0
+        assert seconds < EXIT_LIMIT
+        assert 'Traceback' not in planner.log()
+
+
 # Parameters
 
 
@@ -344,6 +426,8 @@ def test_parameter_that_is_set_counts(rigid: Planner) -> None:
     ('tolerance', 1, 'DOUBLE'),
     ('intervals', 3, 'intervals'),
     ('elbow', 0, 'elbow is 0, but must be +1 or -1'),
+    ('payload_accuracy', 0.0, 'payload_accuracy'),
+    ('payload_step', 0.0, 'payload_step'),
     ('effort_weights', [1.0], 'effort_weights'),
     ('effort_weights', [1.0, math.nan], 'effort_weights[1]'),
     ('joint_names', ['a', 'b'], 'read-only'),
@@ -385,10 +469,12 @@ def test_request_keeps_the_parameters_of_its_arrival(flexible: Planner) -> None:
 def test_log_tells_what_was_planned_and_what_failed(rigid: Planner) -> None:
     rigid.plan()
     rigid.plan(duration=-1.0)
+    rigid.search()
     log = rigid.log()
     assert 'ready to plan for Korayem 2009 two-link arm, rigid' in log
     assert 'planned in' in log
     assert 'error 103: duration is -1.0' in log
+    assert 'maximum payload 5.85' in log
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])

@@ -3,16 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from flex_planner_interfaces.msg import MotionTask, PlanReport
-from flex_planner_interfaces.srv import PlanPath
+from flex_planner.arm import Arm
+from flex_planner.ros.recorder import OutcomeRecorder
+from flex_planner.ros.settings import PlannerSettings
+from flex_planner_interfaces.msg import (
+    FlexibleTrajectory,
+    MotionTask,
+    PayloadSearch,
+    PlanReport,
+)
+from flex_planner_interfaces.srv import FindMaxPayload, PlanPath
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 import numpy as np
 import pytest
-from ros_support import Planner, task
+from ros_support import Planner, search_request, task
 from rosbags.highlevel import AnyReader
 from trajectory_msgs.msg import JointTrajectory
 import yaml
@@ -206,3 +215,73 @@ def test_plan_that_cannot_be_recorded_is_returned_but_not_published(tmp_path: Pa
     assert len(answer.trajectory.points) > 100
     assert not heard
     assert wrong.error_code == PlanReport.OUT_OF_RANGE
+
+
+# Searches for the maximum payload
+
+
+SEARCHED = {'payload_accuracy': 0.1, 'payload_step': 0.5}
+
+
+def recorded_search(response: FindMaxPayload.Response, **asked: Any) -> PayloadSearch:
+    """Return the message that a recording should hold: what was asked and what was answered."""
+    shared = PayloadSearch.get_fields_and_field_types().keys() - asked.keys()
+    return PayloadSearch(**asked, **{name: getattr(response, name) for name in shared})
+
+
+@pytest.fixture(scope='module')
+def searched(planner: Planner) -> FindMaxPayload.Response:
+    answer = planner.search(publish=True, **SEARCHED)
+    assert answer.report.error_code == PlanReport.NONE, answer.report.error_msg
+    return answer
+
+
+@READERS
+def test_search_is_recorded_with_its_request_and_its_motion(searched: FindMaxPayload.Response,
+                                                            read: Any) -> None:
+    found, trajectory = read(Path(searched.report.recording)), searched.trajectory
+    expected = recorded_search(searched, method=PayloadSearch.DIRECT, **SEARCHED)
+    assert {entry.topic: entry.kind for entry in found} == {
+        **TYPES, f'{NODE}/payload_search': 'flex_planner_interfaces/msg/PayloadSearch'}
+    assert len(found) == 5 + len(trajectory.points)
+    for topic, original in (('motion_task', search_request(publish=True).task),
+                            ('plan_report', searched.report), ('payload_search', expected),
+                            ('joint_trajectory', trajectory.joint_trajectory),
+                            ('flexible_trajectory', trajectory)):
+        recorded = plain(only(found, topic).message, original)
+        assert recorded == plain(original, original), topic
+
+
+def test_recording_of_a_search_is_named_by_its_service(searched: FindMaxPayload.Response,
+                                                       answer: PlanPath.Response) -> None:
+    assert Path(searched.report.recording).name.startswith('find_max_payload_')
+    assert Path(answer.report.recording).name.startswith('plan_path_')
+
+
+@READERS
+def test_every_field_of_a_search_is_read_back(rigid_arm: Arm, tmp_path: Path, read: Any) -> None:
+    sent = PayloadSearch(
+        method=PayloadSearch.INCREMENTAL, payload_accuracy=0.1, payload_step=0.2, payload=3.0,
+        payload_upper=3.1, limiting_joint=-1, held=True, front_payloads=[1.0, 2.0],
+        front_efforts=[3.0, 4.0], front_prices=[5.0, 6.0], tried_payloads=[7.0, 8.0, 9.0],
+        tried_solved=[True, False, True], tried_errors=[1e-9, float('inf'), 0.0])
+    settings = replace(PlannerSettings.for_arm(rigid_arm), recording_folder=str(tmp_path))
+    report, trajectory, stamp = PlanReport(), FlexibleTrajectory(), 1_700_000_000_000_000_005
+    folder = OutcomeRecorder(rigid_arm, NODE).write(
+        settings, stamp, task(), report, trajectory, None, None, lambda: False, search=sent)
+    assert folder == tmp_path / 'find_max_payload_20231114T221320_000000005_0001'
+    found = only(read(folder), 'payload_search')
+    assert found.time == stamp
+    assert plain(found.message, sent) == plain(sent, sent)
+
+
+@READERS
+def test_failed_search_is_recorded_as_it_was_asked(planner: Planner, read: Any) -> None:
+    asked = {'method': 3, 'payload_accuracy': float('nan'), 'payload_step': 0.0}
+    response = planner.search(**asked)
+    found = read(Path(response.report.recording))
+    assert response.report.error_code == PlanReport.OUT_OF_RANGE
+    assert len(found) == 3
+    recorded, expected = only(found, 'payload_search'), recorded_search(response, **asked)
+    assert recorded.time == only(found, 'plan_report').time
+    np.testing.assert_equal(plain(recorded.message, expected), plain(expected, expected))

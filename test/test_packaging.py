@@ -10,8 +10,12 @@ import xml.etree.ElementTree as ElementTree
 from ament_index_python.packages import get_package_share_directory
 from catkin_pkg.package import parse_package
 import flex_planner
+from flex_planner.arm_files import load_arm
+from flex_planner.ros.parameters import as_mapping
+from flex_planner.ros.settings import PlannerSettings
 from packaging.requirements import Requirement
 import pytest
+import yaml
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = [ROOT, ROOT / 'flex_planner_interfaces']
@@ -110,6 +114,15 @@ def test_parameter_and_launch_files_are_installed():
         installed = {path.name: path.read_text() for path in share.glob(pattern)}
         assert installed == wanted
         assert wanted
+
+
+def test_parameter_file_repeats_the_defaults_of_the_planner():
+    text = (ROOT / 'config' / 'planner.yaml').read_text()
+    written = yaml.safe_load(text)['flex_planner']['ros__parameters']
+    defaults = as_mapping(PlannerSettings.for_arm(load_arm(written.pop('arm'))))
+    assert written.pop('effort_weights') == [1 / 8, 1 / 8]  # the paper's
+    assert {'payload_accuracy', 'payload_step'} <= written.keys()
+    assert written == {name: defaults.get(name) for name in written}
 
 
 def test_launch_file_starts_executables_of_this_package():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from builtin_interfaces.msg import Duration
 from flex_planner.arm import Arm
@@ -15,6 +16,7 @@ from flex_planner.errors import (
     SingularError,
     UnreachableError,
 )
+from flex_planner.objectives import Objectives
 from flex_planner.plan import peaks, Plan, PlanStatus, Samples
 from flex_planner.progress import StopReason
 from flex_planner.reference import Reference
@@ -45,11 +47,13 @@ STATUS_CODES = {
     PlanStatus.NOT_CONVERGED: PlanReport.NOT_CONVERGED,
     PlanStatus.INFEASIBLE: PlanReport.INFEASIBLE,
     PlanStatus.CERTIFICATE_FAILED: PlanReport.CERTIFICATE_FAILED,
+    PlanStatus.OBJECTIVE_NOT_MET: PlanReport.OBJECTIVE_NOT_MET,
     PlanStatus.TIMEOUT: PlanReport.TIMEOUT,
     PlanStatus.CANCELED: PlanReport.CANCELED,
 }
 STOP_CODES = {StopReason.TIMEOUT: PlanReport.TIMEOUT,
               StopReason.CANCELED: PlanReport.CANCELED}
+OBJECTIVE_FIELDS = ('max_joint_speeds', 'max_torque_shares', 'max_modal_rates')
 _MAX_PLANNING_TIME = 3600.0
 
 
@@ -72,6 +76,20 @@ def task_from_message(message: MotionTask, arm: Arm, settings: PlannerSettings) 
         position_weights=np.asarray(message.position_weights),
         velocity_weights=np.asarray(message.velocity_weights),
         tolerance=tolerance or settings.tolerance)
+
+
+def objectives_from_message(message: MotionTask) -> Objectives | None:
+    """
+    Return the objectives of a request, None if it has none.
+
+    Raises
+    ------
+    InvalidValueError
+        Naming field, value and bound.
+
+    """
+    given: dict[str, Any] = {name: np.asarray(getattr(message, name)) for name in OBJECTIVE_FIELDS}
+    return Objectives(**given) if any(limits.size for limits in given.values()) else None
 
 
 def planning_time_limit(message: MotionTask, settings: PlannerSettings) -> float:
@@ -123,6 +141,12 @@ def report_from_plan(plan: Plan) -> PlanReport:
         setattr(report, name, float(getattr(plan.certificate, name)))
     report.switching_times = plan.switching_times.tolist()
     report.saturation = plan.saturation.tolist()
+    report.velocity_weights = plan.task.velocity_weights.tolist()
+    report.effort_weights = plan.task.effort_weights.tolist()
+    trials = plan.objectives.trials if plan.objectives else ()
+    report.tried_objectives = [trial.objective.value for trial in trials]
+    report.tried_weights = [float(trial.weight) for trial in trials]
+    report.tried_shares = [float(trial.share) for trial in trials]
     return report
 
 

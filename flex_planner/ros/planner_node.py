@@ -1,20 +1,23 @@
-"""The planner node: a service that plans, topics that carry the plan to controllers."""
+"""The planner node: services that plan, topics that carry the plan to controllers."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 import time
 from typing import Any
 
 from flex_planner.model import ArmModel
 from flex_planner.ros.conversions import duration_seconds
 from flex_planner.ros.parameters import declare, declare_arm, judge_changes, validated_changes
+from flex_planner.ros.payload_messages import fill_response, search_without_result
 from flex_planner.ros.planning import busy, Outcome, Planning, unknown_failure
 from flex_planner.ros.recorder import OutcomeRecorder
 from flex_planner.ros.running import run_node
 from flex_planner.ros.settings import PlannerSettings
 from flex_planner.ros.worker import Worker
-from flex_planner_interfaces.msg import FlexibleTrajectory
-from flex_planner_interfaces.srv import PlanPath
+from flex_planner_interfaces.msg import FlexibleTrajectory, MotionTask
+from flex_planner_interfaces.srv import FindMaxPayload, PlanPath
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
@@ -26,6 +29,8 @@ from trajectory_msgs.msg import JointTrajectory
 LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
                      durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _STOP_TIMEOUT = 0.5
+# from the parameters, whether to stop, and the time waited [ns] to what came of a request
+Work = Callable[[PlannerSettings, Callable[[], bool], int], Outcome]
 
 
 class PlannerNode(Node):  # type: ignore[misc]
@@ -35,6 +40,7 @@ class PlannerNode(Node):  # type: ignore[misc]
     Services
     --------
     ~/plan_path : flex_planner_interfaces/srv/PlanPath
+    ~/find_max_payload : flex_planner_interfaces/srv/FindMaxPayload
 
     Topics published
     ----------------
@@ -63,8 +69,10 @@ class PlannerNode(Node):  # type: ignore[misc]
         self._flexible = self.create_publisher(
             FlexibleTrajectory, '~/flexible_trajectory', LATCHED)
         # in the group that all else is in, a request that waits would hold up the others
-        self.create_service(PlanPath, '~/plan_path', self._on_plan_path,
-                            callback_group=ReentrantCallbackGroup())
+        group = ReentrantCallbackGroup()
+        self.create_service(PlanPath, '~/plan_path', self._on_plan_path, callback_group=group)
+        self.create_service(FindMaxPayload, '~/find_max_payload', self._on_find_max_payload,
+                            callback_group=group)
         self.get_logger().info(f'ready to plan for {arm.name}')
 
     def _judge_parameters(self, changes: list[Parameter]) -> SetParametersResult:
@@ -75,27 +83,40 @@ class PlannerNode(Node):  # type: ignore[misc]
 
     async def _on_plan_path(self, request: PlanPath.Request,
                             response: PlanPath.Response) -> PlanPath.Response:
-        """Answer a request: an exception here would end the node."""
-        try:
-            outcome = await self._outcome(request)
-            if request.task.publish and outcome.publishable:
-                self._publish(outcome)
-        except Exception as error:
-            self.get_logger().error(f'plan_path failed: {type(error).__name__}: {error}')
-            outcome = unknown_failure(error)
-        self._log(outcome)
+        """Plan a motion."""
+        outcome = await self._answered(partial(self._planning.plan, request.task), request.task)
         response.report, response.trajectory = outcome.report, outcome.trajectory
         return response
 
-    def _outcome(self, request: PlanPath.Request) -> Future:
+    async def _on_find_max_payload(self, request: FindMaxPayload.Request,
+                                   response: FindMaxPayload.Response) -> FindMaxPayload.Response:
+        """Search for the maximum payload."""
+        outcome = await self._answered(partial(self._planning.find_max_payload, request),
+                                       request.task)
+        response.report, response.trajectory = outcome.report, outcome.trajectory
+        fill_response(response, outcome.search or search_without_result(request))
+        return response
+
+    async def _answered(self, work: Work, task: MotionTask) -> Outcome:
+        """Return what a request led to: an exception here would end the node."""
+        try:
+            outcome: Outcome = await self._outcome(work)
+            if task.publish and outcome.publishable:
+                self._publish(outcome)
+        except Exception as error:
+            self.get_logger().error(f'a request failed: {type(error).__name__}: {error}')
+            outcome = unknown_failure(error)
+        self._log(outcome)
+        return outcome
+
+    def _outcome(self, work: Work) -> Future:
         """Hand a request to the worker and return what it will lead to."""
         executor, settings = self.executor, self._settings
         future, accepted = Future(executor=executor), time.monotonic_ns()
 
         def job() -> None:
-            future.set_result(self._planning.plan(
-                request.task, settings, lambda: self._worker.stopping,
-                waited_ns=time.monotonic_ns() - accepted))
+            future.set_result(work(settings, lambda: self._worker.stopping,
+                                   time.monotonic_ns() - accepted))
             # a future that another thread completes does not wake the executor by itself
             executor.wake()
 
@@ -111,9 +132,12 @@ class PlannerNode(Node):  # type: ignore[misc]
         report = outcome.report
         seconds = duration_seconds(report.planning_time)
         if outcome.publishable:
+            search = outcome.search
+            found = f'maximum payload {search.payload:.6g} kg, ' if search else ''
             self.get_logger().info(
-                f'planned in {seconds:.2f} s ({report.strategy}): J = {report.cost:.6g}, tip '
-                f'error {report.tip_error * 1e3:.2g} mm, recorded in {report.recording or "-"}')
+                f'{found}planned in {seconds:.2f} s ({report.strategy}): J = {report.cost:.6g}, '
+                f'tip error {report.tip_error * 1e3:.2g} mm, recorded in '
+                f'{report.recording or "-"}')
         else:
             self.get_logger().warning(f'error {report.error_code}: {report.error_msg}')
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import logging
 import time
 
-from flex_planner.errors import FlexPlannerError
+from flex_planner.errors import FlexPlannerError, InvalidTaskError
 from flex_planner.model import ArmModel
 from flex_planner.path import plan_path
+from flex_planner.payload import find_max_payload
 from flex_planner.plan import Plan
 from flex_planner.progress import Monitor, StoppedError
 from flex_planner.reference import Reference, sample_reference
@@ -20,15 +21,29 @@ from flex_planner.ros.conversions import (
     failure_report,
     flexible_trajectory,
     joint_trajectory,
+    objectives_from_message,
     planning_time_limit,
     report_from_plan,
     STOP_CODES,
     task_from_message,
 )
+from flex_planner.ros.payload_messages import (
+    report_from_search,
+    search_message,
+    search_options,
+    search_without_result,
+)
 from flex_planner.ros.recorder import OutcomeRecorder
 from flex_planner.ros.settings import PlannerSettings
+from flex_planner.task import Task
 from flex_planner.trajectory_rules import trajectory_violations
-from flex_planner_interfaces.msg import FlexibleTrajectory, MotionTask, PlanReport
+from flex_planner_interfaces.msg import (
+    FlexibleTrajectory,
+    MotionTask,
+    PayloadSearch,
+    PlanReport,
+)
+from flex_planner_interfaces.srv import FindMaxPayload
 
 _LOG = logging.getLogger(__name__)
 
@@ -46,6 +61,8 @@ class Outcome:
         Empty unless there is a plan.
     plan, reference : Plan, Reference or None
         What the trajectory was made of.
+    search : PayloadSearch or None
+        What came of a search for the maximum payload.
 
     """
 
@@ -53,6 +70,7 @@ class Outcome:
     trajectory: FlexibleTrajectory
     plan: Plan | None = None
     reference: Reference | None = None
+    search: PayloadSearch | None = None
 
     @property
     def publishable(self) -> bool:
@@ -93,9 +111,50 @@ class Planning:
             How long ago the request was accepted [ns].
 
         """
+        def planned(task: Task, monitor: Monitor) -> Outcome:
+            plan = plan_path(task, model=self._model, settings=settings.solver(),
+                             monitor=monitor, objectives=objectives_from_message(message))
+            return _outcome(report_from_plan(plan), plan, settings, monitor)
+
+        return self._concluded(planned, message, settings, canceled, waited_ns)
+
+    def find_max_payload(self, request: FindMaxPayload.Request, settings: PlannerSettings,
+                         canceled: Callable[[], bool], waited_ns: int = 0) -> Outcome:
+        """
+        Find the maximum payload, plan the motion with it, and record both.
+
+        Parameters
+        ----------
+        request : FindMaxPayload.Request
+            The request.
+        settings, canceled, waited_ns
+            See `plan`.
+
+        """
+        def searched(task: Task, monitor: Monitor) -> Outcome:
+            if objectives_from_message(request.task) is not None:
+                raise InvalidTaskError('objectives such as max_joint_speeds do not go with a '
+                                       'search for the maximum payload')
+            options = search_options(request, settings)
+            found = find_max_payload(
+                task, model=self._model, settings=settings.solver(), monitor=monitor,
+                method=options.method, accuracy=options.accuracy, step=options.step)
+            outcome = _outcome(report_from_search(found), found.plan, settings, monitor)
+            return replace(outcome, search=search_message(found, options))
+
+        return self._concluded(searched, request.task, settings, canceled, waited_ns,
+                               search_without_result(request))
+
+    def _concluded(self, work: Callable[[Task, Monitor], Outcome], message: MotionTask,
+                   settings: PlannerSettings, canceled: Callable[[], bool], waited_ns: int,
+                   search: PayloadSearch | None = None) -> Outcome:
+        """Do the work of a request and record its outcome, with `search` where it failed."""
         accepted, stamp = time.monotonic_ns() - waited_ns, time.time_ns() - waited_ns
         try:
-            outcome = self._planned(message, settings, canceled)
+            task = task_from_message(message, self._model.arm, settings)
+            monitor = Monitor(time_limit=planning_time_limit(message, settings),
+                              canceled=canceled)
+            outcome = work(task, monitor)
         except FlexPlannerError as error:
             outcome = _failure(error_code(error), str(error))
         except StoppedError as stop:
@@ -103,36 +162,21 @@ class Planning:
         except Exception as error:
             _LOG.exception('planning failed')
             outcome = unknown_failure(error)
+        outcome = replace(outcome, search=outcome.search or search)
         outcome.report.planning_time = duration_message(time.monotonic_ns() - accepted)
         return self._recorded(message, settings, outcome, stamp, canceled)
-
-    def _planned(self, message: MotionTask, settings: PlannerSettings,
-                 canceled: Callable[[], bool]) -> Outcome:
-        """Plan a request; errors are exceptions."""
-        task = task_from_message(message, self._model.arm, settings)
-        monitor = Monitor(time_limit=planning_time_limit(message, settings), canceled=canceled)
-        plan = plan_path(task, model=self._model, settings=settings.solver(), monitor=monitor)
-        report = report_from_plan(plan)
-        if not plan.solved:
-            return Outcome(report=report, trajectory=FlexibleTrajectory(), plan=plan)
-        reference = sample_reference(plan, settings.sampling(), monitor)
-        add_reference(report, plan, reference)
-        joints = joint_trajectory(reference, settings.joint_names)
-        broken = trajectory_violations(joints, settings.joint_names)
-        if broken:
-            raise RuntimeError(f'the trajectory would be refused: {"; ".join(broken)}')
-        trajectory = flexible_trajectory(plan, reference, joints, settings.base_frame)
-        return Outcome(report=report, trajectory=trajectory, plan=plan, reference=reference)
 
     def _recorded(self, message: MotionTask, settings: PlannerSettings, outcome: Outcome,
                   stamp: int, canceled: Callable[[], bool]) -> Outcome:
         """Record an outcome; a plan that cannot be recorded is a failure with a trajectory."""
-        if not settings.record:
+        # a node that ends has no time to record what it gave up
+        if not settings.record or (outcome.report.error_code == PlanReport.CANCELED
+                                   and canceled()):
             return outcome
         try:
             path = self._recorder.write(
                 settings, stamp, message, outcome.report, outcome.trajectory, outcome.plan,
-                outcome.reference, canceled)
+                outcome.reference, canceled, search=outcome.search)
         except Exception as error:
             foreseen = isinstance(error, FlexPlannerError)
             _LOG.error('recording failed: %s', error, exc_info=not foreseen)
@@ -144,6 +188,21 @@ class Planning:
             return outcome
         outcome.report.recording = str(path)
         return outcome
+
+
+def _outcome(report: PlanReport, plan: Plan | None, settings: PlannerSettings,
+             monitor: Monitor) -> Outcome:
+    """Return the outcome that a report tells of, with a trajectory if it is a success."""
+    if plan is None or report.error_code != PlanReport.NONE:
+        return Outcome(report=report, trajectory=FlexibleTrajectory(), plan=plan)
+    reference = sample_reference(plan, settings.sampling(), monitor)
+    add_reference(report, plan, reference)
+    joints = joint_trajectory(reference, settings.joint_names)
+    broken = trajectory_violations(joints, settings.joint_names)
+    if broken:
+        raise RuntimeError(f'the trajectory would be refused: {"; ".join(broken)}')
+    trajectory = flexible_trajectory(plan, reference, joints, settings.base_frame)
+    return Outcome(report=report, trajectory=trajectory, plan=plan, reference=reference)
 
 
 def _failure(code: int, sentence: str) -> Outcome:

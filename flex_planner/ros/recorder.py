@@ -24,7 +24,12 @@ from flex_planner.reference import Reference
 from flex_planner.ros.conversions import reference_state
 from flex_planner.ros.parameters import as_mapping
 from flex_planner.ros.settings import PlannerSettings
-from flex_planner_interfaces.msg import FlexibleTrajectory, MotionTask, PlanReport
+from flex_planner_interfaces.msg import (
+    FlexibleTrajectory,
+    MotionTask,
+    PayloadSearch,
+    PlanReport,
+)
 import yaml
 
 
@@ -51,6 +56,7 @@ class OutcomeRecorder:
         interfaces = 'flex_planner_interfaces/msg/'
         self._task = Topic(f'{namespace}/motion_task', f'{interfaces}MotionTask')
         self._report = Topic(f'{namespace}/plan_report', f'{interfaces}PlanReport')
+        self._search = Topic(f'{namespace}/payload_search', f'{interfaces}PayloadSearch')
         self._joints = Topic(f'{namespace}/joint_trajectory',
                              'trajectory_msgs/msg/JointTrajectory', LATCHED)
         self._flexible = Topic(f'{namespace}/flexible_trajectory',
@@ -60,7 +66,7 @@ class OutcomeRecorder:
 
     def write(self, settings: PlannerSettings, stamp: int, task: MotionTask, report: PlanReport,
               trajectory: FlexibleTrajectory, plan: Plan | None, reference: Reference | None,
-              canceled: Callable[[], bool]) -> Path:
+              canceled: Callable[[], bool], *, search: PayloadSearch | None = None) -> Path:
         """
         Write a recording and return its folder.
 
@@ -82,6 +88,8 @@ class OutcomeRecorder:
             Samples of the plan.
         canceled : callable
             Returns True once writing should stop, which is an error.
+        search : PayloadSearch, optional
+            Where the request was for a maximum payload; the folder's name says so.
 
         Raises
         ------
@@ -90,7 +98,7 @@ class OutcomeRecorder:
 
         """
         ready = stamp + report.planning_time.sec * 10**9 + report.planning_time.nanosec
-        path = settings.output_folder() / self._name(stamp)
+        path = settings.output_folder() / self._name(stamp, search)
         report.recording = str(path)
         with Recording.create(path.parent, path.name, self._types,
                               custom_data={'flex_planner': __version__}) as recording:
@@ -98,6 +106,8 @@ class OutcomeRecorder:
                              media_type='application/yaml', time_ns=stamp)
             recording.write(self._task, task, stamp)
             recording.write(self._report, report, ready)
+            if search is not None:
+                recording.write(self._search, search, ready)
             if plan is not None and reference is not None:
                 recording.write(self._joints, trajectory.joint_trajectory, ready)
                 recording.write(self._flexible, trajectory, ready)
@@ -115,10 +125,11 @@ class OutcomeRecorder:
             message = reference_state(plan, reference.samples, k, names, stamp)
             recording.write(self._states, message, stamp)
 
-    def _name(self, stamp: int) -> str:
-        """Return a name that sorts by time and is not used twice."""
+    def _name(self, stamp: int, search: PayloadSearch | None) -> str:
+        """Return a name that sorts by kind and time and is not used twice."""
+        kind = 'plan_path' if search is None else 'find_max_payload'
         moment = datetime.fromtimestamp(stamp // 10**9, timezone.utc)
-        return f'plan_path_{moment:%Y%m%dT%H%M%S}_{stamp % 10**9:09d}_{next(self._numbers):04d}'
+        return f'{kind}_{moment:%Y%m%dT%H%M%S}_{stamp % 10**9:09d}_{next(self._numbers):04d}'
 
     def _scenario(self, settings: PlannerSettings) -> str:
         """Return arm and parameters as YAML."""

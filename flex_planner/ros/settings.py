@@ -11,7 +11,11 @@ from flex_planner.collocation import Settings
 from flex_planner.errors import InvalidSizeError, InvalidValueError
 from flex_planner.reference import SamplingSettings
 from flex_planner.ros.parameters import described
+from flex_planner.task import MAX_PAYLOAD
 from flex_planner.validation import vector
+
+# of the largest payload [kg]
+MIN_ACCURACY, MAX_ACCURACY = 1e-6, 1e3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,6 +40,13 @@ class PlannerSettings:
         30.0, 'Time limit of a request that sets none [s].', lowest=1e-3, highest=3600.0)
     effort_weights: list[float] = described(
         [1.0], 'Diagonal of R where a request gives none: one entry a joint.')
+    payload_accuracy: float = described(
+        1e-3, 'Largest error of a maximum payload where a request gives none [kg].',
+        lowest=MIN_ACCURACY, highest=MAX_ACCURACY)
+    payload_step: float = described(
+        1.0, 'First step of the incremental search for it where a request gives none; where that '
+        'is less than the accuracy, the accuracy counts [kg].',
+        lowest=MIN_ACCURACY, highest=MAX_PAYLOAD)
     joint_names: list[str] = described(
         ['joint1'], 'Names of the joints in trajectories, from the base outwards.',
         read_only=True)

@@ -1,4 +1,4 @@
-"""Pictures of planned motions, of how they were carried out, and of the arm's modes."""
+"""A motion as it was planned, and as it was carried out."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from pathlib import Path
 
 from flex_planner.arm import Arm
 from flex_planner.kinematics import link_points
-from flex_planner.model import ArmModel, Parameters
-from flex_planner.statics import equilibrium, natural_modes
+from flex_planner.plotting.figures import finish, save, say
 from flex_planner.validation import Array
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -17,9 +16,6 @@ import numpy as np
 
 _MILLI = 1e3
 _POSTURES = 6
-_NATURAL_MODES = 4
-_STATIONS = 81
-_SHOWN_BEND = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -34,7 +30,7 @@ class Motion:
     coordinates, rates : numpy.ndarray, shape (k, n_t)
         Joints [rad], then modes [m], and their rates.
     torques : numpy.ndarray, shape (k, n)
-        [N m].
+        [N m]; the last may be what holds the arm and is not drawn.
     tip : numpy.ndarray, shape (k, 2)
         [m].
 
@@ -101,77 +97,12 @@ def draw_motion(path: Path, arm: Arm, joint_names: Sequence[str], motion: Motion
                  (done.times, np.degrees(done.positions)) if done else None)
     _draw_joints(axes[0, 1], 'joint speeds', 'speed [rad/s]', joint_names, motion.times,
                  motion.rates[:, :n], (done.times, done.speeds) if done else None)
-    _draw_joints(axes[0, 2], 'motor torques and their bounds', 'torque [N m]', joint_names,
-                 motion.times[:-1], motion.torques[:-1],
-                 (done.times, done.torques) if done else None)
-    _draw_bounds(axes[0, 2], arm, motion)
-    _draw_tip(axes[1, 0], arm, motion, execution)
+    draw_torques(axes[0, 2], arm, joint_names, motion, execution)
+    draw_tip(axes[1, 0], arm, motion, execution)
     _draw_modes(axes[1, 1], arm, motion)
-    _draw_tip_error(axes[1, 2], motion, execution)
+    _draw_distance(axes[1, 2], motion, execution)
     figure.suptitle(arm.name)
-    _save(figure, path)
-
-
-def _save(figure: Figure, path: Path) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=110)
-
-
-def draw_mode_shapes(path: Path, model: ArmModel, posture: Array, payload_mass: float) -> None:
-    """
-    Write a picture of the assumed shapes of each link and of the arm's natural modes as PNG.
-
-    Parameters
-    ----------
-    path : Path
-        File to write.
-    model : ArmModel
-        n joints, at least one link with modes.
-    posture : numpy.ndarray, shape (n,)
-        Of the arm whose natural modes are drawn, joints locked [rad].
-    payload_mass : float
-        At its tip [kg].
-
-    """
-    arm = model.arm
-    parameters = Parameters.of(arm, payload_mass=payload_mass)
-    rest, _ = equilibrium(model, posture, parameters)
-    frequencies, vectors = natural_modes(model, rest, parameters, locked=True)
-    flexible = [i for i, link in enumerate(arm.links) if link.modes]
-    shown = min(frequencies.size, _NATURAL_MODES)
-    figure = Figure(figsize=(5 * max(len(flexible), shown), 8), layout='constrained')
-    top, bottom = figure.subfigures(2, 1)
-    for axes, i in zip(np.atleast_1d(top.subplots(1, len(flexible))), flexible, strict=True):
-        _draw_link_shapes(axes, arm, i)
-    for k, axes in enumerate(np.atleast_1d(bottom.subplots(1, shown))):
-        _draw_natural_mode(axes, arm, rest, vectors[:, k], frequencies[k])
-    figure.suptitle(f'{arm.name}, payload {payload_mass:g} kg')
-    _save(figure, path)
-
-
-def _draw_link_shapes(axes: Axes, arm: Arm, index: int) -> None:
-    """Draw the assumed mode shapes of one link."""
-    link = arm.links[index]
-    x = np.linspace(0, link.length, _STATIONS, dtype=float)
-    for j, shape in enumerate(link.mode_shapes().shape(x).T, 1):
-        axes.plot(x, shape, label=f'mode {j}')
-    _finish(axes, f'link {index + 1}: assumed shapes, {link.mode_family}',
-            'deflection per unit of modal displacement', 'along the link [m]')
-
-
-def _draw_natural_mode(axes: Axes, arm: Arm, rest: Array, vector: Array,
-                       frequency: float) -> None:
-    """Draw the arm bent to both sides in a natural mode, enlarged."""
-    change = np.concatenate([np.zeros(arm.n_joints), vector])
-    still = link_points(arm, rest, _STATIONS).reshape(-1, 2)
-    moved = link_points(arm, rest + 1e-6 * change, _STATIONS).reshape(-1, 2)
-    bend = (moved - still) / np.abs(moved - still).max() * _SHOWN_BEND * arm.reach
-    axes.plot(*still.T, color='silver', linewidth=2)
-    for side, style in ((1, '-'), (-1, '--')):
-        axes.plot(*(still + side * bend).T, style, color='C0')
-    axes.set_aspect('equal', adjustable='datalim')
-    _finish(axes, f'natural mode, {frequency / (2 * np.pi):.4g} Hz, joints locked', 'y [m]',
-            'x [m]')
+    save(figure, path)
 
 
 def _draw_joints(axes: Axes, title: str, label: str, names: Sequence[str], times: Array,
@@ -182,7 +113,16 @@ def _draw_joints(axes: Axes, title: str, label: str, names: Sequence[str], times
         if done is not None:
             axes.plot(done[0], done[1][:, i], '--', color=f'C{i}', alpha=0.6,
                       label=f'{name}, simulated')
-    _finish(axes, title, label)
+    finish(axes, title, label)
+
+
+def draw_torques(axes: Axes, arm: Arm, joint_names: Sequence[str], motion: Motion,
+                 execution: Execution | None = None) -> None:
+    """Draw the torques between their bounds."""
+    _draw_joints(axes, 'motor torques and their bounds', 'torque [N m]', joint_names,
+                 motion.times[:-1], motion.torques[:-1],
+                 (execution.times, execution.torques) if execution else None)
+    _draw_bounds(axes, arm, motion)
 
 
 def _draw_bounds(axes: Axes, arm: Arm, motion: Motion) -> None:
@@ -197,7 +137,8 @@ def _draw_bounds(axes: Axes, arm: Arm, motion: Motion) -> None:
     axes.legend(fontsize='small')
 
 
-def _draw_tip(axes: Axes, arm: Arm, motion: Motion, execution: Execution | None) -> None:
+def draw_tip(axes: Axes, arm: Arm, motion: Motion,
+             execution: Execution | None = None) -> None:
     """Draw the tip's path with the arm on its way."""
     for k in np.linspace(0, motion.times.size - 1, _POSTURES).astype(int):
         points = link_points(arm, motion.coordinates[k], 15).reshape(-1, 2)
@@ -208,7 +149,7 @@ def _draw_tip(axes: Axes, arm: Arm, motion: Motion, execution: Execution | None)
     axes.plot(*motion.tip[0], 'o', color='C2', label='start')
     axes.plot(*motion.tip[-1], 's', color='C2', label='goal')
     axes.set_aspect('equal', adjustable='datalim')
-    _finish(axes, 'path of the tip', 'y [m]', 'x [m]')
+    finish(axes, 'path of the tip', 'y [m]', 'x [m]')
 
 
 def _draw_modes(axes: Axes, arm: Arm, motion: Motion) -> None:
@@ -217,24 +158,19 @@ def _draw_modes(axes: Axes, arm: Arm, motion: Motion) -> None:
         axes.plot(motion.times, motion.coordinates[:, arm.n_joints + j] * _MILLI,
                   label=name.replace('_', ', '))
     if not arm.n_modes:
-        axes.text(0.5, 0.5, 'rigid links', transform=axes.transAxes, ha='center')
-    _finish(axes, 'modal displacements, as planned', 'displacement [mm]')
+        say(axes, 'rigid links')
+    finish(axes, 'modal displacements, as planned', 'displacement [mm]')
 
 
-def _draw_tip_error(axes: Axes, motion: Motion, execution: Execution | None) -> None:
-    """Draw the distance of the tip from the goal after arrival."""
+def _draw_distance(axes: Axes, motion: Motion, execution: Execution | None) -> None:
+    """Draw the distance of the tip from the goal: what remains of it after arrival, if known."""
+    tip = motion.tip if execution is None else execution.tip
+    distance = np.linalg.norm(tip - motion.tip[-1], axis=1) * _MILLI
     if execution is None:
-        axes.set_axis_off()
+        axes.plot(motion.times, distance, color='C2')
+        finish(axes, 'distance of the tip from the goal, as planned', 'distance [mm]')
         return
-    distance = np.linalg.norm(execution.tip - motion.tip[-1], axis=1) * _MILLI
     axes.semilogy(execution.tip_times, np.maximum(distance, 1e-6), color='C3',
                   label='distance to the goal')
     axes.axvline(motion.times[-1], color='gray', linestyle=':', label='planned arrival')
-    _finish(axes, 'simulated tip', 'distance [mm]')
-
-
-def _finish(axes: Axes, title: str, y_label: str, x_label: str = 'time [s]') -> None:
-    axes.set(title=title, xlabel=x_label, ylabel=y_label)
-    axes.grid(alpha=0.3)
-    if axes.get_legend_handles_labels()[0]:
-        axes.legend(fontsize='small')
+    finish(axes, 'simulated tip', 'distance [mm]')

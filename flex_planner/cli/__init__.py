@@ -1,0 +1,48 @@
+"""Console script ``flex-planner``."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+import sys
+
+from flex_planner import __version__
+from flex_planner.cli import arm, motion
+from flex_planner.cli.options import with_joined_lists
+from flex_planner.cli.watching import CanceledError
+from flex_planner.errors import FlexPlannerError
+
+_CANCELED = 130  # what a shell makes of a process that SIGINT ended
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """
+    Run the console script.
+
+    Returns
+    -------
+    int
+        Exit code: 0; 1 after a message on standard error; 130 if Ctrl-C was pressed.
+
+    """
+    given = sys.argv[1:] if arguments is None else arguments
+    options = _parser().parse_args(with_joined_lists(given))
+    try:
+        return int(options.run(options))
+    except (FlexPlannerError, OSError) as error:
+        print(f'flex-planner: {error}', file=sys.stderr)
+        return 1
+    except (CanceledError, KeyboardInterrupt) as error:
+        print(f'flex-planner: {str(error) or "canceled"}', file=sys.stderr)
+        return _CANCELED
+
+
+def _parser() -> argparse.ArgumentParser:
+    """Return the description of the command line."""
+    parser = argparse.ArgumentParser(
+        prog='flex-planner', description='Motion planning for flexible-link manipulators.')
+    parser.add_argument('--version', action='version', version=__version__)
+    commands = parser.add_subparsers(required=True, metavar='COMMAND')
+    arm.add_command(commands)
+    motion.add_commands(commands)
+    return parser

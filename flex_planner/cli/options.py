@@ -1,0 +1,61 @@
+"""Options that commands share, and lists of numbers in them."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+import re
+from typing import TypeAlias
+
+from flex_planner.arm_files import preset_files
+from flex_planner.errors import InvalidValueError
+from flex_planner.task import MAX_JOINT_ANGLE
+from flex_planner.validation import Array, vector
+import numpy as np
+
+Commands: TypeAlias = 'argparse._SubParsersAction[argparse.ArgumentParser]'
+
+_NEGATIVE_LIST = re.compile(r'-[\d.].*,')
+
+
+def with_joined_lists(arguments: Sequence[str]) -> list[str]:
+    """Return the arguments with ``--to -1,2`` as ``--to=-1,2``: argparse would see an option."""
+    joined: list[str] = []
+    for argument in arguments:
+        if joined and joined[-1].startswith('--') and _NEGATIVE_LIST.match(argument):
+            joined[-1] += f'={argument}'
+        else:
+            joined.append(argument)
+    return joined
+
+
+def add_arm(parser: argparse.ArgumentParser) -> None:
+    """Add the arm, which every command needs."""
+    parser.add_argument('arm', metavar='ARM',
+                        help=f'arm file, or a preset: {", ".join(sorted(preset_files()))}')
+
+
+def numbers(option: str, text: str, sizes: int | Sequence[int] = (), unit: str = '', *,
+            finite: bool = True) -> Array:
+    """
+    Return comma-separated numbers, unless `finite` infinite ones too and of any count.
+
+    Raises
+    ------
+    InvalidValueError
+        Naming the option, if they are no numbers or not as many as one of `sizes`.
+
+    """
+    try:
+        values = [float(part) for part in text.split(',')]
+    except ValueError:
+        raise InvalidValueError(option, text, 'numbers separated by commas') from None
+    return vector(option, values, sizes, unit=unit) if finite else np.array(values)
+
+
+def angles(option: str, text: str, count: int) -> Array:
+    """Return joint angles [rad] from comma-separated degrees; errors as in `numbers`."""
+    most = float(np.degrees(MAX_JOINT_ANGLE))
+    degrees = vector(option, numbers(option, text, count, 'deg'), count, at_least=-most,
+                     at_most=most, unit='deg')
+    return np.radians(degrees)

@@ -1,0 +1,143 @@
+"""Pictures and recordings of what a command found."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from dataclasses import dataclass
+import os
+from pathlib import Path
+import sys
+import tempfile
+from typing import TYPE_CHECKING
+
+from flex_planner.cli.request import Request
+from flex_planner.errors import InvalidValueError, RecordingError
+from flex_planner.motion_report import Row
+from flex_planner.payload import MaxPayload
+from flex_planner.plan import Plan
+from flex_planner.reference import Reference
+
+if TYPE_CHECKING:
+    from flex_planner.cli.recording import RequestRecorder
+    from flex_planner.plotting import Motion
+
+_DRAWN_SAMPLES = 2001
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outputs:
+    """
+    Writes pictures and recordings.
+
+    Attributes
+    ----------
+    folder : Path
+        Where to.
+    stem : str
+        What the names of pictures begin with.
+    draws : bool
+        Whether there are pictures.
+    recorder : RequestRecorder or None
+        None where nothing is recorded.
+
+    """
+
+    folder: Path
+    stem: str
+    draws: bool
+    recorder: RequestRecorder | None
+
+    @classmethod
+    def of(cls, options: argparse.Namespace, request: Request) -> Outputs:
+        """
+        Return the outputs that a command line with the options of `add_outputs` wants.
+
+        Raises
+        ------
+        InvalidValueError
+            If the folder cannot be written.
+
+        """
+        draws, records = not options.no_plot, not options.no_recording
+        if draws or records:
+            _check_folder(options.output)
+        return cls(folder=options.output, stem=Path(options.arm).stem, draws=draws,
+                   recorder=_recorder(request, options.output) if records else None)
+
+    def write_plan(self, plan: Plan, reference: Reference | None) -> Iterator[Row]:
+        """Write what came of a plan; yield names and paths, one by one as they are written."""
+        if self.draws and plan.solved:
+            yield self._motion(plan)
+        if self.recorder is not None:
+            yield 'recording', str(self.recorder.record_plan(plan, reference))
+
+    def write_search(self, found: MaxPayload, accuracy: float, step: float,
+                     reference: Reference | None) -> Iterator[Row]:
+        """Write what came of a search, see `write_plan`."""
+        solved = found.plan if found.plan is not None and found.plan.solved else None
+        if self.draws and (solved or found.front.payloads.size or found.trials):
+            from flex_planner.plotting import draw_max_payload
+
+            path = self.folder / f'{self.stem}_max_payload.png'
+            draw_max_payload(path, found, _joint_names(found.task.arm.n_joints),
+                             _drawn(solved) if solved else None)
+            yield 'picture of the search', str(path)
+        if self.draws and solved:
+            yield self._motion(solved)
+        if self.recorder is not None:
+            yield 'recording', str(self.recorder.record_search(found, accuracy, step, reference))
+
+    def _motion(self, plan: Plan) -> Row:
+        """Draw the motion of a plan."""
+        from flex_planner.plotting import draw_motion
+
+        path = self.folder / f'{self.stem}_motion.png'
+        draw_motion(path, plan.arm, _joint_names(plan.arm.n_joints), _drawn(plan))
+        return 'picture of the motion', str(path)
+
+
+def add_outputs(parser: argparse.ArgumentParser) -> None:
+    """Add the options for what is written."""
+    parser.add_argument('--output', type=Path, default=Path('output'), metavar='DIR',
+                        help='folder for pictures and recordings (default: output)')
+    parser.add_argument('--no-plot', action='store_true', help='draw nothing')
+    parser.add_argument('--no-recording', action='store_true', help='record nothing')
+
+
+def _check_folder(folder: Path) -> None:
+    """Raise InvalidValueError unless files can be made in a folder, or the folder itself."""
+    there = folder.absolute()
+    while not os.path.lexists(there):
+        there = there.parent
+    try:
+        with tempfile.TemporaryFile(dir=there):
+            pass
+    except OSError as error:
+        raise InvalidValueError('--output', str(folder), 'a folder that can be written '
+                                f'({there}: {error.strerror})') from None
+
+
+def _recorder(request: Request, folder: Path) -> RequestRecorder | None:
+    """Return what records the outcome, or None where ROS 2 is missing, which is told."""
+    try:
+        from flex_planner.cli.recording import RequestRecorder
+
+        return RequestRecorder(request, folder / 'recordings')
+    except (ImportError, RecordingError) as error:
+        print(f'flex-planner: nothing will be recorded, which takes ROS 2: {error}',
+              file=sys.stderr)
+        return None
+
+
+def _joint_names(count: int) -> list[str]:
+    return [f'joint{i}' for i in range(1, count + 1)]
+
+
+def _drawn(plan: Plan) -> Motion:
+    """Return a solved plan as arrays, finer than a controller needs it."""
+    from flex_planner.plotting import Motion
+
+    samples = plan.uniform_samples(_DRAWN_SAMPLES)
+    return Motion(times=samples.times, coordinates=samples.coordinates, rates=samples.rates,
+                  torques=samples.torques, tip=samples.tip)

@@ -1,0 +1,202 @@
+"""From options to a task, with errors that name the options."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import Any
+
+from flex_planner.arm import Arm
+from flex_planner.arm_files import load_arm
+from flex_planner.cli.options import add_arm, angles, numbers
+from flex_planner.errors import (
+    InvalidTaskError,
+    InvalidValueError,
+    SingularError,
+    UnreachableError,
+)
+from flex_planner.objectives import Objectives
+from flex_planner.reference import MAX_SAMPLES, SamplingSettings
+from flex_planner.task import postures_from_points, Task
+from flex_planner.validation import Array, number
+import numpy as np
+
+MAX_TIME_LIMIT = 3600.0
+# names of the core that are not those of options, which have - for _
+_POINTS = {'start_point': '--from', 'goal_point': '--to'}
+_ANGLES = {'start_positions': '--from-angles', 'goal_positions': '--to-angles'}
+_RENAMED = {**_POINTS, 'payload_mass': '--payload'}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Request:
+    """
+    What a command was asked for.
+
+    Attributes
+    ----------
+    task : Task
+        The motion.
+    points : tuple of numpy.ndarray, shape (2,), or None
+        Start and goal of the tip [m]; None if joint angles were given.
+    elbow : int
+        Branch of the inverse kinematics.
+    time_limit : float
+        [s].
+    objectives : Objectives or None
+        What the motion must keep besides.
+
+    """
+
+    task: Task
+    points: tuple[Array, Array] | None
+    elbow: int
+    time_limit: float
+    objectives: Objectives | None = None
+
+    @classmethod
+    def of(cls, options: argparse.Namespace) -> Request:
+        """
+        Return the request of a command line with the options of `add_task`.
+
+        Raises
+        ------
+        FlexPlannerError
+            Naming option, value and bound.
+
+        """
+        arm = load_arm(options.arm)
+        with named_as_options():
+            limit = number('time_limit', options.time_limit, above=0, at_most=MAX_TIME_LIMIT,
+                           unit='s')
+            points = _points(options)
+            start, goal = (_angles(options, arm) if points is None
+                           else postures_from_points(arm, *points, elbow=options.elbow))
+            task = Task(
+                arm=arm, start_positions=start, goal_positions=goal, duration=options.duration,
+                payload_mass=options.payload_mass, payload_inertia=options.payload_inertia,
+                tolerance=options.tolerance, **_weights(options, arm))
+            objectives = _objectives(options, task)
+        return cls(task=task, points=points, elbow=options.elbow, time_limit=limit,
+                   objectives=objectives)
+
+    @property
+    def sampling(self) -> SamplingSettings:
+        """Return how a plan is sampled: closely, but not more often than is allowed."""
+        closest = SamplingSettings()
+        return replace(closest, longest_step=max(closest.longest_step,
+                                                 self.task.duration / (MAX_SAMPLES - 1)))
+
+    def __str__(self) -> str:
+        """Return the motion in words."""
+        if self.points is None:
+            ends, unit = (np.degrees(self.task.start_positions),
+                          np.degrees(self.task.goal_positions)), 'deg'
+        else:
+            ends, unit = self.points, 'm'
+        start, goal = (', '.join(f'{value:.6g}' for value in end) for end in ends)
+        return f'({start}) {unit} to ({goal}) {unit} in {self.task.duration:g} s'
+
+
+def add_task(parser: argparse.ArgumentParser, payload: str) -> None:
+    """Add the options that describe a motion; `payload` says what the payload is for."""
+    add_arm(parser)
+    add = parser.add_argument
+    add('--from', dest='start_point', metavar='X,Y', help='tip at the start [m]')
+    add('--to', dest='goal_point', metavar='X,Y', help='tip at the goal [m]')
+    add('--from-angles', dest='start_positions', metavar='DEG,DEG,...',
+        help='joint angles at the start, instead of points')
+    add('--to-angles', dest='goal_positions', metavar='DEG,DEG,...',
+        help='joint angles at the goal')
+    add('--elbow', type=int, default=-1, metavar='SIGN',
+        help='sign of the second joint angle at the points, 1 or -1 (default: -1)')
+    add('--duration', type=float, required=True, metavar='S',
+        help='duration of the motion')
+    add('--payload', dest='payload_mass', type=float, default=0.0, metavar='KG', help=payload)
+    add('--payload-inertia', type=float, default=0.0, metavar='KG_M2',
+        help='rotary inertia of the payload about the tip (default: 0)')
+    for name, what in (('effort', 'R: torques (default: ones)'),
+                       ('velocity', 'W_2: velocities (default: zeros)'),
+                       ('position', 'W_1: positions (default: zeros)')):
+        add(f'--{name}-weights', metavar='W,W,...', help=f'diagonal of {what}')
+    add('--tolerance', type=float, default=1e-3, metavar='EPS',
+        help='largest half squared error of the final state, eq. (17) (default: 0.001)')
+    add('--time-limit', type=float, default=MAX_TIME_LIMIT, metavar='S',
+        help='give up after this time (default and most: %(default)g)')
+
+
+def add_objectives(parser: argparse.ArgumentParser) -> None:
+    """Add the options that limit a motion, by weights that are found."""
+    for name, unit, what in (
+            ('joint-speeds', 'RAD/S', 'absolute joint speeds; found weights W_2 meet them'),
+            ('torque-shares', 'SHARE', 'torques as shares of their limits; found weights R meet '
+             'them'),
+            ('modal-rates', 'M/S', 'absolute modal rates; found weights W_2 meet them')):
+        parser.add_argument(f'--max-{name}', metavar=f'{unit},{unit},...',
+                            help=f'largest {what}; inf for no limit')
+
+
+@contextmanager
+def named_as_options() -> Iterator[None]:
+    """Let errors of the core name options instead of its own fields."""
+    try:
+        yield
+    except InvalidValueError as error:
+        raise type(error)(_option(error.field), error.value, error.bound) from None
+    except (UnreachableError, SingularError) as error:
+        name, _, reason = str(error).partition(': ')
+        raise type(error)(f'{_POINTS.get(name, name)}: {reason}') from None
+
+
+def _option(field: str) -> str:
+    """Return the option that a field comes from."""
+    name, bracket, index = field.partition('[')
+    if name.startswith('--'):
+        return field
+    if name in _ANGLES:
+        return f'{_ANGLES[name]}{bracket}{index} in radians'
+    return _RENAMED.get(name, f'--{name.replace("_", "-")}') + bracket + index
+
+
+def _points(options: argparse.Namespace) -> tuple[Array, Array] | None:
+    """Return start and goal points; None if angles are given."""
+    ends = {**_POINTS, **_ANGLES}
+    given = [name for name in ends if getattr(options, name) is not None]
+    if given == list(_POINTS):
+        return (numbers('--from', options.start_point, 2, 'm'),
+                numbers('--to', options.goal_point, 2, 'm'))
+    if given == list(_ANGLES):
+        return None
+    found = ', '.join(ends[name] for name in given) or 'none of them'
+    raise InvalidTaskError('start and goal must be given either by --from and --to or by '
+                           f'--from-angles and --to-angles, but the command has {found}')
+
+
+def _angles(options: argparse.Namespace, arm: Arm) -> tuple[Array, Array]:
+    """Return joint angles of start and goal."""
+    start, goal = (angles(option, getattr(options, name), arm.n_joints)
+                   for name, option in _ANGLES.items())
+    return start, goal
+
+
+def _objectives(options: argparse.Namespace, task: Task) -> Objectives | None:
+    """Return the objectives that are given."""
+    given: dict[str, Any] = {
+        name: numbers(f'--{name.replace("_", "-")}', value, finite=False)
+        for name in ('max_joint_speeds', 'max_torque_shares', 'max_modal_rates')
+        if (value := getattr(options, name, None)) is not None}
+    if not given:
+        return None
+    objectives = Objectives(**given)
+    objectives.check(task)
+    return objectives
+
+
+def _weights(options: argparse.Namespace, arm: Arm) -> dict[str, Any]:
+    """Return the weights that are given."""
+    one, any_kind = [arm.n_joints], sorted({arm.n_joints, arm.n_coordinates})
+    sizes = {'effort_weights': one, 'velocity_weights': any_kind, 'position_weights': any_kind}
+    return {name: numbers(f'--{name.replace("_", "-")}', getattr(options, name), size)
+            for name, size in sizes.items() if getattr(options, name) is not None}

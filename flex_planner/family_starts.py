@@ -1,0 +1,129 @@
+"""Where families of motions start: near their end, if the same arm made rigid shows the way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from flex_planner.collocation import CollocationResult, CollocationSolution, Settings
+from flex_planner.continuation import STOPPED
+from flex_planner.errors import FlexPlannerError
+from flex_planner.families import (
+    changed,
+    durations,
+    Enough,
+    Family,
+    no_aim,
+    payloads,
+    Stop,
+    worth,
+    worth_time,
+)
+from flex_planner.motion import MotionProblem
+from flex_planner.progress import Monitor
+from flex_planner.strategies import cold_start, DIRECTLY, lifted, rigid_problem
+
+# largest mesh of a first motion, in units of the coarsest that overlooks nothing
+_FIRST_MESHES = 4
+# a rigid motion is lifted when its payload is so near to its limit, and few before are tried
+_LIFT, _LIFTS, _MOST_RIGID = 0.03, 3, 15
+
+
+def heaviest(problem: MotionProblem, settings: Settings, monitor: Monitor, *,
+             start: Stop | None = None, enough: Enough = no_aim) -> Iterator[Stop]:
+    """
+    Yield heavier and heavier payloads from that of the problem on.
+
+    A flexible arm starts from the heavy end of the same arm made rigid: where the payload is free
+    at a price its motion is near, while with a given payload the phase of what rings is not.
+    Where that fails it starts from the payload of the problem. The first to be tried is a motion
+    of a similar task, if one is given.
+
+    """
+    return _family(problem, payloads, settings, monitor, start, enough)
+
+
+def quickest(problem: MotionProblem, settings: Settings, monitor: Monitor, *,
+             start: Stop | None = None, enough: Enough = no_aim) -> Iterator[Stop]:
+    """Yield shorter and shorter durations from that of the problem on, see `heaviest`."""
+    return _family(problem, durations, settings, monitor, start, enough)
+
+
+def _family(problem: MotionProblem, family: Family, settings: Settings, monitor: Monitor,
+            start: Stop | None, enough: Enough) -> Iterator[Stop]:
+    """Yield the motions of a family, the first one included."""
+    payload = family is payloads
+    first = None if start is None else _taken_over(problem, start, payload, settings, monitor)
+    if first is None and problem.model.arm.n_modes:
+        first = _lifted_first(problem, family, settings, monitor)
+    if first is None:
+        result = first_motion(problem, settings, monitor)
+        first = Stop(value=problem.task.payload_mass if payload else problem.task.duration,
+                     price=0.0, problem=problem, result=result)
+    yield first
+    if first.result.converged:
+        yield from family(first.problem, first.result, settings, monitor, enough)
+
+
+def _lifted_first(problem: MotionProblem, family: Family, settings: Settings,
+                  monitor: Monitor) -> Stop | None:
+    """Return the flexible motion at the price of a rigid one that is near its limit, or None."""
+    rigid = rigid_problem(problem)
+    first = cold_start(rigid, settings, monitor).result
+    if not first.converged:
+        return None
+    stops: list[Stop] = []
+    for stop in family(rigid, first, settings, monitor, lambda value: _LIFT * value):
+        stops.append(stop)
+        if stop.stopped or stop.room < _LIFT * stop.value or len(stops) == _MOST_RIGID:
+            break
+    for stop in reversed(stops[-_LIFTS:]):
+        if stop.stopped:
+            return stop
+        found = _taken_over(problem, stop, family is payloads, settings, monitor)
+        if found is not None:
+            return found
+    return None
+
+
+def _taken_over(problem: MotionProblem, stop: Stop, payload: bool, settings: Settings,
+                monitor: Monitor) -> Stop | None:
+    """Return the motion at the price of another arm's or task's; None if there is none beyond."""
+    solution, price = stop.result.solution, stop.price
+    try:
+        if payload:
+            near = changed(problem, payload_mass=stop.value)
+            found = worth(near, _fitted(near, solution, settings), price, settings, monitor)
+            beyond = found is not None and found.value > problem.task.payload_mass
+        else:
+            near = changed(problem, duration=stop.value)
+            found = worth_time(near, _fitted(near, solution, settings), price, settings, monitor)
+            beyond = found is not None and found.value < problem.task.duration
+    except FlexPlannerError:  # too heavy to hold
+        return None
+    return found if beyond or (found is not None and found.stopped) else None
+
+
+def _fitted(problem: MotionProblem, solution: CollocationSolution,
+            settings: Settings) -> CollocationSolution:
+    """Return a motion of the same or of a rigid arm as a guess, stretched to the duration."""
+    factor = problem.task.duration / solution.mesh[-1]
+    guess = CollocationSolution(solution.mesh * factor, solution.nodes, solution.stages / factor,
+                                solution.rule)
+    return guess if guess.nodes.shape[1] == problem.size else lifted(problem, guess, settings)
+
+
+def first_motion(problem: MotionProblem, settings: Settings,
+                 monitor: Monitor) -> CollocationResult:
+    """Return the first solution that strategies find, or the last failure: soon."""
+    most = max(_FIRST_MESHES * problem.fewest_intervals(settings.stages), 200)
+    quick = replace(settings, max_iterations=min(15, settings.max_iterations),
+                    max_intervals=min(most, settings.max_intervals),
+                    intervals=min(most, settings.intervals))
+    result = cold_start(problem, quick, monitor).result
+    for _, strategy in DIRECTLY:
+        if result.converged or result.status in STOPPED:
+            break
+        attempt = None if strategy is cold_start else strategy(problem, quick, monitor)
+        result = result if attempt is None else attempt.result
+    return result

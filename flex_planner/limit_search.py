@@ -1,0 +1,47 @@
+"""What the searches for the largest payload and the shortest duration share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from flex_planner.collocation import CollocationSolution, Settings
+from flex_planner.families import Stop
+from flex_planner.ladder import planned
+from flex_planner.limits import steady
+from flex_planner.motion import MotionProblem
+from flex_planner.plan import Plan
+from flex_planner.progress import Monitor
+from flex_planner.strategies import Attempt, QUICK, Strategy, weights_raised
+import numpy as np
+
+_MOST_STOPS = 100
+
+
+def collected(stops: Iterable[Stop], accuracy: float) -> list[Stop]:
+    """Return the stops up to one that is near the limit, or fails, or the last."""
+    met: list[Stop] = []
+    for stop in stops:
+        met.append(stop)
+        if not stop.result.converged or len(met) == _MOST_STOPS or is_near(met, accuracy):
+            break
+    return met
+
+
+def is_near(stops: list[Stop], accuracy: float) -> bool:
+    """Return whether the last value is the limit, to an accuracy."""
+    last = stops[-1]
+    if not last.price:
+        return False
+    if np.isfinite(last.room):
+        return last.room <= accuracy
+    return steady(stops, accuracy / (10 * last.value))  # a motor without limit is never full
+
+
+def plan_near(problem: MotionProblem, start: CollocationSolution, settings: Settings,
+              monitor: Monitor) -> Plan:
+    """Return the plan of a problem from a motion of least effort that is nearly its own."""
+    def found(problem: MotionProblem, settings: Settings, monitor: Monitor) -> Attempt:
+        return Attempt(result=weights_raised(problem, start, settings, monitor))
+
+    rungs: tuple[tuple[str, Strategy], ...] = (('limit found', found), *QUICK)
+    return planned(problem, rungs, settings, monitor)

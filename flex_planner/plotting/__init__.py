@@ -1,0 +1,9 @@
+"""Pictures of planned motions, of how they were carried out, of payloads and of modes."""
+
+from __future__ import annotations
+
+from flex_planner.plotting.modes import draw_mode_shapes
+from flex_planner.plotting.motion import draw_motion, Execution, Motion
+from flex_planner.plotting.payload import draw_max_payload
+
+__all__ = ['Execution', 'Motion', 'draw_max_payload', 'draw_mode_shapes', 'draw_motion']

@@ -1,0 +1,76 @@
+"""The shapes that links are assumed to bend in, and the natural modes of an arm."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from flex_planner.arm import Arm
+from flex_planner.kinematics import link_points
+from flex_planner.model import ArmModel, Parameters
+from flex_planner.plotting.figures import finish, save
+from flex_planner.statics import equilibrium, natural_modes
+from flex_planner.validation import Array
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+import numpy as np
+
+_NATURAL_MODES = 4
+_STATIONS = 81
+_SHOWN_BEND = 0.1
+
+
+def draw_mode_shapes(path: Path, model: ArmModel, posture: Array, payload_mass: float) -> None:
+    """
+    Write a picture of the assumed shapes of each link and of the arm's natural modes as PNG.
+
+    Parameters
+    ----------
+    path : Path
+        File to write.
+    model : ArmModel
+        n joints, at least one link with modes.
+    posture : numpy.ndarray, shape (n,)
+        Of the arm whose natural modes are drawn, joints locked [rad].
+    payload_mass : float
+        At its tip [kg].
+
+    """
+    arm = model.arm
+    parameters = Parameters.of(arm, payload_mass=payload_mass)
+    rest, _ = equilibrium(model, posture, parameters)
+    frequencies, vectors = natural_modes(model, rest, parameters, locked=True)
+    flexible = [i for i, link in enumerate(arm.links) if link.modes]
+    shown = min(frequencies.size, _NATURAL_MODES)
+    figure = Figure(figsize=(5 * max(len(flexible), shown), 8), layout='constrained')
+    top, bottom = figure.subfigures(2, 1)
+    for axes, i in zip(np.atleast_1d(top.subplots(1, len(flexible))), flexible, strict=True):
+        _draw_link_shapes(axes, arm, i)
+    for k, axes in enumerate(np.atleast_1d(bottom.subplots(1, shown))):
+        _draw_natural_mode(axes, arm, rest, vectors[:, k], frequencies[k])
+    figure.suptitle(f'{arm.name}, payload {payload_mass:g} kg')
+    save(figure, path)
+
+
+def _draw_link_shapes(axes: Axes, arm: Arm, index: int) -> None:
+    """Draw the assumed mode shapes of one link."""
+    link = arm.links[index]
+    x = np.linspace(0, link.length, _STATIONS, dtype=float)
+    for j, shape in enumerate(link.mode_shapes().shape(x).T, 1):
+        axes.plot(x, shape, label=f'mode {j}')
+    finish(axes, f'link {index + 1}: assumed shapes, {link.mode_family}',
+           'deflection per unit of modal displacement', 'along the link [m]')
+
+
+def _draw_natural_mode(axes: Axes, arm: Arm, rest: Array, vector: Array,
+                       frequency: float) -> None:
+    """Draw the arm bent to both sides in a natural mode, enlarged."""
+    change = np.concatenate([np.zeros(arm.n_joints), vector])
+    still = link_points(arm, rest, _STATIONS).reshape(-1, 2)
+    moved = link_points(arm, rest + 1e-6 * change, _STATIONS).reshape(-1, 2)
+    bend = (moved - still) / np.abs(moved - still).max() * _SHOWN_BEND * arm.reach
+    axes.plot(*still.T, color='silver', linewidth=2)
+    for side, style in ((1, '-'), (-1, '--')):
+        axes.plot(*(still + side * bend).T, style, color='C0')
+    axes.set_aspect('equal', adjustable='datalim')
+    finish(axes, f'natural mode, {frequency / (2 * np.pi):.4g} Hz, joints locked', 'y [m]',
+           'x [m]')

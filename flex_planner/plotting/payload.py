@@ -1,0 +1,139 @@
+"""The search for the maximum payload, and the motion that carries it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from flex_planner.payload import MaxPayload, PayloadMethod
+from flex_planner.plotting.figures import finish, save, say
+from flex_planner.plotting.motion import draw_tip, draw_torques, Motion
+from flex_planner.validation import Array
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+import numpy as np
+
+_FEW = 12
+# of the range of values: beyond the last, and above the others
+_MARGIN = 0.1
+_ABOVE = 10.0
+
+
+def draw_max_payload(path: Path, found: MaxPayload, joint_names: Sequence[str],
+                     motion: Motion | None) -> None:
+    """
+    Write a picture of a search for the maximum payload as PNG.
+
+    Parameters
+    ----------
+    path : Path
+        File to write.
+    found : MaxPayload
+        The search, successful or not. Above: what each payload costs, and the price of more; or
+        the payloads tried, and where their torques led.
+    joint_names : sequence of str
+        For the legends.
+    motion : Motion, optional
+        With the largest payload. Below: its torques, and the path of the tip.
+
+    """
+    rows = 1 if motion is None else 2
+    figure = Figure(figsize=(12.5, 0.5 + 4.25 * rows), layout='constrained')
+    axes = figure.subplots(rows, 2, squeeze=False)
+    if found.method is PayloadMethod.DIRECT:
+        _draw_front(axes[0], found)
+    else:
+        _draw_trials(axes[0], found)
+    if motion is not None:
+        draw_torques(axes[1, 0], found.task.arm, joint_names, motion)
+        draw_tip(axes[1, 1], found.task.arm, motion)
+    figure.suptitle(f'{found.task.arm.name}\n{_result(found)}')
+    save(figure, path)
+
+
+def _result(found: MaxPayload) -> str:
+    """Return the outcome in a line."""
+    if not found.solved:
+        return found.status.value
+    return f'largest payload {found.payload:.6g} kg, too much {found.upper:.6g} kg'
+
+
+def _draw_front(axes: Sequence[Axes], found: MaxPayload) -> None:
+    """Draw effort and price against payload, up to what is too much."""
+    front = found.front
+    if not front.payloads.size:
+        _leave_out(axes, 'no motion was found on the way')
+        return
+    axes[1].set_yscale('log')
+    for each, values in zip(axes, (front.efforts, front.prices), strict=True):
+        each.plot(front.payloads, values, 'o-', color='C0', linewidth=1,
+                  label='motions on the way')
+        if found.payload:
+            each.axvline(found.payload, color='C2', linestyle='--', label='largest payload')
+        if np.isfinite(found.upper):
+            _shade(each, found.upper)
+    finish(axes[0], 'least effort that carries a payload', 'J [N² m² s]', 'payload [kg]')
+    finish(axes[1], 'what more payload costs', '$dJ/dm_p$ [N² m² s/kg]', 'payload [kg]')
+
+
+def _leave_out(axes: Sequence[Axes], reason: str) -> None:
+    """Say why there is nothing to draw."""
+    for each in axes:
+        each.set_axis_off()
+        say(each, reason)
+
+
+def _shade(axes: Axes, upper: float) -> None:
+    """Shade the payloads that are too much."""
+    low, high = axes.get_xlim()
+    high = max(high, upper + _MARGIN * (upper - low))
+    axes.axvspan(upper, high, color='C3', alpha=0.15, linewidth=0, label='too much')
+    axes.set_xlim(low, high)
+    axes.ticklabel_format(axis='x', useOffset=False)
+
+
+def _draw_trials(axes: Sequence[Axes], found: MaxPayload) -> None:
+    """Draw the payloads tried one after the other, and their boundary errors."""
+    if not found.trials:
+        _leave_out(axes, 'no heavier payload was tried')
+        return
+    payloads = np.array([trial.payload for trial in found.trials])
+    axes[0].plot(_numbers(payloads), payloads, color='silver')
+    _mark(axes[0], found, payloads)
+    if found.payload:
+        axes[0].axhline(found.payload, color='C2', linestyle='--', label='largest payload')
+    _draw_errors(axes[1], found)
+    for each in axes:
+        each.xaxis.set_major_locator(MaxNLocator(_FEW, integer=True, min_n_ticks=1))
+        each.set_xlim(0.5, payloads.size + 0.5)
+    finish(axes[0], 'payloads tried', 'payload [kg]', 'trial')
+    finish(axes[1], 'where their torques lead', 'boundary error, eq. (17)', 'trial',
+           legend='upper left', columns=2)
+
+
+def _draw_errors(axes: Axes, found: MaxPayload) -> None:
+    """Draw the boundary errors; what is unknown lies above all others."""
+    errors = np.array([trial.boundary_error for trial in found.trials])
+    tolerance = found.task.tolerance
+    known = np.append(errors[np.isfinite(errors) & (errors > 0)], tolerance)
+    span = max(float(known.max() / known.min()), _ABOVE)
+    unknown = known.max() * span**_MARGIN
+    axes.set_yscale('log')
+    axes.axhline(tolerance, color='gray', linestyle=':', label='tolerance')
+    if not np.isfinite(errors).all():
+        axes.axhline(unknown, color='C3', alpha=0.3, label='not known')
+    _mark(axes, found, np.where(np.isfinite(errors), errors, unknown))
+    axes.set_ylim(known.min() / span**_MARGIN, unknown * span**(3 * _MARGIN))  # room for a legend
+
+
+def _numbers(values: Array) -> Array:
+    return np.arange(1, values.size + 1, dtype=np.float64)
+
+
+def _mark(axes: Axes, found: MaxPayload, values: Array) -> None:
+    """Mark a value of each trial, by its outcome."""
+    solved = np.array([trial.solved for trial in found.trials], dtype=bool)
+    for chosen, style, label in ((solved, 'oC2', 'carried'), (~solved, 'XC3', 'not carried')):
+        if chosen.any():
+            axes.plot(_numbers(values)[chosen], values[chosen], style, label=label)
