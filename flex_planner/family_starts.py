@@ -19,6 +19,7 @@ from flex_planner.families import (
     worth,
     worth_time,
 )
+from flex_planner.hard_starts import hard_payloads
 from flex_planner.motion import MotionProblem
 from flex_planner.progress import Monitor
 from flex_planner.strategies import cold_start, DIRECTLY, lifted, rigid_problem
@@ -55,7 +56,15 @@ def _family(problem: MotionProblem, family: Family, settings: Settings, monitor:
     payload = family is payloads
     first = None if start is None else _taken_over(problem, start, payload, settings, monitor)
     if first is None and problem.model.arm.n_modes:
-        first = _lifted_first(problem, family, settings, monitor)
+        rigid = _rigid_stops(problem, family, settings, monitor)
+        first = _lifted_first(problem, rigid, payload, settings, monitor)
+        if first is None and rigid and payload:
+            price, found = rigid[-1].price, False
+            for stop in hard_payloads(problem, price, settings, monitor, enough):
+                found = True
+                yield stop
+            if found:
+                return
     if first is None:
         result = first_motion(problem, settings, monitor)
         first = Stop(value=problem.task.payload_mass if payload else problem.task.duration,
@@ -65,22 +74,28 @@ def _family(problem: MotionProblem, family: Family, settings: Settings, monitor:
         yield from family(first.problem, first.result, settings, monitor, enough)
 
 
-def _lifted_first(problem: MotionProblem, family: Family, settings: Settings,
-                  monitor: Monitor) -> Stop | None:
-    """Return the flexible motion at the price of a rigid one that is near its limit, or None."""
+def _rigid_stops(problem: MotionProblem, family: Family, settings: Settings,
+                 monitor: Monitor) -> list[Stop]:
+    """Return the motions of the same arm made rigid up to one that is near its limit."""
     rigid = rigid_problem(problem)
     first = cold_start(rigid, settings, monitor).result
-    if not first.converged:
-        return None
     stops: list[Stop] = []
+    if not first.converged:
+        return stops
     for stop in family(rigid, first, settings, monitor, lambda value: _LIFT * value):
         stops.append(stop)
         if stop.stopped or stop.room < _LIFT * stop.value or len(stops) == _MOST_RIGID:
             break
+    return stops
+
+
+def _lifted_first(problem: MotionProblem, stops: list[Stop], payload: bool, settings: Settings,
+                  monitor: Monitor) -> Stop | None:
+    """Return the flexible motion at the price of a rigid one that is near its limit, or None."""
     for stop in reversed(stops[-_LIFTS:]):
         if stop.stopped:
             return stop
-        found = _taken_over(problem, stop, family is payloads, settings, monitor)
+        found = _taken_over(problem, stop, payload, settings, monitor)
         if found is not None:
             return found
     return None
