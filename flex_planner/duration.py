@@ -15,7 +15,7 @@ from flex_planner.errors import InvalidTaskError
 from flex_planner.families import changed, on_the_way, Stop
 from flex_planner.family_starts import quickest
 from flex_planner.ladder import LADDER, planned, STATUSES, STOPPED
-from flex_planner.limit_search import collected, is_near, plan_near
+from flex_planner.limit_search import collected, is_near, plan_near, width
 from flex_planner.model import ArmModel
 from flex_planner.motion import MotionProblem, task_parameters
 from flex_planner.payload import find_max_payload, MaxPayload
@@ -92,7 +92,8 @@ def find_min_duration(task: Task, *, model: ArmModel | None = None,
     model, settings, monitor : optional
         As of `plan_path`.
     accuracy : float
-        Largest width of the bracket, 1e-7 to 100 [s].
+        Largest width of the bracket, 1e-7 to 100, but not less than a millionth of the duration
+        [s].
 
     Returns
     -------
@@ -158,8 +159,8 @@ def _stops(problem: MotionProblem, settings: Settings, monitor: Monitor,
     way, bare = on_the_way(settings, _EXACTNESS * accuracy), without_weights(problem)
     for factor in _LONGER:
         slow = changed(bare, duration=min(factor * problem.task.duration, MAX_DURATION))
-        stops = collected(quickest(slow, way, monitor, enough=lambda duration: accuracy),
-                          accuracy)
+        stops = collected(quickest(slow, way, monitor,
+                                   enough=lambda duration: width(accuracy, duration)), accuracy)
         if stops[0].result.converged or stops[0].stopped:
             break
     return stops

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
+from flex_planner.certify import totals
 from flex_planner.collocation import (
     CollocationResult,
     CollocationSolution,
@@ -49,6 +50,8 @@ _CLOSE, _SURE, _LEAST_FACTOR = 0.2, 0.6, 1.5
 _POWER = 1.5
 _SHORTER = 0.85
 _HEAVIER, _LEAST_MORE = 0.25, 0.1
+# of a price: as a share of what the motion costs per unit, and at all
+_LEAST_SHARE, _LEAST_PRICE = 1e-3, 1e-12
 
 
 def no_aim(value: float) -> float:
@@ -94,6 +97,8 @@ class Stop:
         `reserve` as long as the motion stays of its kind.
 
         """
+        if not self.price:
+            return np.inf
         return reserve(self.problem, self.result.solution) / self.price
 
 
@@ -289,9 +294,11 @@ def on_the_way(settings: Settings, tolerance: float = _TOLERANCE) -> Settings:
 def time_price(problem: MotionProblem, solution: CollocationSolution) -> float:
     """Return -dJ/dt_f of a motion, -H, at least something positive."""
     hamiltonian = problem.model.controls(solution.nodes, problem.p).hamiltonian
-    return max(-float(np.mean(hamiltonian)), 1e-3)
+    share = totals(problem, solution).cost / problem.task.duration
+    return max(-float(np.mean(hamiltonian)), _LEAST_SHARE * share, _LEAST_PRICE)
 
 
 def _payload_price(problem: MotionProblem, solution: CollocationSolution) -> float:
-    """Return dJ/dm_p of a motion, at least something positive."""
-    return max(payload_price(problem, solution), 1e-3)
+    """Return dJ/dm_p of a motion, at least something positive: gravity may help."""
+    share = totals(problem, solution).cost / (problem.task.payload_mass + _LEAST_MORE)
+    return max(payload_price(problem, solution), _LEAST_SHARE * share, _LEAST_PRICE)

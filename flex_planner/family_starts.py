@@ -105,6 +105,8 @@ def _taken_over(problem: MotionProblem, stop: Stop, payload: bool, settings: Set
                 monitor: Monitor) -> Stop | None:
     """Return the motion at the price of another arm's or task's; None if there is none beyond."""
     solution, price = stop.result.solution, stop.price
+    if solution.nodes.shape[1] not in (problem.size, 4 * problem.model.arm.n_joints):
+        return None  # of an arm with other modes
     try:
         if payload:
             near = changed(problem, payload_mass=stop.value)

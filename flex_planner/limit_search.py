@@ -15,6 +15,7 @@ from flex_planner.strategies import Attempt, QUICK, Strategy, weights_raised
 import numpy as np
 
 _MOST_STOPS = 100
+_FINEST = 1e-6
 
 
 def collected(stops: Iterable[Stop], accuracy: float) -> list[Stop]:
@@ -32,9 +33,15 @@ def is_near(stops: list[Stop], accuracy: float) -> bool:
     last = stops[-1]
     if not last.price:
         return False
+    wide = width(accuracy, last.value)
     if np.isfinite(last.room):
-        return last.room <= accuracy
-    return steady(stops, accuracy / (10 * last.value))  # a motor without limit is never full
+        return last.room <= wide
+    return steady(stops, wide / (10 * last.value))  # a motor without limit is never full
+
+
+def width(accuracy: float, value: float) -> float:
+    """Return how wide a bracket may be: motions nearer to their limit are out of reach."""
+    return max(accuracy, _FINEST * value)
 
 
 def plan_near(problem: MotionProblem, start: CollocationSolution, settings: Settings,

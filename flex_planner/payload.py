@@ -20,7 +20,7 @@ from flex_planner.families import changed, on_the_way, payloads, Stop
 from flex_planner.family_starts import heaviest
 from flex_planner.incremental import PayloadTrial, raised_payload
 from flex_planner.ladder import LADDER, planned, STATUSES, STOPPED
-from flex_planner.limit_search import collected, is_near, plan_near
+from flex_planner.limit_search import collected, is_near, plan_near, width
 from flex_planner.model import ArmModel
 from flex_planner.motion import holding_limit, MotionProblem, task_parameters
 from flex_planner.plan import Plan, PlanStatus
@@ -31,6 +31,7 @@ from flex_planner.validation import Array, number
 import numpy as np
 
 _MIN_ACCURACY, _MAX_ACCURACY = 1e-6, 1e3
+_STEP = 1.0
 # of the payload that the motors can just hold, kept clear of rounding
 _HELD = 1 - 1e-9
 # of motions on the way, by accuracy of the payload [1/kg]
@@ -139,7 +140,8 @@ class MaxPayload:
 def find_max_payload(task: Task, *, model: ArmModel | None = None,
                      settings: Settings | None = None, monitor: Monitor | None = None,
                      method: PayloadMethod = PayloadMethod.DIRECT, accuracy: float = 1e-3,
-                     step: float = 1.0, start_from: MaxPayload | None = None) -> MaxPayload:
+                     step: float | None = None,
+                     start_from: MaxPayload | None = None) -> MaxPayload:
     """
     Find the largest payload that the arm can carry from start to goal in the task's duration.
 
@@ -156,9 +158,11 @@ def find_max_payload(task: Task, *, model: ArmModel | None = None,
     method : PayloadMethod
         ``DIRECT`` has the payload as an unknown, ``INCREMENTAL`` is that of the paper's fig. 2.
     accuracy : float
-        Largest width of the bracket, 1e-6 to 1e3 [kg].
-    step : float
-        First step of the incremental method, `accuracy` to 1e6 [kg].
+        Largest width of the bracket, 1e-6 to 1e3, but not less than a millionth of the payload
+        [kg].
+    step : float, optional
+        First step of the incremental method, `accuracy` to 1e6; 1 or `accuracy` if that is more
+        [kg].
     start_from : MaxPayload, optional
         A search of a similar task by the direct method, tried first.
 
@@ -177,6 +181,7 @@ def find_max_payload(task: Task, *, model: ArmModel | None = None,
 
     """
     number('accuracy', accuracy, at_least=_MIN_ACCURACY, at_most=_MAX_ACCURACY, unit='kg')
+    step = max(_STEP, accuracy) if step is None else step
     number('step', step, at_least=accuracy, at_most=MAX_PAYLOAD, unit='kg')
     _check(task)
     monitor = monitor or Monitor()
@@ -241,7 +246,7 @@ class _Search:
                            payload=last.value, upper=last.value + last.room, plan=plan)
         if not near:
             found = self._held(last, found)
-        if not plan.solved:
+        if not plan.solved or found.status in STOPPED.values():
             return replace(found, payload=0.0)
         if not near and not found.held:
             return replace(found, status=PlanStatus.NOT_CONVERGED, message=(
@@ -269,7 +274,7 @@ class _Search:
 
     def _enough(self, payload: float) -> float:
         """Return the room that is near enough."""
-        return self._accuracy
+        return width(self._accuracy, payload)
 
     def _held(self, last: Stop, found: MaxPayload) -> MaxPayload:
         """Return the outcome where the goal is what the motors can just hold, if it is."""
@@ -277,6 +282,8 @@ class _Search:
         if not np.isfinite(limit) or limit * _HELD <= last.value:
             return found
         plan = self._plan(limit * _HELD, last.result.solution)
+        if plan.status in STOPPED.values():
+            return self.failed(PayloadMethod.DIRECT, plan.status, plan.message)
         if not plan.solved:
             return found
         return replace(found, status=plan.status, payload=limit * _HELD, upper=limit, plan=plan,
@@ -307,6 +314,7 @@ class _Search:
             else:
                 upper = trial.payload
         plan = self._plan(*best)
+        upper = min(upper, holding_limit(self._problem)[0])
         found = MaxPayload(task=self._problem.task, method=method, status=plan.status,
                            message=plan.message, payload=best[0] if plan.solved else 0.0,
                            upper=upper, plan=plan, trials=tuple(trials))
