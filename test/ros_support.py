@@ -20,12 +20,15 @@ from typing import Any, TypeVar
 import warnings
 
 from flex_planner.ros.processes import NodeProcess
+from flex_planner_interfaces import action
 from flex_planner_interfaces.msg import MotionTask, PlanReport
 from flex_planner_interfaces.srv import FindMaxPayload, PlanPath
 from geometry_msgs.msg import Point
 from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import GetParameters, SetParameters
 import rclpy
+from rclpy.action import ActionClient
+from rclpy.action.client import ClientGoalHandle
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter, parameter_value_to_python
@@ -33,6 +36,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.task import Future
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+MANY = QoSProfile(depth=1000)  # requests on their way; beyond 10, others would be lost
 STARTING = 60.0  # [s], a node on a machine that is busy
 SomeClient = TypeVar('SomeClient', bound='Client')
 _NUMBERS = itertools.count(1)
@@ -61,6 +65,36 @@ os.environ.update(
     ROS_PYTHON_CHECK_FIELDS='1')
 
 
+class Goal:
+    """
+    An accepted goal of an action.
+
+    Attributes
+    ----------
+    feedback : list
+        What has come so far, each with the time it came [s].
+    answer : Future
+        Of the result.
+
+    """
+
+    def __init__(self, client: Client, handle: ClientGoalHandle,
+                 feedback: list[tuple[float, Any]]) -> None:
+        self._client, self._handle, self.feedback = client, handle, feedback
+        self.answer = handle.get_result_async()
+
+    def end(self, limit: float = 40.0) -> tuple[int, Any]:
+        """Return the end state, of GoalStatus, and the result."""
+        self._client.wait('result', self.answer.done, limit)
+        return self.answer.result().status, self.answer.result().result
+
+    def cancel(self) -> bool:
+        """Cancel the goal and return whether the server accepts that."""
+        answer = self._handle.cancel_goal_async()
+        self._client.wait('answer to the cancellation', answer.done)
+        return bool(answer.result().goals_canceling)
+
+
 class Client:
     """A ROS node in this process that calls, listens and waits; for a with block."""
 
@@ -71,6 +105,7 @@ class Client:
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         self._services: dict[str, Any] = {}
+        self._actions: dict[str, ActionClient] = {}
 
     def wait(self, what: str, done: Callable[[], bool], limit: float = 20.0) -> None:
         """Spin until something is the case; fail after a time [s]."""
@@ -88,7 +123,7 @@ class Client:
     def send(self, kind: Any, name: str, request: Any) -> Future:
         """Call a service without waiting for its answer."""
         if name not in self._services:
-            self._services[name] = self.node.create_client(kind, name)
+            self._services[name] = self.node.create_client(kind, name, qos_profile=MANY)
             self.wait(f'service {name}', self._services[name].service_is_ready, STARTING)
         return self._services[name].call_async(request)
 
@@ -97,6 +132,20 @@ class Client:
         future = self.send(kind, name, request)
         self.wait(f'answer of {name}', future.done, limit)
         return future.result()
+
+    def send_goal(self, kind: Any, name: str, goal: Any) -> Goal:
+        """Send a goal to an action and return once it is accepted."""
+        if name not in self._actions:
+            self._actions[name] = ActionClient(
+                self.node, kind, name, goal_service_qos_profile=MANY,
+                result_service_qos_profile=MANY)
+            self.wait(f'action {name}', self._actions[name].server_is_ready, STARTING)
+        feedback: list[tuple[float, Any]] = []
+        answer = self._actions[name].send_goal_async(
+            goal, lambda message: feedback.append((time.monotonic(), message.feedback)))
+        self.wait(f'goal of {name}', answer.done)
+        assert answer.result().accepted
+        return Goal(self, answer.result(), feedback)
 
     def listen(self, kind: Any, topic: str, qos: QoSProfile | int = LATCHED) -> list[Any]:
         """Return a list that the messages of a topic will be added to."""
@@ -125,13 +174,15 @@ class Client:
 class Planner(Client):
     """A planner node in a process of its own, and a client of it."""
 
+    module = 'flex_planner.ros.planner_node'
+
     def __init__(self, folder: Path, arm: str, name: str = 'flex_planner',
                  **parameters: object) -> None:
         super().__init__()
         self.name, self._log = f'/{name}', folder / f'{name}.log'
         self._log.parent.mkdir(parents=True, exist_ok=True)
         given = {'arm': arm, 'recording_folder': folder / 'recordings', **parameters}
-        self.process = NodeProcess('flex_planner.ros.planner_node', given, {'__node': name},
+        self.process = NodeProcess(self.module, given, {'__node': name},
                                    self._log)
 
     def log(self) -> str:
@@ -162,6 +213,18 @@ class Planner(Client):
         future = self.send_search(**fields)
         self.wait('search', future.done, 40)
         return future.result()
+
+    def plan_goal(self, **fields: Any) -> Goal:
+        """Send the motion of the paper with some fields changed to the action."""
+        goal = action.PlanPath.Goal(task=task(**fields))
+        return self.send_goal(action.PlanPath, f'{self.name}/plan_path', goal)
+
+    def search_goal(self, **fields: Any) -> Goal:
+        """Send the search for the maximum payload of that motion to the action."""
+        request = search_request(**fields)
+        goal = action.FindMaxPayload.Goal(**{
+            name: getattr(request, name) for name in request.get_fields_and_field_types()})
+        return self.send_goal(action.FindMaxPayload, f'{self.name}/find_max_payload', goal)
 
     def set_parameter(self, name: str, value: object) -> SetParametersResult:
         """Set a parameter as ``ros2 param set`` does."""

@@ -12,6 +12,7 @@ from flex_planner.model import ArmModel
 from flex_planner.ros.planning import Outcome, Planning
 from flex_planner.ros.recorder import OutcomeRecorder
 from flex_planner.ros.settings import PlannerSettings
+from flex_planner.ros.ticket import Ticket
 from flex_planner_interfaces.msg import PlanReport
 import pytest
 from ros_support import search_request, task
@@ -30,7 +31,7 @@ def worker(rigid_arm: Arm, rigid_model: ArmModel) -> Planning:
 
 
 def planned(worker: Planning, settings: PlannerSettings, **fields: Any) -> Outcome:
-    return worker.plan(task(**fields), settings, lambda: False)
+    return worker.plan(task(**fields), Ticket(settings=settings))
 
 
 def test_request_with_a_speed_limit_gets_the_weights_that_keep_it(
@@ -86,6 +87,6 @@ def test_search_for_the_maximum_payload_takes_no_objectives(worker: Planning,
                                                             settings: PlannerSettings) -> None:
     request = search_request()
     request.task.max_joint_speeds = [0.8, 0.8]
-    outcome = worker.find_max_payload(request, settings, lambda: False)
+    outcome = worker.find_max_payload(request, Ticket(settings=settings))
     assert outcome.report.error_code == PlanReport.INVALID_TASK
     assert 'do not go with a search for the maximum payload' in outcome.report.error_msg

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 import math
 from pathlib import Path
+import threading
 from typing import Any
 
 from flex_planner.arm import Arm, Joint
@@ -14,6 +15,7 @@ from flex_planner.ros import planning
 from flex_planner.ros.planning import Outcome, Planning
 from flex_planner.ros.recorder import OutcomeRecorder
 from flex_planner.ros.settings import PlannerSettings
+from flex_planner.ros.ticket import Ticket
 from flex_planner_interfaces.msg import PayloadSearch, PlanReport
 import pytest
 from ros_support import search_request, task
@@ -38,7 +40,7 @@ def test_stop_after_the_solve_is_reported_without_a_trajectory(
         raise StoppedError(reason)
 
     monkeypatch.setattr(planning, 'sample_reference', stopped)
-    outcome = worker.plan(task(), settings, lambda: False)
+    outcome = worker.plan(task(), Ticket(settings=settings))
     assert (outcome.report.error_code, outcome.report.error_msg) == (code, reason.value)
     assert not outcome.trajectory.points
     assert not outcome.publishable
@@ -56,12 +58,50 @@ def test_recording_that_is_told_to_stop_leaves_nothing_and_is_not_published(
         return reference
 
     monkeypatch.setattr(planning, 'sample_reference', sampled)
-    outcome = worker.plan(task(), settings, lambda: bool(told))
+    outcome = worker.plan(task(), Ticket(settings=settings, stopping=lambda: bool(told)))
     assert outcome.report.error_code == PlanReport.RECORDING_FAILED
     assert 'writing stopped after 0 of' in outcome.report.error_msg
     assert outcome.report.recording == ''
     assert not outcome.publishable
     assert list(tmp_path.iterdir()) == []
+
+
+def test_recording_that_is_abandoned_leaves_nothing(
+        worker: Planning, settings: PlannerSettings, tmp_path: Path,
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    reached, go_on = threading.Event(), threading.Event()
+
+    def stuck(*arguments: Any) -> None:
+        reached.set()
+        go_on.wait(10)
+
+    monkeypatch.setattr(OutcomeRecorder, '_write_states', stuck)
+    thread = threading.Thread(target=worker.plan, args=(task(), Ticket(settings=settings)))
+    thread.start()
+    assert reached.wait(20)
+    (stage,) = tmp_path.iterdir()
+    assert stage.name.startswith('.plan_path_')
+    worker.abandon()
+    assert list(tmp_path.iterdir()) == []
+    go_on.set()
+    thread.join(10)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_client_that_gives_up_is_recorded_as_canceled(
+        worker: Planning, settings: PlannerSettings, tmp_path: Path) -> None:
+    outcome = worker.plan(task(), Ticket(settings=settings, withdrawn=True))
+    assert outcome.report.error_code == PlanReport.CANCELED
+    assert [str(path) for path in tmp_path.iterdir()] == [outcome.report.recording]
+
+
+def test_ticket_tells_how_far_a_plan_is(worker: Planning, settings: PlannerSettings) -> None:
+    ticket = Ticket(settings=replace(settings, record=False))
+    assert ticket.progress.iteration == 0
+    outcome = worker.plan(task(), ticket)
+    assert ticket.progress.iteration == outcome.report.iterations > 0
+    assert ticket.progress.payload == 1.0
+    assert ticket.progress.intervals == outcome.report.mesh_intervals
 
 
 # The maximum payload
@@ -74,7 +114,7 @@ ACCURACY = 2e-3  # [kg], of both, and twice the default of a request
 
 def search(worker: Planning, settings: PlannerSettings, **fields: Any) -> Outcome:
     """Ask for the maximum payload of the motion of the paper with some fields changed."""
-    return worker.find_max_payload(search_request(**fields), settings, lambda: False)
+    return worker.find_max_payload(search_request(**fields), Ticket(settings=settings))
 
 
 def check_failure(outcome: Outcome, code: int, text: str) -> None:
@@ -161,8 +201,9 @@ def test_search_that_cannot_be_done_says_why(worker: Planning, settings: Planner
 def test_search_is_canceled_before_and_while_it_is_at_work(
         worker: Planning, settings: PlannerSettings, method: int, looks: int) -> None:
     left = iter(range(looks))
-    outcome = worker.find_max_payload(search_request(method=method), replace(
-        settings, record=False), lambda: next(left, None) is None)
+    ticket = Ticket(settings=replace(settings, record=False),
+                    stopping=lambda: next(left, None) is None)
+    outcome = worker.find_max_payload(search_request(method=method), ticket)
     assert (outcome.report.error_code, outcome.publishable) == (PlanReport.CANCELED, False)
     assert 0 <= outcome.report.iterations <= looks
     assert bool(outcome.report.iterations) == bool(looks)

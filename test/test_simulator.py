@@ -4,22 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 import copy
+from dataclasses import fields, replace
 from pathlib import Path
 import signal
+import time
 from typing import Any
 
 from flex_planner.arm import Arm
+from flex_planner.errors import InvalidValueError
 from flex_planner.model import ArmModel
 from flex_planner.path import plan_path
 from flex_planner.reference import sample_reference, SamplingSettings
 from flex_planner.ros.conversions import joint_trajectory
+from flex_planner.ros.parameters import as_mapping
 from flex_planner.ros.processes import NodeProcess
+from flex_planner.ros.simulator_settings import SimulatorSettings
 from geometry_msgs.msg import PointStamped
 import numpy as np
 import pytest
 from ros_support import Client, STARTING
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
 from trajectory_msgs.msg import JointTrajectory
+import yaml
 
 MODULE = 'flex_planner.ros.arm_simulator'
 START = [np.pi / 3, -2 * np.pi / 3]  # tip at (0.5, 0) m
@@ -30,16 +37,21 @@ RATE = 100.0
 class Simulator(Client):
     """The simulator and a client that hears all it says."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, space: str = '', **parameters: object) -> None:
         super().__init__()
         self._log = folder / 'log.txt'
         self.process = NodeProcess(MODULE, {
             'arm': 'korayem_ei50', 'joint_names': ['joint1', 'joint2'], 'payload_mass': 1.0,
-            'initial_positions': START, 'publish_rate': RATE}, log=self._log)
-        self.states: list[JointState] = self.listen(JointState, '/joint_states', 100)
-        self.modes: list[JointState] = self.listen(JointState, '/arm_simulator/modal_states', 100)
-        self.tips: list[PointStamped] = self.listen(PointStamped, '/arm_simulator/tip', 100)
-        self._command = self.node.create_publisher(JointTrajectory, '/joint_trajectory', 1)
+            'initial_positions': START, 'publish_rate': RATE, 'vibration_window': 0.5,
+            **parameters}, {'__ns': space or '/'}, log=self._log)
+        own = f'{space}/arm_simulator'
+        self.states: list[JointState] = self.listen(JointState, f'{space}/joint_states', 100)
+        self.modes: list[JointState] = self.listen(JointState, f'{own}/modal_states', 100)
+        self.tips: list[PointStamped] = self.listen(PointStamped, f'{own}/tip', 100)
+        self.vibrations: list[Float64] = self.listen(Float64, f'{own}/residual_vibration')
+        self.bendings: list[Float64] = self.listen(Float64, f'{own}/residual_bending')
+        self._command = self.node.create_publisher(
+            JointTrajectory, f'{space}/joint_trajectory', 1)
 
     def wait_until_ready(self) -> None:
         """Wait for the states and for the simulator's subscription."""
@@ -149,8 +161,79 @@ def test_arm_rests_and_then_follows_a_plan_to_the_goal(simulator: Simulator,
     assert max(np.abs(simulator.states[-1].velocity)) < 1e-3
 
 
+def test_residual_vibration_is_told_once_after_the_arrival(simulator: Simulator) -> None:
+    simulator.wait('vibration', lambda: bool(simulator.vibrations and simulator.bendings))
+    # of the samples of the trajectory, held for 1 ms: less than 0.01 mm
+    assert 0 < simulator.vibrations[0].data < 1e-5
+    assert 0 < simulator.bendings[0].data < 1e-5
+    assert len(simulator.vibrations) == len(simulator.bendings) == 1
+    assert 'after the arrival the tip moved by' in simulator.log()
+    assert simulator.latched(Float64, '/arm_simulator/residual_vibration').data < 1e-5
+
+
+def test_arm_that_differs_from_the_plan_shows_it(tmp_path: Path,
+                                                 planned: JointTrajectory) -> None:
+    step = 0.001
+    with Simulator(tmp_path, '/other', payload_mass=1.5, modes=1, rigidity_scale=0.5,
+                   added_friction=[0.2, 0.1], encoder_rate=500.0, encoder_resolution=step,
+                   encoder_differences=True, feedforward=False, disturbance_joint=2,
+                   disturbance_torque=3.0, disturbance_start=0.3,
+                   disturbance_duration=0.1) as arm, arm.process:
+        arm.wait_until_ready()
+        assert arm.modes[-1].name == ['link1_mode1', 'link2_mode1']
+        arm.command(planned, 'following a trajectory')
+        arm.wait('vibration', lambda: bool(arm.vibrations and arm.bendings))
+        assert 5e-3 < arm.vibrations[0].data < 0.5
+        assert 1e-4 < arm.bendings[0].data < 0.1
+        counts = np.array(arm.states[-1].position) / step
+        np.testing.assert_allclose(counts, np.round(counts), atol=1e-6)
+        assert arm.process.stop(signal.SIGTERM) == 0
+
+
+def test_simulator_that_is_too_slow_says_so_and_goes_on(tmp_path: Path) -> None:
+    began = time.monotonic()
+    with Simulator(tmp_path, '/slow', control_rate=1e5) as arm, arm.process:
+        arm.wait_until_ready()
+        reason = 'this machine is too slow for control_rate = 100000 Hz with 4 modes'
+        arm.wait('warning', lambda: reason in arm.log())
+        arm.states.clear()
+        arm.wait('states', lambda: bool(arm.states))
+        assert arm.process.stop(signal.SIGINT) == 0
+    assert arm.log().count(reason) <= 1 + (time.monotonic() - began) / 5  # one in 5 s
+
+
+@pytest.mark.parametrize(('changes', 'text'), [
+    ({'initial_positions': [0.1]}, 'initial_positions has 1 numbers'),
+    ({'stiffness': [1.0, -1.0]}, r'stiffness\[1\] is -1.0'),
+    ({'damping': [1.0]}, 'damping has 1 numbers'),
+    ({'added_friction': [0.0, -0.1]}, r'added_friction\[1\] is -0.1'),
+    ({'added_friction': [0.1]}, 'added_friction has 1 numbers'),
+    ({'modes': 9}, 'modes is 9'),
+    ({'rigidity_scale': 0.0}, 'rigidity_scale is 0.0'),
+    ({'encoder_rate': np.nan}, 'encoder_rate is nan'),
+    ({'encoder_resolution': -1.0}, 'encoder_resolution is -1.0'),
+    ({'disturbance_joint': 3}, 'disturbance_joint is 3'),
+    ({'disturbance_torque': np.inf}, 'disturbance_torque is inf'),
+    ({'disturbance_start': -1.0}, 'disturbance_start is -1.0'),
+    ({'disturbance_duration': np.nan}, 'disturbance_duration is nan')])
+def test_bad_settings_are_refused(ei50_arm: Arm, changes: dict[str, Any], text: str) -> None:
+    with pytest.raises(InvalidValueError, match=text):
+        replace(SimulatorSettings.for_arm(ei50_arm), **changes)
+
+
+def test_every_parameter_is_described_and_the_file_has_no_others(ei50_arm: Arm) -> None:
+    text = (Path(__file__).parents[1] / 'config' / 'planner.yaml').read_text()
+    written = yaml.safe_load(text)['arm_simulator']['ros__parameters']
+    written.pop('arm')
+    settings = replace(SimulatorSettings.for_arm(ei50_arm), **written)
+    assert set(written) <= set(as_mapping(settings))
+    assert settings.mismatch.applied(ei50_arm).links == ei50_arm.links
+    for entry in fields(settings):
+        assert entry.metadata['description'].text.endswith('.'), entry.name
+
+
 @pytest.mark.parametrize(('parameters', 'reason'), [
-    ({'initial_positions': [0.1]}, 'initial_positions'),
+    ({'disturbance_joint': 3}, 'disturbance_joint'),
     ({'arm': 'korayem_rigid', 'control_rate': 1.0}, 'control_rate')])
 def test_simulator_with_a_bad_parameter_says_so_and_ends(tmp_path: Path, reason: str,
                                                          parameters: dict[str, object]) -> None:

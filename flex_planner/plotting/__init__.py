@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from flex_planner.plotting.comparison import draw_comparison
 from flex_planner.plotting.modes import draw_mode_shapes
 from flex_planner.plotting.motion import draw_motion, Execution, Motion
 from flex_planner.plotting.payload import draw_max_payload
 
-__all__ = ['Execution', 'Motion', 'draw_max_payload', 'draw_mode_shapes', 'draw_motion']
+__all__ = ['Execution', 'Motion', 'draw_comparison', 'draw_max_payload', 'draw_mode_shapes',
+           'draw_motion']

@@ -3,72 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+import time
 
 from builtin_interfaces.msg import Time
-from flex_planner.arm import Arm
+from flex_planner.joint_control import JointReference
 from flex_planner.kinematics import tip_position
-from flex_planner.model import ArmModel
-from flex_planner.plant import Gains, JointReference, Plant
+from flex_planner.plant import Plant
+from flex_planner.plant_model import PlantModel
 from flex_planner.ros.conversions import duration_seconds
-from flex_planner.ros.parameters import declare, declare_arm, described
+from flex_planner.ros.parameters import declare, declare_arm
 from flex_planner.ros.running import run_node
+from flex_planner.ros.simulator_settings import SimulatorSettings
 from flex_planner.trajectory_rules import trajectory_violations
-from flex_planner.validation import Array, vector
+from flex_planner.validation import Array
+from flex_planner.vibration import ArrivalWatch, Residual
 from geometry_msgs.msg import PointStamped
 import numpy as np
 from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
 from trajectory_msgs.msg import JointTrajectory
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SimulatorSettings:
-    """
-    Parameters of the simulator; all read-only.
-
-    Raises
-    ------
-    InvalidValueError
-        If a list does not have one entry a joint.
-
-    """
-
-    joint_names: list[str] = described(
-        ['joint1'], 'Names of the joints, from the base outwards.', read_only=True)
-    initial_positions: list[float] = described(
-        [0.0], 'Joint angles at the start [rad].', read_only=True)
-    payload_mass: float = described(
-        1.0, 'Mass at the tip of the simulated arm [kg].', lowest=0.0, highest=1e6,
-        read_only=True)
-    payload_inertia: float = described(
-        0.0, 'Rotary inertia of that mass about the tip [kg m^2].', lowest=0.0, highest=1e6,
-        read_only=True)
-    stiffness: list[float] = described(
-        [100.0], 'Proportional gain of each joint [N m/rad].', read_only=True)
-    damping: list[float] = described(
-        [10.0], 'Derivative gain of each joint [N m s/rad].', read_only=True)
-    control_rate: float = described(
-        1000.0, 'Rate of the simulated controller [Hz].', lowest=10.0, highest=1e4,
-        read_only=True)
-    publish_rate: float = described(
-        100.0, 'Rate of the published states [Hz].', lowest=1.0, highest=1000.0, read_only=True)
-    start_tolerance: float = described(
-        0.05, 'A trajectory that starts further from the arm than this is refused [rad].',
-        lowest=0.0, highest=10.0, read_only=True)
-    base_frame: str = described('base_link', 'Frame of the tip.', read_only=True)
-
-    def __post_init__(self) -> None:
-        count = len(self.joint_names)
-        for name in ('initial_positions', 'stiffness', 'damping'):
-            vector(name, getattr(self, name), count)
-
-    @classmethod
-    def for_arm(cls, arm: Arm) -> SimulatorSettings:
-        """Return the defaults for an arm."""
-        n = arm.n_joints
-        return replace(cls(), joint_names=[f'joint{i}' for i in range(1, n + 1)],
-                       initial_positions=[0.0] * n, stiffness=[100.0] * n, damping=[10.0] * n)
+_LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+# in one go, so that messages and signals are served where the machine is too slow
+_LONGEST_WORK = 0.05  # [s]
+_TOO_LATE = 0.5  # [s]
+_WARNING_PERIOD = 5.0  # [s]
 
 
 class ArmSimulator(Node):  # type: ignore[misc]
@@ -82,8 +43,12 @@ class ArmSimulator(Node):  # type: ignore[misc]
     Topics published
     ----------------
     joint_states : sensor_msgs/msg/JointState
+        As measured by the encoders; the torques are those of the motors.
     ~/modal_states : sensor_msgs/msg/JointState
     ~/tip : geometry_msgs/msg/PointStamped
+    ~/residual_vibration, ~/residual_bending : std_msgs/msg/Float64
+        Once after each arrival, kept for late subscribers: peak-to-peak motion of the tip, and
+        of the deflection of the links where it is largest, over `vibration_window` [m].
 
     Raises
     ------
@@ -94,12 +59,16 @@ class ArmSimulator(Node):  # type: ignore[misc]
 
     def __init__(self) -> None:
         super().__init__('arm_simulator')
-        self._arm = declare_arm(self)
-        self._settings = declare(self, SimulatorSettings.for_arm(self._arm))
+        arm = declare_arm(self)
+        self._settings = declare(self, SimulatorSettings.for_arm(arm))
+        self._arm = self._settings.mismatch.applied(arm)
         self._plant = self._new_plant()
+        self._watch = ArrivalWatch(self._arm, self._settings.vibration_window)
         self._joints = self.create_publisher(JointState, 'joint_states', 10)
         self._modes = self.create_publisher(JointState, '~/modal_states', 10)
         self._tip = self.create_publisher(PointStamped, '~/tip', 10)
+        self._vibration = self.create_publisher(Float64, '~/residual_vibration', _LATCHED)
+        self._bending = self.create_publisher(Float64, '~/residual_bending', _LATCHED)
         self.create_subscription(JointTrajectory, 'joint_trajectory', self._on_trajectory, 1)
         self._began = self.get_clock().now()
         self.create_timer(1 / self._settings.publish_rate, self._on_timer)
@@ -107,12 +76,10 @@ class ArmSimulator(Node):  # type: ignore[misc]
 
     def _new_plant(self) -> Plant:
         settings = self._settings
-        gains = Gains(stiffness=np.asarray(settings.stiffness),
-                      damping=np.asarray(settings.damping))
-        return Plant(ArmModel(self._arm), payload_mass=settings.payload_mass,
-                     payload_inertia=settings.payload_inertia, gains=gains,
-                     positions=np.asarray(settings.initial_positions),
-                     rate=settings.control_rate)
+        return Plant(PlantModel(self._arm), settings.control,
+                     payload_mass=settings.payload_mass,
+                     payload_inertia=settings.payload_inertia,
+                     positions=np.asarray(settings.initial_positions))
 
     def _on_trajectory(self, trajectory: JointTrajectory) -> None:
         """Follow a trajectory, or say why not."""
@@ -121,9 +88,9 @@ class ArmSimulator(Node):  # type: ignore[misc]
         if refusal:
             self.get_logger().error(f'trajectory refused: {refusal}')
             return
-        n, n_t, state = self._arm.n_joints, self._arm.n_coordinates, self._plant.state
         reference = _reference(trajectory, self._settings.joint_names)
-        self._plant.follow(reference.after(state[:n], state[n_t:n_t + n], self._plant.torque))
+        self._plant.follow(reference.after(*self._plant.joint_state, self._plant.torque))
+        self._watch.expect(self._plant.time + reference.times[-1])
         self.get_logger().info(f'following a trajectory of {len(trajectory.points)} points')
 
     def _refusal(self, trajectory: JointTrajectory) -> str:
@@ -142,10 +109,11 @@ class ArmSimulator(Node):  # type: ignore[misc]
         """Bring the arm up to now and publish it."""
         self._advance()
         n, n_t = self._arm.n_joints, self._arm.n_coordinates
-        state, torque = self._plant.state, self._plant.torque
+        state, sensor = self._plant.state, self._plant.sensor
         stamp = self.get_clock().now().to_msg()
         self._joints.publish(_state_message(
-            stamp, self._settings.joint_names, state[:n], state[n_t:n_t + n], torque))
+            stamp, self._settings.joint_names, sensor.positions, sensor.speeds,
+            self._plant.torque))
         if self._arm.n_modes:
             self._modes.publish(_state_message(
                 stamp, self._arm.modal_names, state[n:n_t], state[n_t + n:], np.zeros(0)))
@@ -155,8 +123,35 @@ class ArmSimulator(Node):  # type: ignore[misc]
         self._tip.publish(tip)
 
     def _advance(self) -> None:
-        elapsed = self.get_clock().now() - self._began
-        self._plant.advance(elapsed.nanoseconds * 1e-9)
+        """Bring the arm up to now, or as far as it may go at once."""
+        now, plant, limit = self._now(), self._plant, time.monotonic() + _LONGEST_WORK
+        while plant.time + plant.period <= now and time.monotonic() < limit:
+            plant.advance(plant.time + plant.period, self._see)
+        late = self._now() - plant.time
+        if late > _TOO_LATE:
+            self.get_logger().warning(
+                f'the simulation is {late:.2f} s late: this machine is too slow for '
+                f'control_rate = {self._settings.control_rate:g} Hz with '
+                f'{self._arm.n_modes} modes', throttle_duration_sec=_WARNING_PERIOD)
+
+    def _now(self) -> float:
+        """Return the time since the start [s]."""
+        return float((self.get_clock().now() - self._began).nanoseconds) * 1e-9
+
+    def _see(self, plant: Plant) -> None:
+        """Look at the arm after a period of the controller."""
+        self._watch.see(plant.time, plant.state)
+        residual = self._watch.result(plant.time)
+        if residual is not None:
+            self._publish_residual(residual)
+
+    def _publish_residual(self, residual: Residual) -> None:
+        """Publish what was left after an arrival."""
+        self._vibration.publish(Float64(data=residual.tip))
+        self._bending.publish(Float64(data=residual.bending))
+        self.get_logger().info(
+            f'after the arrival the tip moved by {residual.tip * 1e3:.2g} mm and the links bent '
+            f'by {residual.bending * 1e3:.2g} mm, peak to peak')
 
 
 def _reference(trajectory: JointTrajectory, names: list[str]) -> JointReference:

@@ -1,51 +1,54 @@
-"""The planner node: services that plan, topics that carry the plan to controllers."""
+"""The planner node: services and actions that plan, topics that carry the plan to controllers."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
-import time
+import sys
 from typing import Any
 
 from flex_planner.model import ArmModel
 from flex_planner.ros.conversions import duration_seconds
+from flex_planner.ros.desk import Desk, Pending, Work
+from flex_planner.ros.diagnostics import Diagnostics, Record
+from flex_planner.ros.endpoints import Counter, Endpoint, fill_plan, fill_search
+from flex_planner.ros.markers import motion_markers
 from flex_planner.ros.parameters import declare, declare_arm, judge_changes, validated_changes
-from flex_planner.ros.payload_messages import fill_response, search_without_result
-from flex_planner.ros.planning import busy, Outcome, Planning, unknown_failure
+from flex_planner.ros.planning import Outcome, Planning, unknown_failure
 from flex_planner.ros.recorder import OutcomeRecorder
 from flex_planner.ros.running import run_node
 from flex_planner.ros.settings import PlannerSettings
-from flex_planner.ros.worker import Worker
+from flex_planner.ros.streamer import Streamer
+from flex_planner_interfaces import action
 from flex_planner_interfaces.msg import FlexibleTrajectory, MotionTask
 from flex_planner_interfaces.srv import FindMaxPayload, PlanPath
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.task import Future
 from trajectory_msgs.msg import JointTrajectory
+from visualization_msgs.msg import MarkerArray
 
 LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
                      durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _STOP_TIMEOUT = 0.5
-# from the parameters, whether to stop, and the time waited [ns] to what came of a request
-Work = Callable[[PlannerSettings, Callable[[], bool], int], Outcome]
+_SWITCH_INTERVAL = 5e-4  # [s], the solver hands over to callbacks that soon where it can
 
 
 class PlannerNode(Node):  # type: ignore[misc]
     """
     Plans motions of one arm on request.
 
-    Services
-    --------
-    ~/plan_path : flex_planner_interfaces/srv/PlanPath
-    ~/find_max_payload : flex_planner_interfaces/srv/FindMaxPayload
+    Services and actions
+    --------------------
+    ~/plan_path : flex_planner_interfaces/srv/PlanPath, flex_planner_interfaces/action/PlanPath
+    ~/find_max_payload : flex_planner_interfaces/srv/FindMaxPayload, .../action/FindMaxPayload
 
     Topics published
     ----------------
     ~/joint_trajectory : trajectory_msgs/msg/JointTrajectory, latched
     ~/flexible_trajectory : flex_planner_interfaces/msg/FlexibleTrajectory, latched
+    ~/reference_states : sensor_msgs/msg/JointState, along a published plan, by another process
+    ~/markers : visualization_msgs/msg/MarkerArray, latched
+    /diagnostics : diagnostic_msgs/msg/DiagnosticArray
 
     Raises
     ------
@@ -59,21 +62,31 @@ class PlannerNode(Node):  # type: ignore[misc]
         arm = declare_arm(self)
         self._settings = declare(self, PlannerSettings.for_arm(arm))
         self._settings.check_joints(arm.n_joints)
+        self._streamer = Streamer(self)
         self.add_on_set_parameters_callback(self._judge_parameters)
         self.add_post_set_parameters_callback(self._apply_parameters)
         self.get_logger().info(f'preparing the dynamics of {arm.name}')
         self._planning = Planning(ArmModel(arm),
                                   OutcomeRecorder(arm, self.get_fully_qualified_name()))
-        self._worker = Worker(self._settings.queue_length)
+        self._desk = Desk(self._settings.queue_length)
         self._joints = self.create_publisher(JointTrajectory, '~/joint_trajectory', LATCHED)
         self._flexible = self.create_publisher(
             FlexibleTrajectory, '~/flexible_trajectory', LATCHED)
-        # in the group that all else is in, a request that waits would hold up the others
-        group = ReentrantCallbackGroup()
-        self.create_service(PlanPath, '~/plan_path', self._on_plan_path, callback_group=group)
-        self.create_service(FindMaxPayload, '~/find_max_payload', self._on_find_max_payload,
-                            callback_group=group)
+        self._markers = self.create_publisher(MarkerArray, '~/markers', LATCHED)
+        self._record = Record()
+        self._diagnostics = Diagnostics(self, self._desk, self._record, arm.name)
+        self._endpoints = self._create_endpoints()
+        self._streamer.wait_until_ready()
         self.get_logger().info(f'ready to plan for {arm.name}')
+
+    def _create_endpoints(self) -> list[Endpoint]:
+        counter = Counter(self._submit, self._desk.withdraw, self._conclude)
+        plan, search = self._planning.plan, self._planning.find_max_payload
+        return [
+            Endpoint(self, '~/plan_path', (PlanPath, action.PlanPath), counter,
+                     lambda request, ticket: plan(request.task, ticket), fill_plan),
+            Endpoint(self, '~/find_max_payload', (FindMaxPayload, action.FindMaxPayload), counter,
+                     search, fill_search)]
 
     def _judge_parameters(self, changes: list[Parameter]) -> SetParametersResult:
         return judge_changes(self._settings, changes)
@@ -81,52 +94,32 @@ class PlannerNode(Node):  # type: ignore[misc]
     def _apply_parameters(self, changes: list[Parameter]) -> None:
         self._settings = validated_changes(self._settings, changes)
 
-    async def _on_plan_path(self, request: PlanPath.Request,
-                            response: PlanPath.Response) -> PlanPath.Response:
-        """Plan a motion."""
-        outcome = await self._answered(partial(self._planning.plan, request.task), request.task)
-        response.report, response.trajectory = outcome.report, outcome.trajectory
-        return response
+    def _submit(self, work: Work) -> Pending:
+        return self._desk.submit(work, self._settings, self.executor)
 
-    async def _on_find_max_payload(self, request: FindMaxPayload.Request,
-                                   response: FindMaxPayload.Response) -> FindMaxPayload.Response:
-        """Search for the maximum payload."""
-        outcome = await self._answered(partial(self._planning.find_max_payload, request),
-                                       request.task)
-        response.report, response.trajectory = outcome.report, outcome.trajectory
-        fill_response(response, outcome.search or search_without_result(request))
-        return response
-
-    async def _answered(self, work: Work, task: MotionTask) -> Outcome:
+    async def _conclude(self, pending: Pending, task: MotionTask) -> Outcome:
         """Return what a request led to: an exception here would end the node."""
         try:
-            outcome: Outcome = await self._outcome(work)
+            outcome: Outcome = await pending.future
             if task.publish and outcome.publishable:
-                self._publish(outcome)
+                self._publish(outcome, pending.ticket.settings)
         except Exception as error:
             self.get_logger().error(f'a request failed: {type(error).__name__}: {error}')
             outcome = unknown_failure(error)
+        self._record.add(outcome.report)
         self._log(outcome)
         return outcome
 
-    def _outcome(self, work: Work) -> Future:
-        """Hand a request to the worker and return what it will lead to."""
-        executor, settings = self.executor, self._settings
-        future, accepted = Future(executor=executor), time.monotonic_ns()
-
-        def job() -> None:
-            future.set_result(work(settings, lambda: self._worker.stopping,
-                                   time.monotonic_ns() - accepted))
-            # a future that another thread completes does not wake the executor by itself
-            executor.wake()
-
-        if not self._worker.submit(job):
-            future.set_result(busy(settings.queue_length))
-        return future
-
-    def _publish(self, outcome: Outcome) -> None:
+    def _publish(self, outcome: Outcome, settings: PlannerSettings) -> None:
+        """Publish a plan and stream it from now on."""
+        plan, reference = outcome.plan, outcome.reference
+        if plan is None or reference is None:
+            return
+        markers = motion_markers(plan.arm, reference, settings.base_frame)
         self._joints.publish(outcome.trajectory.joint_trajectory)
         self._flexible.publish(outcome.trajectory)
+        self._markers.publish(markers)
+        self._streamer.start(plan, reference, settings)
 
     def _log(self, outcome: Outcome) -> None:
         report = outcome.report
@@ -142,13 +135,16 @@ class PlannerNode(Node):  # type: ignore[misc]
             self.get_logger().warning(f'error {report.error_code}: {report.error_msg}')
 
     def destroy_node(self) -> Any:
-        """Stop the worker, then the node."""
-        self._worker.stop(_STOP_TIMEOUT)
+        """Stop the streamer and the worker, then the node."""
+        self._streamer.close()
+        if not self._desk.close(_STOP_TIMEOUT):
+            self._planning.abandon()
         return super().destroy_node()
 
 
 def main(args: list[str] | None = None) -> None:
     """Run the planner node until it is told to stop."""
+    sys.setswitchinterval(_SWITCH_INTERVAL)
     run_node(PlannerNode, 'flex_planner', args)
 
 

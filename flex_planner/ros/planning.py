@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 import logging
-import time
+from pathlib import Path
+import shutil
 
 from flex_planner.errors import FlexPlannerError, InvalidTaskError
 from flex_planner.model import ArmModel
 from flex_planner.path import plan_path
 from flex_planner.payload import find_max_payload
 from flex_planner.plan import Plan
-from flex_planner.progress import Monitor, StoppedError
+from flex_planner.progress import Monitor, StoppedError, StopReason
 from flex_planner.reference import Reference, sample_reference
 from flex_planner.ros.conversions import (
     add_reference,
@@ -35,6 +36,7 @@ from flex_planner.ros.payload_messages import (
 )
 from flex_planner.ros.recorder import OutcomeRecorder
 from flex_planner.ros.settings import PlannerSettings
+from flex_planner.ros.ticket import Ticket
 from flex_planner.task import Task
 from flex_planner.trajectory_rules import trajectory_violations
 from flex_planner_interfaces.msg import (
@@ -93,9 +95,9 @@ class Planning:
 
     def __init__(self, model: ArmModel, recorder: OutcomeRecorder) -> None:
         self._model, self._recorder = model, recorder
+        self._recorded_now: PlanReport | None = None
 
-    def plan(self, message: MotionTask, settings: PlannerSettings,
-             canceled: Callable[[], bool], waited_ns: int = 0) -> Outcome:
+    def plan(self, message: MotionTask, ticket: Ticket) -> Outcome:
         """
         Plan a request and record it with its outcome.
 
@@ -103,34 +105,34 @@ class Planning:
         ----------
         message : MotionTask
             The request.
-        settings : PlannerSettings
-            Parameters when it arrived.
-        canceled : callable
-            Returns True once planning should stop.
-        waited_ns : int
-            How long ago the request was accepted [ns].
+        ticket : Ticket
+            What it is served with.
 
         """
+        settings = ticket.settings
+
         def planned(task: Task, monitor: Monitor) -> Outcome:
+            monitor.payload = task.payload_mass
             plan = plan_path(task, model=self._model, settings=settings.solver(),
                              monitor=monitor, objectives=objectives_from_message(message))
             return _outcome(report_from_plan(plan), plan, settings, monitor)
 
-        return self._concluded(planned, message, settings, canceled, waited_ns)
+        return self._concluded(planned, message, ticket)
 
-    def find_max_payload(self, request: FindMaxPayload.Request, settings: PlannerSettings,
-                         canceled: Callable[[], bool], waited_ns: int = 0) -> Outcome:
+    def find_max_payload(self, request: FindMaxPayload.Request, ticket: Ticket) -> Outcome:
         """
         Find the maximum payload, plan the motion with it, and record both.
 
         Parameters
         ----------
         request : FindMaxPayload.Request
-            The request.
-        settings, canceled, waited_ns
-            See `plan`.
+            The request, or the goal of the action, which has the same fields.
+        ticket : Ticket
+            What it is served with.
 
         """
+        settings = ticket.settings
+
         def searched(task: Task, monitor: Monitor) -> Outcome:
             if objectives_from_message(request.task) is not None:
                 raise InvalidTaskError('objectives such as max_joint_speeds do not go with a '
@@ -142,18 +144,23 @@ class Planning:
             outcome = _outcome(report_from_search(found), found.plan, settings, monitor)
             return replace(outcome, search=search_message(found, options))
 
-        return self._concluded(searched, request.task, settings, canceled, waited_ns,
-                               search_without_result(request))
+        return self._concluded(searched, request.task, ticket, search_without_result(request))
+
+    def abandon(self) -> None:
+        """Remove what is left of a recording that another thread had no time to finish."""
+        report = self._recorded_now
+        path = Path(report.recording) if report and report.recording else None
+        for stage in path.parent.glob(f'.{path.name}.*') if path else ():
+            shutil.rmtree(stage, ignore_errors=True)
 
     def _concluded(self, work: Callable[[Task, Monitor], Outcome], message: MotionTask,
-                   settings: PlannerSettings, canceled: Callable[[], bool], waited_ns: int,
-                   search: PayloadSearch | None = None) -> Outcome:
+                   ticket: Ticket, search: PayloadSearch | None = None) -> Outcome:
         """Do the work of a request and record its outcome, with `search` where it failed."""
-        accepted, stamp = time.monotonic_ns() - waited_ns, time.time_ns() - waited_ns
         try:
-            task = task_from_message(message, self._model.arm, settings)
-            monitor = Monitor(time_limit=planning_time_limit(message, settings),
-                              canceled=canceled)
+            ticket.report(replace(ticket.progress, phase='start'))
+            task = task_from_message(message, self._model.arm, ticket.settings)
+            monitor = Monitor(time_limit=planning_time_limit(message, ticket.settings),
+                              canceled=ticket.canceled, report=ticket.report)
             outcome = work(task, monitor)
         except FlexPlannerError as error:
             outcome = _failure(error_code(error), str(error))
@@ -163,20 +170,20 @@ class Planning:
             _LOG.exception('planning failed')
             outcome = unknown_failure(error)
         outcome = replace(outcome, search=outcome.search or search)
-        outcome.report.planning_time = duration_message(time.monotonic_ns() - accepted)
-        return self._recorded(message, settings, outcome, stamp, canceled)
+        outcome.report.planning_time = duration_message(ticket.elapsed_ns)
+        return self._recorded(message, ticket, outcome)
 
-    def _recorded(self, message: MotionTask, settings: PlannerSettings, outcome: Outcome,
-                  stamp: int, canceled: Callable[[], bool]) -> Outcome:
+    def _recorded(self, message: MotionTask, ticket: Ticket, outcome: Outcome) -> Outcome:
         """Record an outcome; a plan that cannot be recorded is a failure with a trajectory."""
         # a node that ends has no time to record what it gave up
-        if not settings.record or (outcome.report.error_code == PlanReport.CANCELED
-                                   and canceled()):
+        given_up = outcome.report.error_code == PlanReport.CANCELED and ticket.stopping()
+        if not ticket.settings.record or given_up:
             return outcome
+        self._recorded_now = outcome.report
         try:
             path = self._recorder.write(
-                settings, stamp, message, outcome.report, outcome.trajectory, outcome.plan,
-                outcome.reference, canceled, search=outcome.search)
+                ticket.settings, ticket.stamp_ns, message, outcome.report, outcome.trajectory,
+                outcome.plan, outcome.reference, ticket.stopping, search=outcome.search)
         except Exception as error:
             foreseen = isinstance(error, FlexPlannerError)
             _LOG.error('recording failed: %s', error, exc_info=not foreseen)
@@ -186,6 +193,8 @@ class Planning:
             outcome.report.error_code = PlanReport.RECORDING_FAILED
             outcome.report.error_msg = f'the plan could not be recorded: {error}'
             return outcome
+        finally:
+            self._recorded_now = None
         outcome.report.recording = str(path)
         return outcome
 
@@ -212,6 +221,13 @@ def _failure(code: int, sentence: str) -> Outcome:
 def unknown_failure(error: Exception) -> Outcome:
     """Return the outcome of an exception that nobody foresaw."""
     return _failure(PlanReport.UNKNOWN, f'{type(error).__name__}: {error}')
+
+
+def canceled(ticket: Ticket) -> Outcome:
+    """Return the outcome of a request that its client gave up."""
+    outcome = _failure(PlanReport.CANCELED, StopReason.CANCELED.value)
+    outcome.report.planning_time = duration_message(ticket.elapsed_ns)
+    return outcome
 
 
 def busy(queue_length: int) -> Outcome:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import faulthandler
 import logging
 import os
 import signal
 import sys
 import threading
+import time
 
 from flex_planner.errors import FlexPlannerError
 from flex_planner.ros.logs import forward_logs
@@ -18,6 +20,8 @@ import rclpy.logging
 from rclpy.node import Node
 
 _LONGEST_WAIT = 0.2  # [s]
+_LAST_RESORT = 3.0  # [s] after a signal
+_AFTER_ERROR = 0.01  # [s]; an error that comes again and again must not fill disk and processor
 
 
 def run_node(create: Callable[[], Node], name: str, args: list[str] | None) -> None:
@@ -38,6 +42,8 @@ def run_node(create: Callable[[], Node], name: str, args: list[str] | None) -> N
     node, code, started = None, 0, False
 
     def on_signal(number: int, frame: object) -> None:
+        # should anything below hang, say where, and end
+        faulthandler.dump_traceback_later(_LAST_RESORT, exit=True)
         # once it spins, rclpy ends it between two callbacks; before, nobody would for seconds
         if not started:
             sys.exit(0)
@@ -54,7 +60,7 @@ def run_node(create: Callable[[], Node], name: str, args: list[str] | None) -> N
         # spin() would wait without end: where the signal that ends rclpy comes between two waits,
         # its wake-up is lost now and then
         while rclpy.ok():
-            executor.spin_once(timeout_sec=_LONGEST_WAIT)
+            _spin_once(executor, name)
     except ExternalShutdownException:
         pass
     except (FlexPlannerError, ParameterException) as error:
@@ -68,6 +74,26 @@ def run_node(create: Callable[[], Node], name: str, args: list[str] | None) -> N
             node.destroy_node()
         rclpy.try_shutdown()
     _leave(code)
+
+
+def _spin_once(executor: SingleThreadedExecutor, name: str) -> None:
+    """
+    Let the executor do one thing.
+
+    Requests that rclpy itself cannot digest, such as a parameter of an unknown type, raise here:
+    they get no answer, but all others do.
+
+    """
+    try:
+        executor.spin_once(timeout_sec=_LONGEST_WAIT)
+    except ExternalShutdownException:
+        raise
+    except Exception as error:
+        if not rclpy.ok():
+            raise
+        rclpy.logging.get_logger(name).error(
+            f'a callback failed: {type(error).__name__}: {error}')
+        time.sleep(_AFTER_ERROR)
 
 
 def _leave(code: int) -> None:

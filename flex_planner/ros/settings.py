@@ -66,6 +66,9 @@ class PlannerSettings:
     torque_tolerance: float = described(
         0.02, 'Samples get closer until linear interpolation of the torque is this exact [N m].',
         lowest=1e-6, highest=1e6)
+    reference_rate: float = described(
+        100.0, 'States a second that are streamed along a published plan [Hz].', lowest=1.0,
+        highest=1000.0)
     queue_length: int = described(
         8, 'Requests that may wait; more are answered BUSY.', lowest=1, highest=1000,
         read_only=True)

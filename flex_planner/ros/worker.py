@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 import logging
-import queue
 import threading
 
 Job = Callable[[], None]
@@ -24,8 +24,10 @@ class Worker:
     """
 
     def __init__(self, queue_length: int) -> None:
-        self._jobs: queue.Queue[Job | None] = queue.Queue(queue_length)
-        self._stopping = threading.Event()
+        self._queue_length = queue_length
+        self._jobs: deque[Job] = deque()
+        self._changed = threading.Condition()
+        self._stopping = False
         # a daemon: should a job not listen, the process still ends
         self._thread = threading.Thread(target=self._run, name='planner', daemon=True)
         self._thread.start()
@@ -33,32 +35,46 @@ class Worker:
     @property
     def stopping(self) -> bool:
         """Whether the node is shutting down; long jobs look at it and give up."""
-        return self._stopping.is_set()
+        return self._stopping
+
+    @property
+    def waiting(self) -> int:
+        """How many jobs wait."""
+        return len(self._jobs)
 
     def submit(self, job: Job) -> bool:
         """Queue a job; return False if the queue is full or the worker is stopping."""
-        if self.stopping:
-            return False
-        try:
-            self._jobs.put_nowait(job)
-        except queue.Full:
-            return False
+        with self._changed:
+            if self._stopping or len(self._jobs) >= self._queue_length:
+                return False
+            self._jobs.append(job)
+            self._changed.notify()
         return True
 
-    def stop(self, timeout: float) -> None:
-        """Tell the running job to give up, drop the others, and wait for the thread [s]."""
-        self._stopping.set()
-        try:
-            self._jobs.put_nowait(None)
-        except queue.Full:
-            pass  # the thread is busy and looks at `stopping` before the next job
+    def withdraw(self, job: Job) -> bool:
+        """Drop a job that still waits; return False if it does not."""
+        with self._changed:
+            if job not in self._jobs:
+                return False
+            self._jobs.remove(job)
+        return True
+
+    def stop(self, timeout: float) -> bool:
+        """Tell the running job to give up, drop the others, wait [s]; return whether it did."""
+        with self._changed:
+            self._stopping = True
+            self._changed.notify()
         self._thread.join(timeout)
+        return not self._thread.is_alive()
+
+    def _next(self) -> Job | None:
+        """Wait for a job; None when the worker stops."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._stopping or self._jobs)
+            return None if self._stopping else self._jobs.popleft()
 
     def _run(self) -> None:
-        while not self.stopping:
-            job = self._jobs.get()
-            if job is None:
-                return
+        while (job := self._next()) is not None:
             try:
                 job()
             except Exception:

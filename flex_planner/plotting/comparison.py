@@ -1,0 +1,104 @@
+"""A task carried out as planned with flexible and with rigid links."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from flex_planner.comparison import Comparison
+from flex_planner.execution import Outcome, Way
+from flex_planner.plotting.figures import finish, save, say
+from flex_planner.validation import Array
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+import numpy as np
+
+_MILLI = 1e3
+_STYLES = {Way.FLEXIBLE_OPEN: ('C0', '--'), Way.RIGID_OPEN: ('C3', '--'),
+           Way.FLEXIBLE: ('C0', '-'), Way.RIGID: ('C3', '-'), Way.PD_ONLY: ('C1', '-')}
+# of the tip's distance from the goal: less is rounding and sampling
+_FLOOR = 1e-6  # [mm]
+_MARGIN = 0.15
+
+
+def draw_comparison(path: Path, comparison: Comparison) -> None:
+    """
+    Write a picture of a comparison as PNG.
+
+    Parameters
+    ----------
+    path : Path
+        File to write.
+    comparison : Comparison
+        With a line for each outcome. Above: the distance of the tip from the goal after its
+        arrival, and its path there. Below: the torques.
+
+    """
+    n = comparison.flexible.arm.n_joints
+    figure = Figure(figsize=(14, 10), layout='constrained')
+    above, below = figure.subfigures(2, 1, height_ratios=[1.25, 1])
+    distance, path_axes = above.subplots(1, 2, width_ratios=[1.3, 1])
+    torques = np.atleast_1d(below.subplots(1, n, sharey=True))
+    outcomes = comparison.outcomes
+    _draw_distance(distance, comparison)
+    _draw_paths(path_axes, comparison)
+    for joint, axes in enumerate(torques):
+        _draw_torques(axes, outcomes, joint)
+    if outcomes:
+        handles, labels = distance.get_legend_handles_labels()
+        figure.legend(handles, labels, loc='outside lower center', ncols=len(outcomes))
+    figure.suptitle(f'{comparison.flexible.arm.name}: one task, planned and carried out in '
+                    f'{len(outcomes)} ways')
+    save(figure, path)
+
+
+def _draw_distance(axes: Axes, comparison: Comparison) -> None:
+    """Draw the distance of the tip from the goal, from the arrival on."""
+    for outcome in comparison.outcomes:
+        color, style = _STYLES[outcome.way]
+        times, tip = _after_arrival(outcome)
+        distance = np.linalg.norm(tip - comparison.goal, axis=1) * _MILLI
+        axes.semilogy(times, np.maximum(distance, _FLOOR), style, color=color, linewidth=1.2,
+                      label=outcome.way.value)
+    if not comparison.outcomes:
+        say(axes, 'neither plan was solved')
+    axes.set(title='distance of the tip from the goal', xlabel='time after arrival [s]',
+             ylabel='distance [mm]')
+    axes.grid(alpha=0.3)
+
+
+def _draw_paths(axes: Axes, comparison: Comparison) -> None:
+    """Draw the path of the tip near the goal, from the arrival on."""
+    near = [outcome for outcome in comparison.outcomes if outcome.way is not Way.PD_ONLY]
+    reach = 0.0
+    for outcome in comparison.outcomes:
+        color, style = _STYLES[outcome.way]
+        path = (_after_arrival(outcome)[1] - comparison.goal) * _MILLI
+        axes.plot(*path.T, style, color=color, linewidth=1)
+        axes.plot(*path[0], 'o', color=color, markersize=5)
+        if outcome in near:
+            reach = max(reach, float(np.abs(path).max()))
+    axes.plot(0, 0, '+', color='black', markersize=14, label='goal')
+    axes.plot([], [], 'o', color='gray', markersize=5, label='on arrival')
+    if reach:
+        limit = reach * (1 + _MARGIN)
+        axes.set(xlim=(-limit, limit), ylim=(-limit, limit))
+    axes.set_aspect('equal', adjustable='box')
+    finish(axes, 'path of the tip after arrival, from the goal', 'y [mm]', 'x [mm]')
+
+
+def _draw_torques(axes: Axes, outcomes: tuple[Outcome, ...], joint: int) -> None:
+    """Draw what the motor of a joint did."""
+    for outcome in outcomes:
+        color, style = _STYLES[outcome.way]
+        execution = outcome.execution
+        axes.plot(execution.times, execution.torques[:, joint], style, color=color, linewidth=1)
+    for arrival in sorted({outcome.arrival for outcome in outcomes}):
+        axes.axvline(arrival, color='gray', linestyle=':', label='planned arrival')
+    finish(axes, f'torque of joint {joint + 1}', 'torque [N m]')
+
+
+def _after_arrival(outcome: Outcome) -> tuple[Array, Array]:
+    """Return times since the arrival, and the tip."""
+    times = outcome.execution.times - outcome.arrival
+    after = times >= -1e-9
+    return times[after], outcome.execution.tip[after]

@@ -1,0 +1,209 @@
+"""
+A published plan as a stream of reference states, in real time, in a process of its own.
+
+The solver's libraries keep Python's other threads from running for tens of milliseconds: a thread
+of the planner could not keep the times. Run as a program, this module reads plans from its
+standard input and publishes them; it ends with that input, and so with the planner. It imports
+nothing of the solver.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+import logging
+import os
+import pickle
+import signal
+import sys
+import threading
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+import rclpy
+from rclpy.signals import SignalHandlerOptions
+from scipy.interpolate import CubicHermiteSpline
+from sensor_msgs.msg import JointState
+
+Array = NDArray[np.float64]
+_BLOCK = 100  # states are interpolated that many at a time
+_DEPTH = 10
+_LOG = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StreamedPlan:
+    """
+    Samples of a plan, and how to stream them.
+
+    Attributes
+    ----------
+    names : list of str
+        Of the joints, then of the modal coordinates.
+    rate : float
+        States a second, above 0 [Hz].
+    stamp_ns, began_ns : int
+        When the motion starts, since 1970 and by the monotonic clock [ns].
+    times_ns : numpy.ndarray of int64, shape (k,)
+        Of the samples, from 0 [ns].
+    coordinates, rates, accelerations : numpy.ndarray, shape (k, n_t)
+        Joints [rad], then modes [m].
+    torques : numpy.ndarray, shape (k, n)
+        [N m].
+
+    """
+
+    names: list[str]
+    rate: float
+    stamp_ns: int
+    began_ns: int
+    times_ns: NDArray[np.int64]
+    coordinates: Array
+    rates: Array
+    accelerations: Array
+    torques: Array
+
+
+class ReferenceStates:
+    """
+    A plan at a constant rate, and at its end.
+
+    Between the samples, coordinates and rates follow cubic polynomials and torques are linear, as
+    they are for a joint_trajectory_controller.
+
+    Parameters
+    ----------
+    plan : StreamedPlan
+        Its samples.
+
+    """
+
+    def __init__(self, plan: StreamedPlan) -> None:
+        self.plan, times = plan, plan.times_ns * 1e-9
+        self._positions = CubicHermiteSpline(times, plan.coordinates, plan.rates)
+        self._velocities = CubicHermiteSpline(times, plan.rates, plan.accelerations)
+        # the last period may be up to half a period longer or shorter than the others
+        count = max(int(np.floor(times[-1] * plan.rate + 0.5)), 1)
+        grid = np.round(np.arange(count) / plan.rate * 1e9).astype(np.int64)
+        self.times_ns = np.append(grid, plan.times_ns[-1])
+
+    def messages(self) -> Iterator[JointState]:
+        """Yield the states."""
+        for first in range(0, len(self.times_ns), _BLOCK):
+            chosen = self.times_ns[first:first + _BLOCK]
+            for time_ns, *values in zip(chosen, *self._values(chosen * 1e-9), strict=True):
+                yield self._message(self.plan.stamp_ns + int(time_ns), *values)
+
+    def _values(self, times: Array) -> tuple[Array, Array, Array]:
+        """Return coordinates, rates, and torques with zeros for the modes."""
+        plan = self.plan
+        modes = np.zeros((len(times), len(plan.names) - plan.torques.shape[1]))
+        torques = [np.interp(times, plan.times_ns * 1e-9, column) for column in plan.torques.T]
+        return (self._positions(times), self._velocities(times),
+                np.column_stack([*torques, modes]))
+
+    def _message(self, stamp_ns: int, position: Array, velocity: Array,
+                 effort: Array) -> JointState:
+        message = JointState(name=self.plan.names, position=position.tolist(),
+                             velocity=velocity.tolist(), effort=effort.tolist())
+        stamp = message.header.stamp
+        stamp.sec, stamp.nanosec = divmod(stamp_ns, 10**9)
+        return message
+
+
+class Stream:
+    """
+    Publishes reference states when they are due, in its own thread.
+
+    Parameters
+    ----------
+    publish : callable
+        Takes a message; called from the thread.
+
+    """
+
+    def __init__(self, publish: Callable[[JointState], None]) -> None:
+        self._publish = publish
+        self._changed = threading.Condition()
+        self._next: StreamedPlan | None = None
+        self._closed = False
+        self._thread = threading.Thread(target=self._run, name='reference states', daemon=True)
+        self._thread.start()
+
+    def start(self, plan: StreamedPlan) -> None:
+        """Stream a plan, in place of one that is being streamed."""
+        with self._changed:
+            self._next = plan
+            self._changed.notify()
+
+    def close(self, timeout: float) -> None:
+        """End the stream and its thread [s]."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify()
+        self._thread.join(timeout)
+
+    def _interrupted(self) -> bool:
+        return self._closed or self._next is not None
+
+    def _run(self) -> None:
+        _hurry()
+        while True:
+            with self._changed:
+                self._changed.wait_for(self._interrupted)
+                if self._closed or self._next is None:
+                    return
+                plan, self._next = self._next, None
+            try:
+                self._play(ReferenceStates(plan))
+            except Exception:
+                _LOG.exception('streaming the reference states failed')
+
+    def _play(self, states: ReferenceStates) -> None:
+        """Publish states at their times until the last, or another plan."""
+        for time_ns, message in zip(states.times_ns, states.messages(), strict=True):
+            if self._wait(states.plan.began_ns + int(time_ns)):
+                return
+            self._publish(message)
+
+    def _wait(self, due_ns: int) -> bool:
+        """Wait until a time of the monotonic clock [ns]; return whether to stop instead."""
+        with self._changed:
+            while not self._interrupted():
+                left = due_ns - time.monotonic_ns()
+                if left <= 0:
+                    return False
+                self._changed.wait(left * 1e-9)
+        return True
+
+
+def _hurry() -> None:
+    """Let this thread run before others as soon as it is due, where the system allows that."""
+    with suppress(OSError):
+        os.sched_setscheduler(0, os.SCHED_RR | os.SCHED_RESET_ON_FORK, os.sched_param(1))
+
+
+def main() -> None:
+    """Publish plans from the standard input on a topic; arguments: name, namespace, topic."""
+    name, namespace, topic = sys.argv[1:]
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)  # the planner decides when it ends
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    node = rclpy.create_node(name, namespace=namespace, enable_rosout=False,
+                             start_parameter_services=False)
+    stream = Stream(node.create_publisher(JointState, topic, _DEPTH).publish)
+    print('ready', flush=True)
+    try:
+        while True:
+            stream.start(pickle.load(sys.stdin.buffer))
+    except EOFError:
+        stream.close(1.0)
+    node.destroy_node()
+    rclpy.try_shutdown()
+
+
+if __name__ == '__main__':
+    main()
