@@ -13,7 +13,8 @@ setup(
     license='Apache-2.0',
     python_requires='>=3.10',
     packages=find_packages(include=['flex_planner', 'flex_planner.*']),
-    package_data={'flex_planner': ['py.typed']},
+    package_data={'flex_planner': ['py.typed'],
+                  'flex_planner.report': ['page.html', 'plots.js']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),
@@ -38,6 +39,7 @@ setup(
         'console_scripts': [
             'planner = flex_planner.ros.planner_node:main',
             'arm_simulator = flex_planner.ros.arm_simulator:main',
+            'replay = flex_planner.ros.replay:main',
             'flex-planner = flex_planner.cli:main',
         ],
     },

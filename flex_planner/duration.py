@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
-from flex_planner.collocation import Settings
+from flex_planner.collocation import CollocationSolution, Settings, solve
 from flex_planner.errors import InvalidTaskError
-from flex_planner.families import changed, on_the_way, Stop
+from flex_planner.families import changed, durations, on_the_way, Stop
 from flex_planner.family_starts import quickest
 from flex_planner.ladder import LADDER, planned, STATUSES, STOPPED
 from flex_planner.limit_search import collected, is_near, plan_near, width
@@ -136,12 +136,14 @@ def _found(task: Task, problem: MotionProblem, settings: Settings, monitor: Moni
         return MinDuration(task=task, status=STOPPED[last.result.status],
                            message=last.result.message)
     if not last.result.converged:
-        plan = planned(problem, LADDER, settings, monitor)
-        status = PlanStatus.NOT_CONVERGED if plan.solved else plan.status
-        return MinDuration(task=task, status=status, message=plan.message)
+        first = planned(without_weights(problem), LADDER, settings, monitor)
+        if first.solution is None or not first.solved:
+            return MinDuration(task=task, status=first.status, message=first.message)
+        stops = _stops_from(first.problem, first.solution, settings, monitor, accuracy)
+        last = stops[-1]
     plan = plan_near(changed(problem, duration=last.value), last.result.solution, settings,
                      monitor)
-    lower = last.value - last.room
+    lower = max(0.0, last.value - last.room)
     found = MinDuration(task=task, status=plan.status, message=plan.message, plan=plan,
                         duration=last.value if plan.solved else np.inf, lower=lower,
                         stops=tuple(stop for stop in stops if stop.price))
@@ -151,6 +153,16 @@ def _found(task: Task, problem: MotionProblem, settings: Settings, monitor: Moni
         return replace(found, status=PlanStatus.NOT_CONVERGED, message=(
             f'{last.value:.6g} s are enough, but it was not shown that no less are'))
     return replace(found, message=f'{last.value:.6g} s are enough, {lower:.6g} s are not')
+
+
+def _stops_from(problem: MotionProblem, solution: CollocationSolution, settings: Settings,
+                monitor: Monitor, accuracy: float) -> list[Stop]:
+    """Return the motions on the way from one that took all strategies to find."""
+    way = on_the_way(settings, _EXACTNESS * accuracy)
+    first = solve(problem, solution, way, monitor)
+    stop = Stop(value=problem.task.duration, price=0.0, result=first, problem=problem)
+    family = durations(problem, first, way, monitor, lambda duration: width(accuracy, duration))
+    return [stop, *(each for each in collected(family, accuracy) if each.result.converged)]
 
 
 def _stops(problem: MotionProblem, settings: Settings, monitor: Monitor,

@@ -5,9 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+import shutil
 from typing import Any, NamedTuple
 
 from flex_planner.arm import Arm
+from flex_planner.reference import sample_reference
+from flex_planner.ros.conversions import (
+    flexible_trajectory,
+    joint_trajectory,
+    report_from_plan,
+)
 from flex_planner.ros.recorder import OutcomeRecorder
 from flex_planner.ros.settings import PlannerSettings
 from flex_planner_interfaces.msg import (
@@ -285,3 +292,24 @@ def test_failed_search_is_recorded_as_it_was_asked(planner: Planner, read: Any) 
     recorded, expected = only(found, 'payload_search'), recorded_search(response, **asked)
     assert recorded.time == only(found, 'plan_report').time
     np.testing.assert_equal(plain(recorded.message, expected), plain(expected, expected))
+
+
+# Bytes
+
+
+def test_same_request_and_outcome_make_the_same_bytes(plan_of: Any, ei50_arm: Arm,
+                                                      tmp_path: Path) -> None:
+    plan, stamp = plan_of('ei50', 0.8), 1_700_000_000_000_000_005
+    settings = replace(PlannerSettings.for_arm(ei50_arm), recording_folder=str(tmp_path / 'now'))
+    reference = sample_reference(plan, settings.sampling())
+    joints = joint_trajectory(reference, settings.joint_names)
+    contents = []
+    for _ in range(2):
+        trajectory = flexible_trajectory(plan, reference, joints, settings.base_frame)
+        folder = OutcomeRecorder(ei50_arm, NODE).write(
+            settings, stamp, task(), report_from_plan(plan), trajectory, plan, reference,
+            lambda: False)
+        contents.append({path.name: path.read_bytes() for path in folder.iterdir()})
+        shutil.rmtree(folder)
+    assert len(contents[0]) == 2
+    assert contents[0] == contents[1]

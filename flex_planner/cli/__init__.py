@@ -7,10 +7,11 @@ from collections.abc import Sequence
 import sys
 
 from flex_planner import __version__
-from flex_planner.cli import arm, motion
+from flex_planner.cli import arm, compare, motion, recordings
 from flex_planner.cli.options import with_joined_lists
 from flex_planner.cli.watching import CanceledError
 from flex_planner.errors import FlexPlannerError
+from flex_planner.progress import StoppedError, StopReason
 
 _CANCELED = 130  # what a shell makes of a process that SIGINT ended
 
@@ -32,6 +33,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (FlexPlannerError, OSError) as error:
         print(f'flex-planner: {error}', file=sys.stderr)
         return 1
+    except StoppedError as stop:
+        print(f'flex-planner: {stop}', file=sys.stderr)
+        return _CANCELED if stop.reason is StopReason.CANCELED else 1
     except (CanceledError, KeyboardInterrupt) as error:
         print(f'flex-planner: {str(error) or "canceled"}', file=sys.stderr)
         return _CANCELED
@@ -45,4 +49,6 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar='COMMAND')
     arm.add_command(commands)
     motion.add_commands(commands)
+    compare.add_command(commands)
+    recordings.add_commands(commands)
     return parser

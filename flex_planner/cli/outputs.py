@@ -61,7 +61,7 @@ class Outputs:
         """
         draws, records = not options.no_plot, not options.no_recording
         if draws or records:
-            _check_folder(options.output)
+            check_folder(options.output)
         return cls(folder=options.output, stem=Path(options.arm).stem, draws=draws,
                    recorder=_recorder(request, options.output) if records else None)
 
@@ -105,7 +105,7 @@ def add_outputs(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--no-recording', action='store_true', help='record nothing')
 
 
-def _check_folder(folder: Path) -> None:
+def check_folder(folder: Path) -> None:
     """Raise InvalidValueError unless files can be made in a folder, or the folder itself."""
     there = folder.absolute()
     while not os.path.lexists(there):

@@ -2,21 +2,27 @@
 Recordings of plans that ROS 2 tools open, written and read without ROS.
 
 A recording is a folder ``<name>/`` with ``<name>_0.mcap`` and ``metadata.yaml``, as ``ros2 bag
-record -s mcap`` leaves one behind. Identical inputs give identical bytes: the messages are
-encoded here, not by a middleware, and nothing in the files depends on the clock or the machine.
+record -s mcap`` leaves one behind; a split one has ``<name>_1.mcap`` and so on. Identical inputs
+give identical bytes: the messages are encoded here, not by a middleware, and nothing in the files
+depends on the clock or the machine.
 
 """
 
 from __future__ import annotations
 
 from flex_planner.recording.definitions import definition_folder, MessageTypes
-from flex_planner.recording.metadata import RecordingMetadata, TopicSummary
+from flex_planner.recording.metadata import FileSummary, RecordingMetadata, TopicSummary
+from flex_planner.recording.playback import from_time
 from flex_planner.recording.reader import (
+    check_definition,
     read_attachments,
     read_metadata,
     read_recording,
+    read_serialized,
     RecordedMessage,
+    SerializedMessage,
 )
+from flex_planner.recording.recovery import recover_recording
 from flex_planner.recording.topics import (
     DEFAULT,
     Durability,
@@ -31,16 +37,22 @@ __all__ = [
     'DEFAULT',
     'LATCHED',
     'Durability',
+    'FileSummary',
     'MessageTypes',
     'QosProfile',
     'RecordedMessage',
     'Recording',
     'RecordingMetadata',
     'Reliability',
+    'SerializedMessage',
     'Topic',
     'TopicSummary',
+    'check_definition',
     'definition_folder',
+    'from_time',
     'read_attachments',
     'read_metadata',
     'read_recording',
+    'read_serialized',
+    'recover_recording',
 ]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Final
 
@@ -50,16 +50,40 @@ class TopicSummary:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class FileSummary:
+    """
+    One file of a recording.
+
+    Parameters
+    ----------
+    name : str
+        Name of the MCAP file.
+    start_ns, end_ns : int
+        Log time of the first and the last message, 0 where there is none [ns].
+    message_count : int
+        Number of messages.
+
+    """
+
+    name: str
+    start_ns: int
+    end_ns: int
+    message_count: int
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the entry of ``files``."""
+        return {'path': self.name, **_extent(self.start_ns, self.end_ns, self.message_count)}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RecordingMetadata:
     """
     Summary of a recording.
 
     Parameters
     ----------
-    file_name : str
-        Name of the MCAP file.
-    start_ns, end_ns : int
-        Log time of the first and the last message [ns].
+    files : tuple of FileSummary
+        In the order of their messages; one unless the recording was split.
     topics : tuple of TopicSummary
         Topics in the order of their first message.
     custom_data : mapping of str to str
@@ -67,15 +91,23 @@ class RecordingMetadata:
 
     """
 
-    file_name: str
-    start_ns: int
-    end_ns: int
+    files: tuple[FileSummary, ...]
     topics: tuple[TopicSummary, ...]
     custom_data: Mapping[str, str]
 
     def __post_init__(self) -> None:
         """Check and copy the custom data."""
         object.__setattr__(self, 'custom_data', checked_custom_data(self.custom_data))
+
+    @property
+    def start_ns(self) -> int:
+        """Return the log time of the first message, 0 without one [ns]."""
+        return min((file.start_ns for file in self.files if file.message_count), default=0)
+
+    @property
+    def end_ns(self) -> int:
+        """Return the log time of the last message, 0 without one [ns]."""
+        return max((file.end_ns for file in self.files if file.message_count), default=0)
 
     @property
     def message_count(self) -> int:
@@ -92,12 +124,12 @@ class RecordingMetadata:
         return {
             'version': METADATA_VERSION,
             'storage_identifier': 'mcap',
-            **self._extent(),
+            **_extent(self.start_ns, self.end_ns, self.message_count),
             'topics_with_message_count': [topic.to_dict() for topic in self.topics],
             'compression_format': '',
             'compression_mode': '',
-            'relative_file_paths': [self.file_name],
-            'files': [{'path': self.file_name, **self._extent()}],
+            'relative_file_paths': [file.name for file in self.files],
+            'files': [file.to_dict() for file in self.files],
             'custom_data': dict(self.custom_data),
             'ros_distro': ROS_DISTRO,
         }
@@ -110,13 +142,26 @@ class RecordingMetadata:
         """Return the text of metadata.yaml."""
         return _dump({'rosbag2_bagfile_information': self.to_dict()})
 
-    def _extent(self) -> dict[str, object]:
-        """Return duration, start and count; a new object, else YAML would write an alias."""
-        return {
-            'duration': {'nanoseconds': self.duration_ns},
-            'starting_time': {'nanoseconds_since_epoch': self.start_ns},
-            'message_count': self.message_count,
-        }
+    @classmethod
+    def joined(cls, parts: Iterable[RecordingMetadata]) -> RecordingMetadata:
+        """Return the metadata of a recording from those of its files, at least one."""
+        parts = tuple(parts)
+        topics: dict[str, TopicSummary] = {}
+        for entry in (entry for part in parts for entry in part.topics):
+            before = topics.get(entry.topic.name)
+            count = entry.message_count + (before.message_count if before else 0)
+            topics[entry.topic.name] = replace(before or entry, message_count=count)
+        return cls(files=tuple(file for part in parts for file in part.files),
+                   topics=tuple(topics.values()), custom_data=parts[0].custom_data)
+
+
+def _extent(start_ns: int, end_ns: int, message_count: int) -> dict[str, object]:
+    """Return duration, start and count; a new object, else YAML would write an alias."""
+    return {
+        'duration': {'nanoseconds': end_ns - start_ns},
+        'starting_time': {'nanoseconds_since_epoch': start_ns},
+        'message_count': message_count,
+    }
 
 
 def checked_custom_data(custom_data: Mapping[str, str]) -> Mapping[str, str]:

@@ -2,7 +2,8 @@
 Folders that appear whole or not at all.
 
 Files are written into a hidden folder beside the target, forced to the disk, and the folder is
-renamed. A killed process leaves at most the hidden folder behind, which may be deleted.
+renamed. A killed process leaves at most the hidden folder behind, which may be deleted, or saved
+as far as it is complete (see `recovery`).
 
 """
 
@@ -10,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+import fcntl
 import logging
 import os
 from pathlib import Path
@@ -55,6 +57,8 @@ def output_file(path: Path, shown: Path) -> Iterator[BinaryIO]:
     with os_errors(shown):
         stream = path.open('xb')
     try:
+        with suppress(OSError):  # some network file systems have no locks
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)  # released with the process
         yield stream
         with os_errors(shown):
             stream.flush()

@@ -1,44 +1,23 @@
-"""
-Write a recording: an MCAP file and its metadata.yaml, as rosbag2 stores a bag.
-
-Every channel carries CDR with a ros2msg schema: a single channel of another kind would make
-``ros2 bag play`` refuse the file. Everything that is not a message is an attachment.
-
-"""
+"""Write a recording: MCAP files and their metadata.yaml, as rosbag2 stores a bag."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, ExitStack
 from operator import index
 from pathlib import Path
 import re
-from typing import BinaryIO, Final
+from typing import Final
 
-from flex_planner import __version__
 from flex_planner.errors import InvalidValueError, RecordingError
 from flex_planner.recording.definitions import MessageTypes
-from flex_planner.recording.metadata import checked_custom_data, RecordingMetadata, TopicSummary
+from flex_planner.recording.mcap_file import RecordingFile
+from flex_planner.recording.metadata import checked_custom_data, RecordingMetadata
 from flex_planner.recording.staging import os_errors, output_file, staged_folder
 from flex_planner.recording.topics import Topic
-from mcap.writer import CompressionType, LIBRARY_IDENTIFIER, Writer
 
 NAME: Final = re.compile(r'[A-Za-z0-9_][A-Za-z0-9_.-]*')  # cannot lead elsewhere or hide
 LARGEST_TIME: Final = 2**63 - 1  # [ns], rosbag2 counts with a signed 64-bit integer
-
-
-class _Channel:
-    """A topic with its number in the file and the messages so far."""
-
-    def __init__(self, topic: Topic, number: int, type_hash: str) -> None:
-        self.topic = topic
-        self.number = number
-        self.type_hash = type_hash
-        self.count = 0
-
-    def summary(self) -> TopicSummary:
-        """Return what the metadata say of the topic."""
-        return TopicSummary(topic=self.topic, type_hash=self.type_hash, message_count=self.count)
 
 
 class Recording:
@@ -47,31 +26,35 @@ class Recording:
 
     Parameters
     ----------
-    stream : binary file
-        Where the MCAP bytes go.
+    stage : Path
+        Folder where its files are written.
     path : Path
         Folder that the recording will be.
     types : MessageTypes
         Definitions of the messages.
     custom_data : mapping of str to str
         Free text for the metadata.
+    max_bytes : int or None
+        Size at which the next file begins.
 
     """
 
     def __init__(
-        self, stream: BinaryIO, path: Path, types: MessageTypes, custom_data: Mapping[str, str]
+        self, stage: Path, path: Path, types: MessageTypes, custom_data: Mapping[str, str],
+        max_bytes: int | None
     ) -> None:
         self.path = path
+        self._stage = stage
         self._types = types
         self._custom_data = custom_data
-        self._channels: dict[str, _Channel] = {}
-        self._schemas: dict[str, int] = {}
+        self._max_bytes = max_bytes
+        self._topics: dict[str, Topic] = {}
         self._attachments: set[str] = set()
-        self._times: tuple[int, int] | None = None
+        self._last: int | None = None
+        self._parts: list[RecordingMetadata] = []
+        self._open_file = ExitStack()
+        self._file = self._begin_file()
         self._writable = True
-        self._writer = Writer(stream, compression=CompressionType.ZSTD, enable_data_crcs=True)
-        with self._writing():
-            self._writer.start('ros2', f'flex_planner/{__version__} {LIBRARY_IDENTIFIER}')
 
     @classmethod
     @contextmanager
@@ -82,6 +65,7 @@ class Recording:
         types: MessageTypes,
         *,
         custom_data: Mapping[str, str] | None = None,
+        max_bytes: int | None = None,
     ) -> Iterator[Recording]:
         """
         Write the recording ``folder/name`` in a with block, whole or not at all.
@@ -98,11 +82,15 @@ class Recording:
             Definitions of the messages.
         custom_data : mapping of str to str, optional
             Free text for the metadata, e.g. the planner's version.
+        max_bytes : int, optional
+            A message that would make a file larger than this begins the next, as rosbag2
+            splits a bag; the file's index, and a single larger message, may exceed it.
+            Default: one file.
 
         Raises
         ------
         InvalidValueError
-            If the name or the custom data are malformed.
+            If the name, the custom data or the size are malformed.
         RecordingError
             If the name is taken (a recording is never overwritten), or the system refuses to
             write.
@@ -110,11 +98,13 @@ class Recording:
         """
         if not NAME.fullmatch(name):
             raise InvalidValueError('name', name, 'letters, digits, _ and, not in front, - and .')
+        if max_bytes is not None and max_bytes < 1:
+            raise InvalidValueError('max_bytes', max_bytes, 'at least 1')
         path = Path(folder) / name
         custom_data = checked_custom_data(custom_data or {})
         with staged_folder(path) as stage:
-            with output_file(stage / f'{name}_0.mcap', path) as stream:
-                recording = cls(stream, path, types, custom_data)
+            recording = cls(stage, path, types, custom_data, max_bytes)
+            with recording._open_file:
                 yield recording
                 metadata = recording._finish()
             with output_file(stage / 'metadata.yaml', path) as stream, os_errors(path):
@@ -143,15 +133,16 @@ class Recording:
 
         """
         time = self._checked_time(log_time_ns)
-        known = self._channels.get(topic.name)
-        if known is not None and known.topic != topic:
-            raise InvalidValueError('topic', topic, f'the same as before, {known.topic}')
+        known = self._topics.get(topic.name, topic)
+        if known != topic:
+            raise InvalidValueError('topic', topic, f'the same as before, {known}')
         data = self._types.encode(topic.type_name, message)
         with self._writing():
-            channel = known or self._add_channel(topic)
-            self._writer.add_message(channel.number, time, data, publish_time=time)
-        channel.count += 1
-        self._times = (time if self._times is None else self._times[0], time)
+            if self._max_bytes and self._file.size_with(data) > self._max_bytes:
+                self._end_file()
+                self._file = self._begin_file()
+            self._file.write(topic, data, time)
+        self._topics[topic.name], self._last = topic, time
 
     def attach(self, name: str, data: bytes, *, media_type: str, time_ns: int = 0) -> None:
         """
@@ -180,44 +171,34 @@ class Recording:
             raise InvalidValueError('name of an attachment', name, 'printable and not taken')
         time = _integer_time('time_ns', time_ns)
         with self._writing():
-            self._writer.add_attachment(time, time, name, media_type, data)
+            self._file.attach(name, data, media_type, time)
         self._attachments.add(name)
-
-    def _add_channel(self, topic: Topic) -> _Channel:
-        """Add a topic to the file, with the schema of its type."""
-        schema = self._schemas.get(topic.type_name)
-        if schema is None:
-            text = self._types.schema(topic.type_name)
-            schema = self._writer.register_schema(topic.type_name, 'ros2msg', text.encode())
-            self._schemas[topic.type_name] = schema
-        type_hash = self._types.type_hash(topic.type_name)
-        metadata = {'offered_qos_profiles': topic.qos.to_yaml(), 'topic_type_hash': type_hash}
-        number = self._writer.register_channel(topic.name, 'cdr', schema, metadata)
-        self._channels[topic.name] = _Channel(topic, number, type_hash)
-        return self._channels[topic.name]
 
     def _checked_time(self, log_time_ns: int) -> int:
         """Return a log time that does not run backwards."""
         time = _integer_time('log_time_ns', log_time_ns)
-        if self._times is not None and time < self._times[1]:
-            raise InvalidValueError('log_time_ns', time, f'>= {self._times[1]}, the last one')
+        if self._last is not None and time < self._last:
+            raise InvalidValueError('log_time_ns', time, f'>= {self._last}, the last one')
         return time
 
+    def _begin_file(self) -> RecordingFile:
+        """Open the next file."""
+        name = f'{self.path.name}_{len(self._parts)}.mcap'
+        stream = self._open_file.enter_context(output_file(self._stage / name, self.path))
+        with os_errors(self.path):
+            return RecordingFile(stream, name, self._types)
+
+    def _end_file(self) -> None:
+        """Write metadata and index of the open file and close it."""
+        self._parts.append(self._file.finish(self._custom_data))
+        self._open_file.close()
+
     def _finish(self) -> RecordingMetadata:
-        """Write the metadata and the index, and return the metadata."""
-        start, end = self._times or (0, 0)
-        metadata = RecordingMetadata(
-            file_name=f'{self.path.name}_0.mcap',
-            start_ns=start,
-            end_ns=end,
-            topics=tuple(channel.summary() for channel in self._channels.values()),
-            custom_data=self._custom_data,
-        )
+        """End the last file, and return the metadata of all."""
         with self._writing():
-            self._writer.add_metadata('rosbag2', {'serialized_metadata': metadata.to_record()})
-            self._writer.finish()  # type: ignore[no-untyped-call]
+            self._end_file()
         self._writable = False
-        return metadata
+        return RecordingMetadata.joined(self._parts)
 
     @contextmanager
     def _writing(self) -> Iterator[None]:

@@ -1,0 +1,174 @@
+"""A node that publishes a recording again: the original bytes, topics, times and QoS."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+import time
+from typing import Any
+
+from flex_planner.errors import InvalidValueError, RecordingError
+from flex_planner.recording import (
+    check_definition,
+    definition_folder,
+    Durability,
+    from_time,
+    MessageTypes,
+    QosProfile,
+    read_metadata,
+    read_serialized,
+    Reliability,
+    TopicSummary,
+)
+from flex_planner.ros.parameters import declare, described
+from flex_planner.ros.running import run_node
+import rclpy
+from rclpy.clock import Clock, ClockType
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+_DELIVERY_TIMEOUT = Duration(seconds=1)
+_SHORTEST_WAIT_NS = 1000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReplaySettings:
+    """Parameters of the replay; all read-only."""
+
+    recording: str = described('', 'Folder of the recording, or its .mcap file.', read_only=True)
+    rate: float = described(
+        1.0, 'Speed of the playback, 2 is twice as fast.', lowest=1e-3, highest=1e3,
+        read_only=True)
+    start: float = described(
+        0.0, 'What to leave out at the beginning of the recording [s].', lowest=0.0, highest=1e9,
+        read_only=True)
+    delay: float = described(
+        1.0, 'Time before the first message, in which subscribers find the publishers [s].',
+        lowest=0.01, highest=60.0, read_only=True)
+    loop: bool = described(False, 'Whether to begin again at the end.', read_only=True)
+
+
+class Replay(Node):  # type: ignore[misc]
+    """
+    Publishes the messages of a recording, then ends.
+
+    Topics whose types are not installed, or differ, are left out, which is logged.
+
+    Parameters
+    ----------
+    settings : ReplaySettings
+        Defaults of the parameters.
+
+    Raises
+    ------
+    FlexPlannerError
+        If there is no such recording, or nothing of it can be published.
+
+    """
+
+    def __init__(self, settings: ReplaySettings) -> None:
+        super().__init__('replay')
+        self._settings = declare(self, settings)
+        self._path = Path(self._settings.recording)
+        metadata = read_metadata(self._path)
+        self._first_ns = metadata.start_ns + round(self._settings.start * 1e9)
+        if self._first_ns > metadata.end_ns:
+            raise InvalidValueError('start', self._settings.start, 'at most the duration of the '
+                                    f'recording, {metadata.duration_ns * 1e-9:g} s')
+        self._outlets = self._publish_topics(metadata.topics)
+        self.get_logger().info(
+            f'replaying {self._path}: {len(self._outlets)} topics, '
+            f'{(metadata.end_ns - self._first_ns) * 1e-9 / self._settings.rate:.3g} s')
+        self._begin = time.monotonic() + self._settings.delay
+        self._sent, self._messages = 0, self._passes()
+        self._due, self._send = next(self._messages)
+        self._timer = self.create_timer(self._settings.delay, self._on_timer,
+                                        clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def _publish_topics(self, topics: tuple[TopicSummary, ...]) -> dict[str, Publisher]:
+        """Return a publisher for each topic whose type is installed as it was recorded."""
+        types = MessageTypes.load([definition_folder('flex_planner_interfaces')])
+        outlets: dict[str, Publisher] = {}
+        for entry in topics:
+            topic = entry.topic
+            try:
+                if topic.type_name in types:
+                    check_definition(self._path, topic, entry.type_hash, types)
+                kind = message_class(topic.type_name)
+            except (ImportError, AttributeError, RecordingError) as error:
+                self.get_logger().warning(f'{topic.name} is left out: {error}')
+                continue
+            outlets[topic.name] = self.create_publisher(kind, topic.name, _profile(topic.qos))
+        if not outlets:
+            raise RecordingError(f'{self._path} holds no messages that could be published')
+        return outlets
+
+    def _passes(self) -> Iterator[tuple[float, partial[None]]]:
+        """Yield when to send each message, in seconds since the beginning, and what sends it."""
+        began = 0.0
+        while True:
+            due = began
+            messages = read_serialized(self._path, self._outlets.keys())
+            for entry in from_time(messages, self._first_ns):
+                after = (entry.log_time_ns - self._first_ns) * 1e-9
+                due = began + after / self._settings.rate
+                yield due, partial(self._outlets[entry.topic.name].publish, entry.data)
+            if not self._settings.loop:
+                return
+            began = due + self._settings.delay
+
+    def _on_timer(self) -> None:
+        """Send what is due, then wait for the next message."""
+        while (left := self._begin + self._due - time.monotonic()) <= 0:
+            self._send()
+            self._sent += 1
+            following = next(self._messages, None)
+            if following is None:
+                self._finish()
+                return
+            self._due, self._send = following
+        self._timer.timer_period_ns = max(round(left * 1e9), _SHORTEST_WAIT_NS)
+        self._timer.reset()
+
+    def _finish(self) -> None:
+        """End, once subscribers have got everything."""
+        self._timer.cancel()
+        for outlet in self._outlets.values():
+            outlet.wait_for_all_acked(_DELIVERY_TIMEOUT)
+        self.get_logger().info(f'{self._sent} messages sent')
+        rclpy.try_shutdown()
+
+
+def message_class(type_name: str) -> Any:
+    """Return rclpy's class of a type, e.g. of ``sensor_msgs/msg/JointState``."""
+    package, _, name = type_name.split('/')
+    return getattr(import_module(f'{package}.msg'), name)
+
+
+def _profile(qos: QosProfile) -> QoSProfile:
+    """Return rclpy's profile for a recorded one."""
+    reliable = qos.reliability is Reliability.RELIABLE
+    latched = qos.durability is Durability.TRANSIENT_LOCAL
+    return QoSProfile(
+        depth=qos.depth,
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE)
+
+
+def replay(settings: ReplaySettings, args: list[str] | None = None) -> None:
+    """Publish a recording and end the process, with code 0 unless it cannot be read."""
+    run_node(lambda: Replay(settings), 'replay', args)
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the node ``replay`` with the parameters that it is given."""
+    replay(ReplaySettings(), args)
+
+
+if __name__ == '__main__':
+    main()
