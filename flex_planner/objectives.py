@@ -27,6 +27,7 @@ from numpy.typing import ArrayLike
 
 _MIN_TOLERANCE, _MAX_TOLERANCE = 1e-4, 1.0
 _MAX_WEIGHT = 1e12
+_BOUND = '> 0, or inf for no limit'
 # points in an interval of the mesh at which peaks are looked for
 _POINTS = np.linspace(0, 1, 33, dtype=np.float64)
 
@@ -138,9 +139,9 @@ def _limits(name: str, values: ArrayLike) -> Array:
         raise InvalidValueError(name, values, 'a list of numbers')
     for i, limit in enumerate(limits):
         if np.isnan(limit):
-            raise NotFiniteError(f'{name}[{i}]', float(limit), '> 0, or inf for no limit')
+            raise NotFiniteError(f'{name}[{i}]', float(limit), _BOUND)
         if not limit > 0:
-            raise InvalidValueError(f'{name}[{i}]', float(limit), '> 0')
+            raise InvalidValueError(f'{name}[{i}]', float(limit), _BOUND)
     limits.setflags(write=False)
     return limits
 

@@ -30,9 +30,10 @@ _FACTOR = 4.0
 _SMALLEST, _LARGEST = 1e-8, 1e10
 # an objective is given up when so many weights in a row gained too little to come to its limit
 _PATIENCE = 3
+_GOLDEN, _FINEST_FACTOR = 0.618, 1.02
 _MOST_STEPS = 60
-# objectives are given up when so many turns in a row left the worst share this near to what it was
-_IDLE, _IDLE_TURNS, _MOST_TURNS = 0.95, 2, 30
+# objectives are given up when so many turns in a row left this much of what is too much
+_IDLE, _IDLE_TURNS, _MOST_TURNS = 0.9, 2, 30
 # how far inside a bracket a weight is tried, and how near to its ends
 _INSIDE, _NEARLY = 0.1, 0.9
 
@@ -58,6 +59,8 @@ def adapted(plan: Plan, objectives: Objectives, settings: Settings, monitor: Mon
 
     """
     assert plan.solution is not None
+    if not objectives.limited(plan.arm):
+        return replace(plan, objectives=ObjectiveSearch(objectives=objectives, met=True))
     search = _Search(plan.problem, plan.solution, objectives, settings, monitor)
     try:
         met = search.run()
@@ -69,8 +72,9 @@ def adapted(plan: Plan, objectives: Objectives, settings: Settings, monitor: Mon
             ('weights adapted', warm_start(best.solution)), *LADDER)
         found = planned(best.problem, rungs, settings, monitor)
     except StoppedError as stop:
-        return replace(plan, status=STATUSES[stop.reason], message=str(stop), solution=None,
-                       iterations=monitor.iteration, planning_time=monitor.elapsed)
+        return Plan(task=plan.task, status=STATUSES[stop.reason], message=str(stop),
+                    strategy=plan.strategy, problem=plan.problem, solution=None,
+                    iterations=monitor.iteration, planning_time=monitor.elapsed)
     report = ObjectiveSearch(objectives=objectives, met=met, trials=tuple(search.trials),
                              margins=search.margins() if met else ())
     found = replace(found, objectives=report)
@@ -103,6 +107,12 @@ class _Search:
         self._settings, self._monitor = settings, monitor
         self._limited = objectives.limited(problem.model.arm)
         self._below: dict[Objective, _Point] = {}
+        self._patterns = {objective: objectives.pattern(objective, problem.model.arm)
+                          for objective in self._limited}
+        if Objective.TORQUE_SHARES in self._limited:
+            # where all are raised none of them is: only those whose torque is too large
+            over = objectives.shares(Objective.TORQUE_SHARES, problem, solution) > 1
+            self._patterns[Objective.TORQUE_SHARES] *= over
         self.trials: list[WeightTrial] = []
         self.best = self._point(dict.fromkeys(self._limited, 0.0), problem, solution)
 
@@ -127,7 +137,8 @@ class _Search:
             if here.worst <= 1 and (here is before or len(self._limited) == 1):
                 self.best = here
                 return True
-            idle = idle + 1 if here.worst > max(_IDLE * before.worst, 1.0) else 0
+            excess = here.worst - 1, max(before.worst - 1, 0.0)
+            idle = idle + 1 if excess[0] > _IDLE * excess[1] else 0
             if idle == _IDLE_TURNS:
                 break
         return False
@@ -161,6 +172,8 @@ class _Search:
         below, above = self._bracket(objective, here)
         if above is None:
             return None
+        if below is not None and above.weights[objective] <= below.weights[objective]:
+            below = None  # it was not the weight that was too small
         for _ in range(_MOST_STEPS):
             if below is None or above.weights[objective] <= tolerance * below.weights[objective]:
                 break
@@ -189,7 +202,13 @@ class _Search:
 
     def _raised(self, objective: Objective, here: _Point,
                 first: float) -> tuple[_Point, _Point | None]:
-        """Raise a weight until its objective is met, or given up."""
+        """
+        Raise a weight until its objective is met, or given up.
+
+        Where one joint's torque falls another's may grow: once a step makes things worse, the
+        best weight is between the last three.
+
+        """
         below, weight, idle, before = here, max(here.weights[objective] * _FACTOR, first), 0, 0.0
         while idle < _PATIENCE and weight < _LARGEST * first:
             found = self._at(objective, weight, below)
@@ -199,11 +218,32 @@ class _Search:
                 return below, found
             gained = below.shares[objective] - found.shares[objective]
             # were the gains to go on falling by this ratio, they would add up to this
+            if gained < 0 and below.weights[objective]:
+                return below, self._least(objective, weight / _FACTOR**2, weight, below)
             ratio = gained / before if 0 < gained < before else 0.0
             hope = gained * ratio / (1 - ratio) if ratio or gained <= 0 else np.inf
             idle = idle + 1 if hope < found.shares[objective] - 1 else 0
             below, weight, before = found, weight * _FACTOR, gained
         return below, None
+
+    def _least(self, objective: Objective, low: float, high: float,
+               near: _Point) -> _Point | None:
+        """Return a motion that meets an objective with a weight between two, if there is one."""
+        ends, known = [np.log(low), np.log(high)], dict[float, _Point | None]()
+        while ends[1] - ends[0] > np.log(_FINEST_FACTOR):
+            inner = [ends[0] + part * (ends[1] - ends[0]) for part in (1 - _GOLDEN, _GOLDEN)]
+            for at in inner:
+                if at not in known:
+                    known[at] = self._at(objective, float(np.exp(at)), near)
+                found = known[at]
+                if found is None:
+                    return None
+                if found.shares[objective] <= 1:
+                    return found
+            left, right = (point.shares[objective] for point in (known[at] for at in inner)
+                           if point is not None)
+            ends = [ends[0], inner[1]] if left < right else [inner[0], ends[1]]
+        return None
 
     def _first_weight(self, objective: Objective) -> float:
         """Return the weight that is tried first."""
@@ -252,7 +292,7 @@ class _Search:
         task, arm = self._base.task, self._base.model.arm
         n, velocity, effort = arm.n_joints, task.velocity_weights.copy(), task.effort_weights
         for objective, weight in weights.items():
-            added = weight * self._objectives.pattern(objective, arm)
+            added = weight * self._patterns[objective]
             if objective is Objective.TORQUE_SHARES:
                 effort = effort * (1 + added)
             elif objective is Objective.JOINT_SPEEDS:

@@ -71,7 +71,7 @@ def test_limit_that_cannot_be_kept_is_an_error_without_a_trajectory(
     ({'max_joint_speeds': [0.8]}, PlanReport.INVALID_SIZE,
      'max_joint_speeds has 1 entries, but must be a list of 2 numbers'),
     ({'max_torque_shares': [0.5, 0.0]}, PlanReport.OUT_OF_RANGE,
-     'max_torque_shares[1] is 0.0, but must be > 0'),
+     'max_torque_shares[1] is 0.0, but must be > 0, or inf for no limit'),
     ({'max_joint_speeds': [math.nan, 1.0]}, PlanReport.NOT_FINITE,
      'max_joint_speeds[0] is nan, but must be > 0, or inf for no limit'),
     ({'max_modal_rates': [0.1]}, PlanReport.INVALID_SIZE,
