@@ -376,14 +376,14 @@ def test_limits_are_copied_and_read_only() -> None:
         objectives.max_joint_speeds[0] = 3.0
 
 
-BOUND = 'but must be > 0, or inf for no limit'
+REASON = 'but must be > 0, or inf for no limit'
 
 
 @pytest.mark.parametrize(('changes', 'message'), [
-    ({'max_joint_speeds': [0.8, 0.0]}, f'max_joint_speeds[1] is 0.0, {BOUND}'),
-    ({'max_joint_speeds': [-0.8, 0.8]}, f'max_joint_speeds[0] is -0.8, {BOUND}'),
-    ({'max_torque_shares': [nan, 0.8]}, f'max_torque_shares[0] is nan, {BOUND}'),
-    ({'max_modal_rates': [0.1, -inf]}, f'max_modal_rates[1] is -inf, {BOUND}'),
+    ({'max_joint_speeds': [0.8, 0.0]}, f'max_joint_speeds[1] is 0.0, {REASON}'),
+    ({'max_joint_speeds': [-0.8, 0.8]}, f'max_joint_speeds[0] is -0.8, {REASON}'),
+    ({'max_torque_shares': [nan, 0.8]}, f'max_torque_shares[0] is nan, {REASON}'),
+    ({'max_modal_rates': [0.1, -inf]}, f'max_modal_rates[1] is -inf, {REASON}'),
     ({'max_modal_rates': 'slow'}, "max_modal_rates is 'slow', but must be a list of numbers"),
     ({'max_joint_speeds': 0.8}, 'max_joint_speeds is 0.8, but must be a list of numbers'),
     ({'max_joint_speeds': [[0.8, 0.8]]},
