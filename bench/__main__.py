@@ -147,7 +147,9 @@ def text(figures: dict[str, Any]) -> str:
 
 
 def payload_text(figures: dict[str, Any]) -> str:
-    """Return the part on the maximum payload."""
+    """Return the part on the maximum payload, once it was measured."""
+    if 'payload' not in figures:
+        return ''
     return PAYLOAD.format(
         accuracies=', '.join(f'{accuracy:g} kg with {tip:g} m at the tip'
                              for accuracy, tip in payload.ACCURACIES.items()),

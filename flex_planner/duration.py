@@ -152,7 +152,8 @@ def _found(task: Task, problem: MotionProblem, settings: Settings, monitor: Moni
     if not is_near(stops, accuracy):
         return replace(found, status=PlanStatus.NOT_CONVERGED, message=(
             f'{last.value:.6g} s are enough, but it was not shown that no less are'))
-    return replace(found, message=f'{last.value:.6g} s are enough, {lower:.6g} s are not')
+    kind = ' for motions of this kind' if task.arm.gravity.any() else ''
+    return replace(found, message=f'{last.value:.6g} s are enough, {lower:.6g} s are not{kind}')
 
 
 def _stops_from(problem: MotionProblem, solution: CollocationSolution, settings: Settings,

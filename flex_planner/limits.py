@@ -171,8 +171,17 @@ def steady(stops: list[Stop], share: float = _STEADY) -> bool:
 
 
 def _limited(stops: list[Stop], sentence: str) -> Attempt:
-    """Return an attempt with evidence: only if the price shows that the limit is near."""
+    """
+    Return an attempt with evidence: only if the price shows that the limit is near.
+
+    Under gravity motions of several kinds (swinging back first) have limits of their own, and
+    that of one is no evidence.
+
+    """
     last = stops[-1]
+    if last.problem.model.arm.gravity.any():
+        return Attempt(result=replace(last.result, status=Status.NEWTON_FAILED, message=(
+            f'by the motions that were followed {sentence}; under gravity others may do more')))
     if steady(stops):
         grown = last.price / max(stops[0].price, 1.0)
         return Attempt(result=last.result, evidence=(

@@ -29,7 +29,7 @@ _MIN_TOLERANCE, _MAX_TOLERANCE = 1e-4, 1.0
 _MAX_WEIGHT = 1e12
 _BOUND = '> 0, or inf for no limit'
 # points in an interval of the mesh at which peaks are looked for
-_POINTS = np.linspace(0, 1, 33, dtype=np.float64)
+_POINTS = np.linspace(0, 1, 129, dtype=np.float64)
 
 
 class Objective(Enum):

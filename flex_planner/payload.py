@@ -343,6 +343,8 @@ def _described(found: MaxPayload) -> MaxPayload:
         reason = f'joint {joint + 1} is on its limit for {shares[joint]:.1%} of the time'
     else:
         reason = f'joint {joint + 1} can hold no more at the goal'
+    # under gravity the bound is that of this kind of motion; another may swing back first
+    kind = ' by motions of this kind' if found.task.arm.gravity.any() and not found.held else ''
     return replace(found, limiting_joint=joint, message=(
-        f'{found.payload:.6g} kg can be carried, {found.upper:.6g} kg cannot: '
+        f'{found.payload:.6g} kg can be carried, {found.upper:.6g} kg cannot{kind}: '
         f'the motor of {reason}'))

@@ -1,4 +1,4 @@
-"""Launch the planner and a simulated arm that follows its trajectories."""
+"""Launch the planner alone."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from launch_ros.actions import Node
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Return the two nodes, with the parameters of one file and the same arm."""
+    """Return the planner, with the parameters of a file and an arm."""
     config = Path(get_package_share_directory('flex_planner'), 'config')
     parameters = [LaunchConfiguration('params_file'), {'arm': LaunchConfiguration('arm')}]
     return LaunchDescription([
@@ -20,15 +20,10 @@ def generate_launch_description() -> LaunchDescription:
         ),
         DeclareLaunchArgument(
             'params_file', default_value=str(config / 'planner.yaml'),
-            description='Parameters of both nodes',
+            description='Parameters of the node',
         ),
         Node(
             package='flex_planner', executable='planner', name='flex_planner',
             output='screen', parameters=parameters,
-        ),
-        Node(
-            package='flex_planner', executable='arm_simulator', name='arm_simulator',
-            output='screen', parameters=parameters,
-            remappings=[('joint_trajectory', 'flex_planner/joint_trajectory')],
         ),
     ])

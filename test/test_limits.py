@@ -265,6 +265,16 @@ def test_swing_that_another_motion_makes_is_not_called_impossible() -> None:
     assert alone.status is not PlanStatus.INFEASIBLE, alone.message
 
 
+def test_limit_of_one_kind_of_swing_is_no_evidence() -> None:
+    # 0.3 kg take 1.8691 s by another; the limit that is found in 2 s is 0.2591 kg
+    link = Link(length=1.0, linear_density=0.3)
+    arm = Arm(name='pendulum', links=(link,), joints=(Joint(motor=Motor(stall_torque=3.0)),),
+              gravity=[0, -9.81])
+    plan = plan_path(Task(arm=arm, start_positions=[-np.pi / 2], goal_positions=[np.pi / 2],
+                          duration=2.0, payload_mass=0.3), monitor=Monitor(time_limit=10))
+    assert plan.status is not PlanStatus.INFEASIBLE, plan.message
+
+
 def test_payload_tried_on_the_way_may_be_too_heavy_to_hold() -> None:
     link = Link(length=1.0, linear_density=0.3)
     arm = Arm(name='pendulum', links=(link,), joints=(Joint(motor=Motor(stall_torque=6.0)),),

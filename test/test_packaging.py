@@ -19,7 +19,8 @@ import yaml
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = [ROOT, ROOT / 'flex_planner_interfaces']
-LAUNCH_FILE = ROOT / 'launch' / 'planner.launch.py'
+LAUNCH_FILES = sorted(ROOT.glob('launch/*.launch.py'))
+each_launch_file = pytest.mark.parametrize('path', LAUNCH_FILES, ids=lambda path: path.name)
 
 
 def setup_keyword(name):
@@ -36,9 +37,9 @@ def console_scripts():
 
 
 def imported_modules():
-    """Return the top-level modules that the package and its launch file import."""
+    """Return the top-level modules that the package and its launch files import."""
     modules = set()
-    for path in [*ROOT.glob('flex_planner/**/*.py'), LAUNCH_FILE]:
+    for path in [*ROOT.glob('flex_planner/**/*.py'), *LAUNCH_FILES]:
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.Import):
                 modules |= {alias.name for alias in node.names}
@@ -47,10 +48,10 @@ def imported_modules():
     return {module.partition('.')[0] for module in modules}
 
 
-def launch_calls(function):
+def launch_calls(path, function):
     """Return the keyword arguments and first literal of every call of a function."""
     calls = []
-    for node in ast.walk(ast.parse(LAUNCH_FILE.read_text())):
+    for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Call) and getattr(node.func, 'id', None) == function:
             literals = [a.value for a in node.args if isinstance(a, ast.Constant)]
             keywords = {k.arg: k.value.value for k in node.keywords
@@ -125,16 +126,26 @@ def test_parameter_file_repeats_the_defaults_of_the_planner():
     assert written == {name: defaults.get(name) for name in written}
 
 
-def test_launch_file_starts_executables_of_this_package():
-    nodes = [keywords for _, keywords in launch_calls('Node')]
+def test_launch_files_are_those_of_the_planner_alone_with_an_arm_and_with_ros2_control():
+    started = {path.name: [keywords['executable'] for _, keywords in launch_calls(path, 'Node')]
+               for path in LAUNCH_FILES}
+    assert started == {'planner.launch.py': ['planner'], 'ros2_control.launch.py': ['planner'],
+                       'simulation.launch.py': ['planner', 'arm_simulator']}
+
+
+@each_launch_file
+def test_launch_file_starts_executables_of_this_package(path):
+    nodes = [keywords for _, keywords in launch_calls(path, 'Node')]
     assert {node['package'] for node in nodes} == {'flex_planner'}
     assert {node['executable'] for node in nodes} <= console_scripts().keys()
 
 
-def test_launch_file_offers_an_arm_that_exists():
-    arguments = {names[0]: keywords for names, keywords in launch_calls('DeclareLaunchArgument')}
-    assert arguments.keys() == {'arm', 'params_file'}
+@each_launch_file
+def test_launch_file_offers_an_arm_that_exists(path):
+    arguments = {names[0]: keywords
+                 for names, keywords in launch_calls(path, 'DeclareLaunchArgument')}
+    assert {'arm', 'params_file'} <= arguments.keys()
     assert (ROOT / 'config' / 'arms' / f'{arguments["arm"]["default_value"]}.yaml').is_file()
-    functions = [node.name for node in ast.parse(LAUNCH_FILE.read_text()).body
+    functions = [node.name for node in ast.parse(path.read_text()).body
                  if isinstance(node, ast.FunctionDef)]
     assert functions == ['generate_launch_description']
