@@ -195,7 +195,10 @@ def main() -> None:
     node = rclpy.create_node(name, namespace=namespace, enable_rosout=False,
                              start_parameter_services=False)
     stream = Stream(node.create_publisher(JointState, topic, _DEPTH).publish)
-    print('ready', flush=True)
+    try:
+        print('ready', flush=True)
+    except BrokenPipeError:  # the planner ended while this one started
+        os._exit(0)
     try:
         while True:
             stream.start(pickle.load(sys.stdin.buffer))
