@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from flex_planner.certify import totals
 from flex_planner.collocation import (
@@ -59,7 +60,7 @@ def no_aim(value: float) -> float:
     return 0.0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Stop:
     """
     A motion on the way to a limit.
@@ -88,7 +89,7 @@ class Stop:
         """Whether the monitor ended the search here."""
         return self.result.status in STOPPED
 
-    @property
+    @cached_property
     def room(self) -> float:
         """
         How far the limit is at most: what the motors have left over the price of more.
@@ -113,8 +114,7 @@ def reserve(problem: MotionProblem, solution: CollocationSolution) -> float:
     n, n_t = model.arm.n_joints, model.arm.n_coordinates
     z = solution.stage_values().reshape(-1, problem.size)
     torque = model.controls(z, problem.p).torque
-    slowed = parameters.torque_slope * z[:, n_t:n_t + n]
-    bound = parameters.stall_torque - np.where(torque >= 0, slowed, -slowed)
+    bound = parameters.torque_limit(torque, z[:, n_t:n_t + n])
     weights = (solution.steps[:, None] * solution.rule.weights).ravel()
     return float(weights @ ((bound**2 - torque**2) @ parameters.effort_weights)) / 2
 

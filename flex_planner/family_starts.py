@@ -124,9 +124,7 @@ def _taken_over(problem: MotionProblem, stop: Stop, payload: bool, settings: Set
 def _fitted(problem: MotionProblem, solution: CollocationSolution,
             settings: Settings) -> CollocationSolution:
     """Return a motion of the same or of a rigid arm as a guess, stretched to the duration."""
-    factor = problem.task.duration / solution.mesh[-1]
-    guess = CollocationSolution(solution.mesh * factor, solution.nodes, solution.stages / factor,
-                                solution.rule)
+    guess = solution.stretched(problem.task.duration / solution.mesh[-1])
     return guess if guess.nodes.shape[1] == problem.size else lifted(problem, guess, settings)
 
 
@@ -138,9 +136,9 @@ def first_motion(problem: MotionProblem, settings: Settings,
                     max_intervals=min(most, settings.max_intervals),
                     intervals=min(most, settings.intervals))
     result = cold_start(problem, quick, monitor).result
-    for _, strategy in DIRECTLY:
+    for _, strategy in DIRECTLY[1:]:
         if result.converged or result.status in STOPPED:
             break
-        attempt = None if strategy is cold_start else strategy(problem, quick, monitor)
+        attempt = strategy(problem, quick, monitor)
         result = result if attempt is None else attempt.result
     return result

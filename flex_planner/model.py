@@ -70,6 +70,12 @@ class Parameters:
                    position_weights=default(position_weights, np.zeros(arm.n_coordinates)),
                    velocity_weights=default(velocity_weights, np.zeros(arm.n_coordinates)))
 
+    def torque_limit(self, torque: Array, speeds: Array) -> Array:
+        """Return the bound of eq. (15) in the direction of each torque (k, n), as a size."""
+        slowed = self.torque_slope * speeds
+        limit: Array = self.stall_torque - np.where(torque >= 0, slowed, -slowed)
+        return limit
+
     def stacked(self) -> Array:
         """Return them as one vector, as the compiled functions take them."""
         return np.concatenate([[self.payload_mass, self.payload_inertia], self.rigidity,

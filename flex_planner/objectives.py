@@ -157,9 +157,7 @@ def _peaks(objective: Objective, problem: MotionProblem,
     if objective is Objective.JOINT_SPEEDS:
         return _largest(rates)
     torque = problem.model.controls(z, problem.p).torque
-    slowed = problem.parameters.torque_slope * rates
-    bound = problem.parameters.stall_torque - np.where(torque >= 0, slowed, -slowed)
-    return _largest(torque / bound)
+    return _largest(torque / problem.parameters.torque_limit(torque, rates))
 
 
 def _largest(values: Array) -> Array:

@@ -279,10 +279,8 @@ def warm_start(solution: CollocationSolution) -> Strategy:
     def strategy(problem: MotionProblem, settings: Settings, monitor: Monitor) -> Attempt | None:
         if solution.nodes.shape[1] != problem.size:
             return None
-        factor = problem.task.duration / solution.mesh[-1]
-        stretched = CollocationSolution(solution.mesh * factor, solution.nodes,
-                                        solution.stages / factor, solution.rule)
-        return Attempt(result=solve(problem, stretched, settings, monitor,
+        guess = solution.stretched(problem.task.duration / solution.mesh[-1])
+        return Attempt(result=solve(problem, guess, settings, monitor,
                                     expected_error=settings.error_tolerance))
 
     return strategy

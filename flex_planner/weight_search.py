@@ -321,7 +321,7 @@ def _between(objective: Objective, below: _Point, above: _Point, tolerance: floa
     """Return the weight to try next: where the share should be 1, or what ends the search."""
     low, high = below.weights[objective], above.weights[objective]
     if not low:
-        return high / _FACTOR if high / _FACTOR else high
+        return high / _FACTOR
     over, under = below.shares[objective] - 1, above.shares[objective] - 1
     part = float(np.clip(over / (over - under), _INSIDE, 1 - _INSIDE))
     guess: float = low * (high / low) ** part

@@ -90,6 +90,10 @@ class CollocationSolution:
         rate: Array = (self.rule.basis_rate(theta)[:, None] @ self.stages[interval])[:, 0]
         return rate
 
+    def stretched(self, factor: float) -> CollocationSolution:
+        """Return the same values at times so many times as late."""
+        return CollocationSolution(self.mesh * factor, self.nodes, self.stages / factor, self.rule)
+
     def on_mesh(self, mesh: Array, rule: GaussRule | None = None) -> CollocationSolution:
         """Return the same function sampled on another mesh of the same span."""
         rule, steps = rule or self.rule, np.diff(mesh)
