@@ -150,6 +150,8 @@ class DirectProblem:
         n joints, n_t coordinates.
     settings : DirectSettings, optional
         Mesh and tolerances.
+    breaks : numpy.ndarray, shape (intervals + 1,), optional
+        Ends of the intervals from 0 to 1; equal intervals if not given.
 
     Attributes
     ----------
@@ -158,10 +160,12 @@ class DirectProblem:
 
     """
 
-    def __init__(self, model: ArmModel, settings: DirectSettings | None = None) -> None:
+    def __init__(self, model: ArmModel, settings: DirectSettings | None = None,
+                 breaks: Array | None = None) -> None:
         began = time.perf_counter()
         self.model, self.settings = model, settings or DirectSettings()
-        self._mesh = Mesh.of(self.settings.scheme, self.settings.degree, self.settings.intervals)
+        self._mesh = Mesh.of(self.settings.scheme, self.settings.degree, self.settings.intervals,
+                             breaks)
         self._programme = Programme.of(model.arm, self._mesh, self.settings.free_payload)
         self._watch = self._programme.watch(self.settings.intervals)
         self._solvers: dict[bool, Any] = {}
@@ -266,7 +270,7 @@ class DirectProblem:
     def _times(self, duration: float) -> tuple[Array, Array]:
         """Return the times of the points, and of the nodes that are no points."""
         mesh = self._mesh
-        nodes = np.linspace(0, duration, mesh.nodes.size, dtype=np.float64)
+        nodes = duration * mesh.breaks
         return duration * mesh.points, nodes[mesh.nodes >= mesh.points.size]
 
     def _result(self, arrays: dict[str, Array], cost: float, stats: dict[str, Any],
@@ -282,7 +286,7 @@ class DirectProblem:
         status, message = _outcome(stats, self._watch.stopped)
         return DirectResult(
             status=status, message=message, cost=cost, payload=parameters.payload_mass,
-            times=np.linspace(0, duration, mesh.nodes.size, dtype=np.float64),
+            times=duration * mesh.breaks,
             states=values[mesh.nodes], costates=costates, point_times=duration * mesh.points,
             point_states=values[:K], point_costates=point_costates,
             torques=y[:, 3 * n_t:] - parameters.torque_slope * y[:, n_t:n_t + n],

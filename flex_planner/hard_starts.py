@@ -28,7 +28,6 @@ from flex_planner.extended_motion import PayloadProblem
 from flex_planner.families import changed, Enough, Stop
 from flex_planner.motion import MotionProblem
 from flex_planner.progress import Monitor
-from flex_planner.transcription import Mesh, Programme
 from flex_planner.validation import Array
 import numpy as np
 
@@ -51,35 +50,6 @@ class _Found:
     problem: MotionProblem
     solution: CollocationSolution
     converged: bool
-
-
-class _OnMesh(DirectProblem):
-    """A payload at a price, on a mesh whose intervals need not be equal."""
-
-    def __init__(self, motion: MotionProblem, mesh: Array) -> None:
-        settings = DirectSettings(
-            scheme='gauss', degree=_STAGES, intervals=mesh.size - 1, tolerance=_TOLERANCE,
-            max_iterations=_ITERATIONS, free_payload=True)
-        self.model, self.settings, self._nodes = motion.model, settings, mesh / mesh[-1]
-        self._mesh = _uneven(settings, self._nodes)
-        self._programme = Programme.of(motion.model.arm, self._mesh, free_payload=True)
-        self._watch = self._programme.watch(settings.intervals)
-        self._solvers = {}
-
-    def _times(self, duration: float) -> tuple[Array, Array]:
-        """Return the times of the points and of the nodes."""
-        return duration * self._mesh.points, duration * self._nodes
-
-
-def _uneven(settings: DirectSettings, nodes: Array) -> Mesh:
-    """Return a Gauss rule on intervals between nodes from 0 to 1."""
-    from scipy.sparse import diags
-
-    steps, even = np.diff(nodes), Mesh.of('gauss', settings.degree, settings.intervals)
-    inner = even.points[:settings.degree] * steps.size
-    shares = np.repeat(steps * steps.size, settings.degree)
-    return Mesh((nodes[:-1, None] + steps[:, None] * inner).ravel(), even.weights * shares,
-                even.nodes, even.P, (even.Q @ diags(shares)).tocsr())
 
 
 def hard_payloads(problem: MotionProblem, price: float, settings: Settings, monitor: Monitor,
@@ -162,8 +132,11 @@ def _transcribed(problem: MotionProblem, price: float, mesh: Array,
                  guess: CollocationSolution | None, monitor: Monitor) -> _Found:
     """Return what IPOPT finds on a mesh, with its multipliers as costates."""
     duration = problem.task.duration
-    found = _OnMesh(problem, mesh).solve(problem.parameters, problem.start, problem.goal,
-                                         duration, guess=guess, price=price, monitor=monitor)
+    direct = DirectProblem(problem.model, DirectSettings(
+        scheme='gauss', degree=_STAGES, intervals=mesh.size - 1, tolerance=_TOLERANCE,
+        max_iterations=_ITERATIONS, free_payload=True), mesh / duration)
+    found = direct.solve(problem.parameters, problem.start, problem.goal, duration, guess=guess,
+                         price=price, monitor=monitor)
     motion = changed(problem, payload_mass=found.payload)
     points = np.hstack([found.point_states, found.point_costates])
     rates = motion.rate(found.point_times, points).reshape(mesh.size - 1, _STAGES, -1)

@@ -26,7 +26,7 @@ Indices = NDArray[np.intp]
 @dataclass(frozen=True, slots=True, eq=False)
 class Mesh:
     """
-    A collocation method on N equal intervals of a unit of time.
+    A collocation method on N intervals of a unit of time.
 
     The values are x at K points, then at those nodes that are no points. They satisfy
     ``P x = Q x'``, r rows an interval, of which the last leads to its right node; two more rows of
@@ -34,6 +34,8 @@ class Mesh:
 
     Attributes
     ----------
+    breaks : numpy.ndarray, shape (N + 1,)
+        Ends of the intervals.
     points, weights : numpy.ndarray, shape (K,)
         Collocation times and the quadrature's weights.
     nodes : numpy.ndarray, shape (N + 1,)
@@ -43,6 +45,7 @@ class Mesh:
 
     """
 
+    breaks: Array
     points: Array
     weights: Array
     nodes: Indices
@@ -50,22 +53,29 @@ class Mesh:
     Q: Any
 
     @classmethod
-    def of(cls, scheme: str, degree: int, intervals: int) -> Mesh:
-        """Return one of `SCHEMES`; the degree counts the points an interval of the first two."""
-        c = _collocation_points(scheme, degree)
+    def of(cls, scheme: str, degree: int, intervals: int, breaks: Array | None = None) -> Mesh:
+        """
+        Return one of `SCHEMES`; the degree counts the points an interval of the first two.
+
+        On equal intervals, unless their ends from 0 to 1 are given.
+
+        """
+        if breaks is None:
+            breaks = np.linspace(0, 1, intervals + 1, dtype=np.float64)
+        c, steps = _collocation_points(scheme, degree), np.diff(breaks)
         index = np.arange(intervals)[:, None] * (c.size - (c[0] == 0)) + np.arange(c.size)
         targets, values, nodes = _values(index, c)
-        integrals = _integrals(c, targets) / intervals
-        weights = np.bincount(index.ravel(), np.tile(integrals[-1], intervals)).astype(float)
+        integrals = _integrals(c, targets) * steps[:, None, None]
+        weights = np.bincount(index.ravel(), integrals[:, -1].ravel()).astype(float)
         points = np.empty_like(weights)
-        points[index] = (np.arange(intervals)[:, None] + c) / intervals
+        points[index] = breaks[:-1, None] + steps[:, None] * c
         rows = np.arange(values.size).reshape(values.shape)
         height, width = values.size + 2, max(points.size, int(nodes.max()) + 1)
         P = (_sparse((height, width), 1.0, rows, values)
              + _sparse((height, width), -1.0, rows, nodes[:-1, None])
              + _sparse((height, width), 1.0, values.size + np.arange(2), nodes[[0, -1]]))
         Q = _sparse((height, points.size), integrals, rows[:, :, None], index[:, None, :])
-        return cls(points, weights, nodes, P, Q)
+        return cls(breaks, points, weights, nodes, P, Q)
 
     def costates(self, multipliers: Array) -> tuple[Array, Array]:
         """Return psi at nodes and at points from multipliers of all rows (N r + 2, 2 n_t)."""

@@ -6,7 +6,8 @@ from flex_planner.collocation import CollocationSolution
 from flex_planner.kinematics import tip_position
 from flex_planner.model import ArmModel
 from flex_planner.motion import MotionProblem, task_parameters
-from flex_planner.plan import Plan
+from flex_planner.plan import Plan, PlanStatus
+from flex_planner.progress import Monitor
 from flex_planner.resimulation import PlannedTorque
 from flex_planner.simulation import simulate
 from flex_planner.task import Task
@@ -25,6 +26,21 @@ def problem_of(model: ArmModel, task: Task) -> MotionProblem:
 def solution_of(plan: Plan) -> CollocationSolution:
     assert plan.solution is not None, plan.message
     return plan.solution
+
+
+def stopped_in(phase: str, status: PlanStatus, iterations: int = 0) -> Monitor:
+    """Return a monitor that stops work so many iterations after a phase has begun."""
+    monitor, begun = Monitor(), [0]
+
+    def due() -> bool:
+        begun[0] = begun[0] if monitor.phase == phase else monitor.iteration
+        late = monitor.phase == phase and monitor.iteration >= begun[0] + iterations
+        if late and status is PlanStatus.TIMEOUT:
+            monitor.time_limit = -1.0
+        return late and status is PlanStatus.CANCELED
+
+    monitor.canceled = due
+    return monitor
 
 
 def share_of(problem: MotionProblem, solution: CollocationSolution) -> float:

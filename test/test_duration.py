@@ -17,7 +17,7 @@ from flex_planner.plan import PlanStatus
 from flex_planner.progress import Monitor, Progress
 from flex_planner.task import Task
 import numpy as np
-from plan_checks import problem_of
+from plan_checks import problem_of, stopped_in
 import pytest
 
 TaskFactory = Callable[..., Task]
@@ -45,21 +45,6 @@ def assert_encloses(found: MinDuration, duration: float, accuracy: float = 1e-4)
     # the motion at the upper end is as exact as the bracket is narrow
     assert found.lower - accuracy / 10 <= duration <= found.duration + accuracy / 10
     assert 0 < found.duration - found.lower <= accuracy
-
-
-def stopped_in(phase: str, status: PlanStatus, iterations: int = 0) -> Monitor:
-    """Return a monitor that stops work so many iterations after a phase has begun."""
-    monitor, begun = Monitor(), [0]
-
-    def due() -> bool:
-        begun[0] = begun[0] if monitor.phase == phase else monitor.iteration
-        late = monitor.phase == phase and monitor.iteration >= begun[0] + iterations
-        if late and status is PlanStatus.TIMEOUT:
-            monitor.time_limit = -1.0
-        return late and status is PlanStatus.CANCELED
-
-    monitor.canceled = due
-    return monitor
 
 
 def assert_stopped(found: MinDuration, status: PlanStatus) -> None:

@@ -26,7 +26,7 @@ from flex_planner.progress import Monitor, Progress
 from flex_planner.task import Task
 from flex_planner.validation import Array
 import numpy as np
-from plan_checks import solution_of
+from plan_checks import solution_of, stopped_in
 import pytest
 from scipy.integrate import simpson
 
@@ -59,21 +59,6 @@ def seen(plan: Plan) -> Peaks:
 def modal_peaks(plan: Plan) -> Array:
     rates: Array = np.abs(plan.uniform_samples(4001).rates[:, plan.arm.n_joints:]).max(axis=0)
     return rates
-
-
-def stopped_in(phase: str, status: PlanStatus, iterations: int) -> Monitor:
-    """Return a monitor that stops work so many iterations after a phase has begun."""
-    monitor, begun = Monitor(), [0]
-
-    def due() -> bool:
-        begun[0] = begun[0] if monitor.phase == phase else monitor.iteration
-        late = monitor.phase == phase and monitor.iteration >= begun[0] + iterations
-        if late and status is PlanStatus.TIMEOUT:
-            monitor.time_limit = -1.0
-        return late and status is PlanStatus.CANCELED
-
-    monitor.canceled = due
-    return monitor
 
 
 @pytest.fixture(scope='module')
