@@ -11,12 +11,10 @@ from flex_planner.payload import MaxPayload
 from flex_planner.plan import Plan
 from flex_planner.reference import Reference
 from flex_planner.ros.conversions import (
-    add_reference,
     duration_message,
-    flexible_trajectory,
-    joint_trajectory,
     OBJECTIVE_FIELDS,
     report_from_plan,
+    reported_trajectory,
 )
 from flex_planner.ros.payload_messages import report_from_search, search_message, SearchOptions
 from flex_planner.ros.recorder import OutcomeRecorder
@@ -77,9 +75,7 @@ class RequestRecorder:
         """Write a recording; the request is said to have come when planning began."""
         trajectory, took = FlexibleTrajectory(), int(seconds * 1e9)
         if plan is not None and reference is not None:
-            add_reference(report, plan, reference)
-            joints = joint_trajectory(reference, self._settings.joint_names)
-            trajectory = flexible_trajectory(plan, reference, joints, self._settings.base_frame)
+            trajectory = reported_trajectory(report, plan, reference, self._settings)
         report.planning_time = duration_message(took)
         return self._recorder.write(
             self._settings, time.time_ns() - took, self._message, report, trajectory, plan,

@@ -199,6 +199,14 @@ def flexible_trajectory(plan: Plan, reference: Reference, joints: JointTrajector
     return message
 
 
+def reported_trajectory(report: PlanReport, plan: Plan, reference: Reference,
+                        settings: PlannerSettings) -> FlexibleTrajectory:
+    """Return the trajectory of a sampled plan, and add to its report what the samples show."""
+    add_reference(report, plan, reference)
+    joints = joint_trajectory(reference, settings.joint_names)
+    return flexible_trajectory(plan, reference, joints, settings.base_frame)
+
+
 def _flexible_point(n: int, samples: Samples, k: int, time: int) -> FlexiblePoint:
     return FlexiblePoint(
         time_from_start=duration_message(time),

@@ -16,15 +16,13 @@ from flex_planner.plan import Plan
 from flex_planner.progress import Monitor, StoppedError, StopReason
 from flex_planner.reference import Reference, sample_reference
 from flex_planner.ros.conversions import (
-    add_reference,
     duration_message,
     error_code,
     failure_report,
-    flexible_trajectory,
-    joint_trajectory,
     objectives_from_message,
     planning_time_limit,
     report_from_plan,
+    reported_trajectory,
     STOP_CODES,
     task_from_message,
 )
@@ -205,12 +203,10 @@ def _outcome(report: PlanReport, plan: Plan | None, settings: PlannerSettings,
     if plan is None or report.error_code != PlanReport.NONE:
         return Outcome(report=report, trajectory=FlexibleTrajectory(), plan=plan)
     reference = sample_reference(plan, settings.sampling(), monitor)
-    add_reference(report, plan, reference)
-    joints = joint_trajectory(reference, settings.joint_names)
-    broken = trajectory_violations(joints, settings.joint_names)
+    trajectory = reported_trajectory(report, plan, reference, settings)
+    broken = trajectory_violations(trajectory.joint_trajectory, settings.joint_names)
     if broken:
         raise RuntimeError(f'the trajectory would be refused: {"; ".join(broken)}')
-    trajectory = flexible_trajectory(plan, reference, joints, settings.base_frame)
     return Outcome(report=report, trajectory=trajectory, plan=plan, reference=reference)
 
 
