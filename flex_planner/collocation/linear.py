@@ -16,10 +16,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from flex_planner.collocation.banded import BandedFactors
 from flex_planner.collocation.gauss import ComplexArray, GaussRule
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import lapack
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -86,9 +86,8 @@ class NewtonSystem:
         self._upper = 2 * scale.size - 1 - left.shape[0]
         self._row_scale = np.concatenate([_row_sizes(left * scale), _row_sizes(right * scale)])
         band = self._assembled(self._stages.transition(), left, right)
-        self._factors, self._pivots, info = lapack.dgbtrf(
-            band, self._lower, self._upper, overwrite_ab=True)
-        if info or not np.isfinite(self._factors).all():
+        self._factors = BandedFactors(band, self._lower, self._upper)
+        if self._factors.singular:
             raise SingularSystemError('the linearised boundary-value problem is singular')
 
     def with_rule(self, rule: GaussRule) -> NewtonSystem:
@@ -138,11 +137,7 @@ class NewtonSystem:
         rhs = np.concatenate([-residual.left / self._row_scale[:top],
                               (gaps / self._scale).ravel(),
                               -residual.right / self._row_scale[top:]])
-        solution, info = lapack.dgbtrs(self._factors, self._lower, self._upper, rhs,
-                                       self._pivots)
-        if info:
-            raise SingularSystemError('the linearised boundary-value problem is singular')
-        nodes = solution.reshape(-1, self._scale.size) * self._scale
+        nodes = self._factors.solve(rhs).reshape(-1, self._scale.size) * self._scale
         rates = (self._jacobians @ nodes[:-1, :, None])[..., 0]
         return nodes, stages.joined(stages.solve(stages.constant(rates)) - forced)
 
