@@ -38,6 +38,7 @@ from rclpy.task import Future
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 MANY = QoSProfile(depth=1000)  # requests on their way; beyond 10, others would be lost
 STARTING = 60.0  # [s], a node on a machine that is busy
+PARAMETER_FILE = Path(__file__).parents[1] / 'config' / 'planner.yaml'
 SomeClient = TypeVar('SomeClient', bound='Client')
 _NUMBERS = itertools.count(1)
 
@@ -172,18 +173,29 @@ class Client:
 
 
 class Planner(Client):
-    """A planner node in a process of its own, and a client of it."""
+    """
+    A planner node in a process of its own, and a client of it.
+
+    Attributes
+    ----------
+    name : str
+        Full name of the node.
+    recordings : Path
+        Where it records.
+
+    """
 
     module = 'flex_planner.ros.planner_node'
 
-    def __init__(self, folder: Path, arm: str, name: str = 'flex_planner',
-                 **parameters: object) -> None:
+    def __init__(self, folder: Path, arm: str, name: str = 'flex_planner', *,
+                 parameter_file: Path | None = None, **parameters: object) -> None:
         super().__init__()
         self.name, self._log = f'/{name}', folder / f'{name}.log'
         self._log.parent.mkdir(parents=True, exist_ok=True)
-        given = {'arm': arm, 'recording_folder': folder / 'recordings', **parameters}
-        self.process = NodeProcess(self.module, given, {'__node': name},
-                                   self._log)
+        self.recordings = folder / 'recordings'
+        given = {'arm': arm, 'recording_folder': self.recordings, **parameters}
+        self.process = NodeProcess(self.module, given, {'__node': name}, self._log,
+                                   parameter_file)
 
     def log(self) -> str:
         """Return what the node has said."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Iterator
+from contextlib import ExitStack
 import math
 from pathlib import Path
 import signal
@@ -25,7 +26,7 @@ from flex_planner_interfaces.msg import (
 from geometry_msgs.msg import Point
 import pytest
 from rcl_interfaces.srv import DescribeParameters, ListParameters
-from ros_support import Planner, STARTING
+from ros_support import PARAMETER_FILE, Planner, STARTING
 from trajectory_msgs.msg import JointTrajectory
 
 JOINTS = ['joint1', 'joint2']
@@ -58,15 +59,29 @@ def check_health(planner: Planner) -> None:
     assert 'Traceback' not in planner.log()
 
 
+def check_end(planner: Planner, number: signal.Signals) -> None:
+    """Require that a signal ends the node at once, in good order."""
+    code, seconds = planner.stop(number)
+    assert code == 0
+    assert seconds < EXIT_LIMIT
+    assert 'Traceback' not in planner.log()
+    assert not list(planner.recordings.glob('.*'))
+
+
 @pytest.fixture(scope='module', autouse=True)
 def nodes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Planner]]:
-    """Start both planners at once."""
+    """Start both planners at once; in the end, stop one that is idle and one that searches."""
     folder = tmp_path_factory.mktemp('nodes')
     with Planner(folder, 'korayem_rigid', 'rigid_planner', record=False) as rigid, \
-            Planner(folder, 'korayem_ei50', queue_length=1) as flexible:
+            Planner(folder, 'korayem_ei50', parameter_file=PARAMETER_FILE,
+                    queue_length=1) as flexible:
         yield {'rigid': rigid, 'flexible': flexible}
         check_health(rigid)
         check_health(flexible)
+        check_end(rigid, signal.SIGTERM)
+        flexible.send_search(**LONG)
+        flexible.spin(0.3)
+        check_end(flexible, signal.SIGINT)
 
 
 @pytest.fixture(scope='module')
@@ -385,17 +400,6 @@ def test_searches_and_plans_wait_in_one_queue(flexible: Planner) -> None:
     assert (refused.payload, refused.payload_upper, refused.limiting_joint) == (0.0, math.inf, -1)
 
 
-def test_node_ends_at_once_while_it_searches(tmp_path: Path) -> None:
-    with Planner(tmp_path, 'korayem_ei50', 'searching') as planner:
-        planner.search(duration=-1.0)
-        planner.send_search(**LONG)
-        planner.spin(0.3)
-        code, seconds = planner.stop()
-        assert code == 0
-        assert seconds < EXIT_LIMIT
-        assert 'Traceback' not in planner.log()
-
-
 # Parameters
 
 
@@ -408,6 +412,13 @@ def test_every_parameter_is_described(rigid: Planner) -> None:
     answer = rigid.call(DescribeParameters, f'{name}/describe_parameters', request)
     assert {'arm', 'tolerance', 'sampling_step', 'queue_length', 'record'} <= set(names)
     assert all(descriptor.description.endswith('.') for descriptor in answer.descriptors)
+
+
+def test_node_takes_the_parameter_file_and_what_is_given_beside_it(flexible: Planner,
+                                                                   rigid: Planner) -> None:
+    assert flexible.parameter('effort_weights') == [1 / 8, 1 / 8]
+    assert rigid.parameter('effort_weights') == [1.0, 1.0]
+    assert flexible.parameter('queue_length') == 1
 
 
 def test_parameter_that_is_set_counts(rigid: Planner) -> None:
@@ -478,22 +489,6 @@ def test_log_tells_what_was_planned_and_what_failed(rigid: Planner) -> None:
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize('fields', [None, LONG], ids=['idle', 'planning'])
-def test_node_ends_at_once_with_code_0(tmp_path: Path, number: signal.Signals,
-                                       fields: dict[str, Any] | None) -> None:
-    with Planner(tmp_path, 'korayem_ei50', 'mortal') as planner:
-        planner.plan(duration=-1.0)
-        if fields is not None:
-            planner.send_plan(**fields)
-            planner.spin(0.3)
-        code, seconds = planner.stop(number)
-        assert code == 0
-        assert seconds < EXIT_LIMIT
-        assert 'Traceback' not in planner.log()
-    assert not list((tmp_path / 'recordings').glob('.*'))
-
-
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_node_can_be_ended_while_it_starts(tmp_path: Path, number: signal.Signals) -> None:
     with Planner(tmp_path, 'korayem_ei50', 'newborn') as planner:
         planner.wait('start', lambda: 'preparing the dynamics' in planner.log(), STARTING)
@@ -501,17 +496,20 @@ def test_node_can_be_ended_while_it_starts(tmp_path: Path, number: signal.Signal
         assert 'Traceback' not in planner.log()
 
 
-@pytest.mark.parametrize(('parameters', 'reason'), [
-    ({'arm': 'no_such_arm'}, "arm 'no_such_arm' is neither a path ending in .yaml nor one of"),
-    ({'arm': 'korayem_rigid', 'joint_names': []}, 'joint_names'),
-    ({'arm': 'korayem_rigid', 'joint_names': ['a', 'b', 'c'],
-      'effort_weights': [1.0, 1.0, 1.0]}, 'joint_names'),
-    ({'arm': 'korayem_rigid', 'tolerance': 5.0}, 'tolerance'),
-], ids=str)
-def test_node_with_a_bad_parameter_says_so_and_ends(tmp_path: Path, parameters: dict[str, object],
-                                                    reason: str) -> None:
-    log = tmp_path / 'log.txt'
-    with NodeProcess('flex_planner.ros.planner_node', parameters, log=log) as node:
-        assert node.process.wait(STARTING) == 1
-    assert reason in log.read_text()
-    assert 'Traceback' not in log.read_text()
+def test_node_with_a_bad_parameter_says_so_and_ends(tmp_path: Path) -> None:
+    wrong: list[tuple[dict[str, object], str]] = [
+        ({'arm': 'no_such_arm'}, "arm 'no_such_arm' is neither a path ending in .yaml nor one of"),
+        ({'arm': 'korayem_rigid', 'joint_names': []}, 'joint_names'),
+        ({'arm': 'korayem_rigid', 'joint_names': ['a', 'b', 'c'],
+          'effort_weights': [1.0, 1.0, 1.0]}, 'joint_names'),
+        ({'arm': 'korayem_rigid', 'tolerance': 5.0}, 'tolerance')]
+    with ExitStack() as stack:  # all start at once, which takes hardly longer than one
+        nodes = [stack.enter_context(NodeProcess(
+            'flex_planner.ros.planner_node', parameters, log=tmp_path / f'{k}.log'))
+            for k, (parameters, _) in enumerate(wrong)]
+        codes = [node.process.wait(STARTING) for node in nodes]
+    logs = [(tmp_path / f'{k}.log').read_text() for k in range(len(wrong))]
+    assert codes == [1] * len(wrong)
+    for log, (_, reason) in zip(logs, wrong, strict=True):
+        assert reason in log
+        assert 'Traceback' not in log

@@ -67,10 +67,10 @@ def test_plan_of_a_goal_is_published(planner: Planner) -> None:
 
 
 def test_search_succeeds_with_the_payload_of_the_service(planner: Planner) -> None:
-    fields = {'payload_mass': 4.0, 'payload_accuracy': 0.5}
+    fields = {'payload_mass': 5.5, 'payload_accuracy': 2.0}
     status, result = planner.search_goal(**fields).end()
     assert (status, result.report.error_code) == (SUCCEEDED, PlanReport.NONE)
-    assert result.payload == planner.search(**fields).payload > 4
+    assert result.payload == planner.search(**fields).payload > 5.5
     assert result.trajectory.payload_mass == result.payload
 
 
@@ -149,8 +149,8 @@ def test_waiting_goal_can_be_canceled_and_leaves_its_place(planner: Planner) -> 
 
 
 def test_goals_beyond_the_queue_are_aborted_as_busy(planner: Planner) -> None:
-    goals = [planner.plan_goal(**LONG, allowed_planning_time=1.5) for _ in range(3)]
-    goals.append(planner.search_goal(**LONG, allowed_planning_time=1.5))
+    goals = [planner.plan_goal(**LONG, allowed_planning_time=0.8) for _ in range(3)]
+    goals.append(planner.search_goal(**LONG, allowed_planning_time=0.8))
     ends = [goal.end() for goal in goals]
     assert {status for status, _ in ends} == {ABORTED}
     codes = [result.report.error_code for _, result in ends]

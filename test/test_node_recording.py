@@ -8,15 +8,18 @@ from pathlib import Path
 import shutil
 from typing import Any, NamedTuple
 
+from conftest import PlanFactory
 from flex_planner.arm import Arm
+from flex_planner.plan import Plan
 from flex_planner.reference import sample_reference
+from flex_planner.report import RecordedRequest
 from flex_planner.ros.conversions import (
     flexible_trajectory,
     joint_trajectory,
     report_from_plan,
 )
 from flex_planner.ros.recorder import OutcomeRecorder
-from flex_planner.ros.settings import PlannerSettings
+from flex_planner.ros.settings import MIN_RECORDING_SIZE, PlannerSettings
 from flex_planner_interfaces.msg import (
     FlexibleTrajectory,
     MotionTask,
@@ -34,6 +37,8 @@ from trajectory_msgs.msg import JointTrajectory
 import yaml
 
 NODE = '/flex_planner'
+SMALLEST = MIN_RECORDING_SIZE
+STAMP = 1_700_000_000_000_000_005  # [ns]
 TYPES = {
     f'{NODE}/motion_task': 'flex_planner_interfaces/msg/MotionTask',
     f'{NODE}/plan_report': 'flex_planner_interfaces/msg/PlanReport',
@@ -77,6 +82,10 @@ def read_by_mcap(folder: Path) -> list[Found]:
 
 
 READERS = pytest.mark.parametrize('read', [read_by_rosbags, read_by_mcap])
+
+
+def files(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.glob('*.mcap'))
 
 
 def only(found: list[Found], topic: str) -> Found:
@@ -175,7 +184,7 @@ def test_latched_topics_are_recorded_as_latched(answer: PlanPath.Response) -> No
 
 @pytest.mark.parametrize(('wrong', 'code'), [
     ({'duration': float('nan')}, PlanReport.NOT_FINITE),
-    ({'payload_mass': 200.0}, PlanReport.INFEASIBLE)])
+    ({'duration': 0.1}, PlanReport.INFEASIBLE)])
 def test_failed_request_is_recorded_with_its_report(planner: Planner, wrong: dict[str, Any],
                                                     code: int) -> None:
     report = planner.report(**wrong)
@@ -199,6 +208,29 @@ def test_nothing_is_recorded_if_told_so(planner: Planner) -> None:
     assert sorted(folder.iterdir()) == before
 
 
+def test_recording_continues_in_another_file_at_the_size_of_the_parameter(
+        planner: Planner) -> None:
+    assert planner.set_parameter('max_recording_size', SMALLEST).successful
+    answer = planner.plan()
+    assert planner.set_parameter('max_recording_size', 0).successful
+    folder = Path(answer.report.recording)
+    assert files(folder) == [f'{folder.name}_{k}.mcap' for k in range(len(files(folder)))]
+    assert len(files(folder)) > 1
+    found = read_by_rosbags(folder)
+    assert len(found) == len(answer.trajectory.points) + 4
+    assert plain(only(found, 'plan_report').message, answer.report) == plain(
+        answer.report, answer.report)
+
+
+def test_size_that_would_make_a_file_of_every_message_is_refused(planner: Planner) -> None:
+    for size, reason in ((SMALLEST - 1, 'max_recording_size is 65535, but must be 0 or at least'),
+                         (-1, 'max_recording_size')):
+        result = planner.set_parameter('max_recording_size', size)
+        assert not result.successful
+        assert reason in result.reason
+    assert planner.parameter('max_recording_size') == 0
+
+
 def test_every_recording_has_its_own_folder(planner: Planner) -> None:
     paths = [planner.report(duration=-1.0).recording for _ in range(3)]
     assert len(set(paths)) == 3
@@ -206,22 +238,23 @@ def test_every_recording_has_its_own_folder(planner: Planner) -> None:
     assert {str(Path(path).parent) for path in paths} == {planner.parameter('recording_folder')}
 
 
-def test_plan_that_cannot_be_recorded_is_returned_but_not_published(tmp_path: Path) -> None:
-    blocker = tmp_path / 'file'
-    blocker.write_text('no folder')
-    with Planner(tmp_path, 'korayem_rigid', 'blocked',
-                 recording_folder=blocker / 'recordings') as planner:
-        heard = planner.listen(JointTrajectory, '/blocked/joint_trajectory')
-        answer = planner.plan(publish=True)
-        planner.spin(0.2)
+def test_plan_that_cannot_be_recorded_is_returned_but_not_published(planner: Planner) -> None:
+    before = planner.plan(publish=True).trajectory.joint_trajectory
+    aside = planner.recordings.rename(planner.recordings.with_name('aside'))
+    planner.recordings.write_text('no folder')
+    try:
+        answer = planner.plan(publish=True, payload_mass=0.9)
         wrong = planner.report(duration=-1.0)
-        assert 'Traceback' not in planner.log()
+    finally:
+        planner.recordings.unlink()
+        aside.rename(planner.recordings)
     assert answer.report.error_code == PlanReport.RECORDING_FAILED
-    assert str(blocker) in answer.report.error_msg
+    assert str(planner.recordings) in answer.report.error_msg
     assert answer.report.recording == wrong.recording == ''
     assert len(answer.trajectory.points) > 100
-    assert not heard
     assert wrong.error_code == PlanReport.OUT_OF_RANGE
+    assert planner.latched(JointTrajectory, f'{NODE}/joint_trajectory') == before
+    assert 'Traceback' not in planner.log()
 
 
 # Searches for the maximum payload
@@ -273,12 +306,12 @@ def test_every_field_of_a_search_is_read_back(rigid_arm: Arm, tmp_path: Path, re
         front_efforts=[3.0, 4.0], front_prices=[5.0, 6.0], tried_payloads=[7.0, 8.0, 9.0],
         tried_solved=[True, False, True], tried_errors=[1e-9, float('inf'), 0.0])
     settings = replace(PlannerSettings.for_arm(rigid_arm), recording_folder=str(tmp_path))
-    report, trajectory, stamp = PlanReport(), FlexibleTrajectory(), 1_700_000_000_000_000_005
+    report, trajectory = PlanReport(), FlexibleTrajectory()
     folder = OutcomeRecorder(rigid_arm, NODE).write(
-        settings, stamp, task(), report, trajectory, None, None, lambda: False, search=sent)
+        settings, STAMP, task(), report, trajectory, None, None, lambda: False, search=sent)
     assert folder == tmp_path / 'find_max_payload_20231114T221320_000000005_0001'
     found = only(read(folder), 'payload_search')
-    assert found.time == stamp
+    assert found.time == STAMP
     assert plain(found.message, sent) == plain(sent, sent)
 
 
@@ -294,22 +327,46 @@ def test_failed_search_is_recorded_as_it_was_asked(planner: Planner, read: Any) 
     np.testing.assert_equal(plain(recorded.message, expected), plain(expected, expected))
 
 
-# Bytes
+# Files
 
 
-def test_same_request_and_outcome_make_the_same_bytes(plan_of: Any, ei50_arm: Arm,
-                                                      tmp_path: Path) -> None:
-    plan, stamp = plan_of('ei50', 0.8), 1_700_000_000_000_000_005
-    settings = replace(PlannerSettings.for_arm(ei50_arm), recording_folder=str(tmp_path / 'now'))
+def written(plan: Plan, folder: Path, **changes: Any) -> Path:
+    """Return where the recorder puts a plan with some parameters changed."""
+    settings = replace(PlannerSettings.for_arm(plan.arm), recording_folder=str(folder), **changes)
     reference = sample_reference(plan, settings.sampling())
     joints = joint_trajectory(reference, settings.joint_names)
+    trajectory = flexible_trajectory(plan, reference, joints, settings.base_frame)
+    return OutcomeRecorder(plan.arm, NODE).write(
+        settings, STAMP, task(), report_from_plan(plan), trajectory, plan, reference,
+        lambda: False)
+
+
+def raw(folder: Path) -> list[tuple[str, int, bytes]]:
+    """Return topics, log times and contents, without the report, which names its folder."""
+    with AnyReader([folder]) as reader:
+        return [(connection.topic, time, bytes(data))
+                for connection, time, data in reader.messages()
+                if connection.topic != f'{NODE}/plan_report']
+
+
+def test_same_request_and_outcome_make_the_same_bytes(plan_of: PlanFactory,
+                                                      tmp_path: Path) -> None:
     contents = []
     for _ in range(2):
-        trajectory = flexible_trajectory(plan, reference, joints, settings.base_frame)
-        folder = OutcomeRecorder(ei50_arm, NODE).write(
-            settings, stamp, task(), report_from_plan(plan), trajectory, plan, reference,
-            lambda: False)
+        folder = written(plan_of('ei50', 0.8), tmp_path / 'now')
         contents.append({path.name: path.read_bytes() for path in folder.iterdir()})
         shutil.rmtree(folder)
     assert len(contents[0]) == 2
     assert contents[0] == contents[1]
+
+
+def test_split_recording_holds_what_a_whole_one_holds(plan_of: PlanFactory,
+                                                      tmp_path: Path) -> None:
+    plan = plan_of('ei50', 0.8)
+    whole = written(plan, tmp_path / 'whole')
+    split = written(plan, tmp_path / 'split', max_recording_size=SMALLEST)
+    assert len(files(whole)) == 1 < len(files(split))
+    assert raw(split) == raw(whole)
+    request = RecordedRequest.read(split)
+    assert request.solved
+    assert request.settings['max_recording_size'] == SMALLEST

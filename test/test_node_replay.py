@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
+import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -88,6 +90,21 @@ def test_loop_from_a_late_start_goes_on_until_it_is_stopped(recording: Path,
     order = [round(10 * position) for position in positions(states)]
     assert order[:5] in ([3, 4, 3, 4, 3], [4, 3, 4, 3, 4])
     assert 'Traceback' not in (tmp_path / 'log').read_text()
+
+
+def test_replay_whose_recording_vanishes_fails_and_says_why(recording: Path,
+                                                            tmp_path: Path) -> None:
+    copy, log = tmp_path / 'copy', tmp_path / 'log'
+    shutil.copytree(recording, copy)
+    with Client() as client:
+        states = client.listen(JointState, STATES.name, RELIABLE)
+        with replaying(copy, log, loop=True, delay=0.2) as node:
+            client.wait('states', lambda: bool(states))
+            shutil.rmtree(copy)
+            assert node.process.wait(20) == 1
+    text = log.read_text()
+    assert re.search(rf'the replay ends after \d+ messages: cannot read {copy}.*: No such', text)
+    assert 'Traceback' not in text
 
 
 def test_command_replays_and_ends_well(recording: Path) -> None:

@@ -111,17 +111,29 @@ def test_parameter_that_makes_no_sense_changes_nothing(planner: Planner, wrong: 
     check_that_it_serves(planner)
 
 
+@pytest.fixture(scope='module')
+def flooded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[signal.Signals, Planner]]:
+    """Start both nodes that will be ended at once."""
+    folders = [tmp_path_factory.mktemp('flooded') for _ in range(2)]
+    with Planner(folders[0], 'korayem_ei50', 'flooded_int') as first, \
+            Planner(folders[1], 'korayem_ei50', 'flooded_term') as second:
+        yield {signal.SIGINT: first, signal.SIGTERM: second}
+
+
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_node_ends_at_once_while_requests_pour_in(tmp_path: Path, number: signal.Signals) -> None:
-    with Planner(tmp_path, 'korayem_ei50', 'flooded') as planner:
-        planner.plan(duration=-1.0)
-        planner.plan_goal(duration=-1.0).end()
-        for _ in range(20):
-            planner.send_plan(duration=100.0)
-            planner.send_search(duration=100.0)
-        planner.plan_goal(duration=100.0)
-        code, seconds = planner.stop(number)
-        assert code == 0
-        assert seconds < 2
-        assert 'Traceback' not in planner.log()
-    assert not list((tmp_path / 'recordings').glob('.*'))
+def test_node_ends_at_once_while_requests_pour_in(flooded: dict[signal.Signals, Planner],
+                                                  number: signal.Signals) -> None:
+    planner = flooded[number]
+    planner.plan(duration=-1.0)
+    planner.plan_goal(duration=-1.0).end()
+    planner.send_plan(duration=100.0)
+    planner.spin(0.3)  # it is at work from here on
+    for _ in range(20):
+        planner.send_plan(duration=100.0)
+        planner.send_search(duration=100.0)
+    planner.plan_goal(duration=100.0)
+    code, seconds = planner.stop(number)
+    assert code == 0
+    assert seconds < 2
+    assert 'Traceback' not in planner.log()
+    assert not list(planner.recordings.glob('.*'))

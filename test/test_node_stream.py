@@ -4,16 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+import io
 import os
 from pathlib import Path
+import pickle
 import signal
 from typing import NamedTuple
 
 from conftest import PlanFactory
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from flex_planner.reference import Reference, sample_reference, SamplingSettings
+from flex_planner.ros.settings import PlannerSettings
+from flex_planner.ros.streamer import Streamer
 from flex_planner.ros.streaming import ReferenceStates, StreamedPlan
 import numpy as np
 import pytest
+from rclpy.clock import Clock
 from ros_support import Planner
 from sensor_msgs.msg import JointState
 
@@ -31,12 +37,21 @@ class Heard(NamedTuple):
         return int(self.message.header.stamp.sec * 10**9 + self.message.header.stamp.nanosec)
 
 
+def check_that_the_stream_ends(planner: Planner, number: signal.Signals, code: int) -> None:
+    """Require that a planner ended by a signal takes the process with it, while it streams."""
+    assert planner.report(publish=True, duration=6.0).error_code == 0
+    (streamer,) = children(planner.process.process.pid)
+    assert planner.stop(number)[0] == code
+    planner.wait('end', lambda: gone(streamer), 5)
+
+
 @pytest.fixture(scope='module')
 def planner(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Planner]:
     folder = tmp_path_factory.mktemp('stream')
     with Planner(folder, 'korayem_ei50', record=False) as planner:
         yield planner
         assert planner.process.process.poll() is None
+        check_that_the_stream_ends(planner, signal.SIGINT, 0)
         assert 'Traceback' not in planner.log()
 
 
@@ -76,6 +91,52 @@ def real_time_is_allowed() -> bool:
 
 def children(pid: int) -> list[int]:
     return [int(word) for word in Path(f'/proc/{pid}/task/{pid}/children').read_text().split()]
+
+
+def stream_status(statuses: list[DiagnosticArray]) -> tuple[bytes, str]:
+    """Return level and message of what the node said last of its stream."""
+    _, stream = statuses[-1].status
+    return stream.level, stream.message
+
+
+class BrokenPipe(io.BytesIO):
+    """The input of a process that is gone."""
+
+    def flush(self) -> None:
+        raise BrokenPipeError('Broken pipe')
+
+
+class FakeProcess:
+    """A process with an input and an exit code, None while it runs."""
+
+    def __init__(self, stdin: io.BytesIO, code: int | None = None) -> None:
+        self.stdin, self.stdout, self._code = stdin, io.BytesIO(), code
+
+    def poll(self) -> int | None:
+        return self._code
+
+
+class FakeNode:
+    """What the streamer needs of a node, and what it logged."""
+
+    def __init__(self) -> None:
+        self.said: list[str] = []
+        self.warning = self.error = self.said.append
+
+    def get_name(self) -> str:
+        return 'fake'
+
+    def get_namespace(self) -> str:
+        return '/'
+
+    def resolve_topic_name(self, name: str) -> str:
+        return name
+
+    def get_logger(self) -> FakeNode:
+        return self
+
+    def get_clock(self) -> Clock:
+        return Clock()
 
 
 def gone(pid: int) -> bool:
@@ -164,9 +225,9 @@ def test_new_plan_takes_the_place_of_the_one_before(planner: Planner, heard: lis
 def test_states_come_in_time_while_the_solver_is_at_work(planner: Planner,
                                                          heard: list[Heard]) -> None:
     heard.clear()
-    planner.report(publish=True, duration=3.0)
+    planner.report(publish=True, duration=2.0)
     goal = planner.plan_goal(duration=100.0)
-    planner.wait('all states', lambda: len(heard) == 301)
+    planner.wait('all states', lambda: len(heard) == 201)
     assert not goal.answer.done()
     assert goal.cancel()
     began = [state.published for state in heard]
@@ -177,21 +238,64 @@ def test_states_come_in_time_while_the_solver_is_at_work(planner: Planner,
     assert np.median(errors) < 1e-3
 
 
-def test_process_that_streams_is_started_again(planner: Planner, heard: list[Heard]) -> None:
+def test_process_that_died_is_an_error_until_a_plan_starts_it_again(
+        planner: Planner, heard: list[Heard]) -> None:
+    statuses: list[DiagnosticArray] = planner.listen(DiagnosticArray, '/diagnostics', 10)
     (streamer,) = children(planner.process.process.pid)
     os.kill(streamer, signal.SIGKILL)
-    planner.wait('end', lambda: gone(streamer))
-    assert planner.report(publish=True, duration=6.0).error_code == 0
-    (streamer,) = children(planner.process.process.pid)
+    planner.wait('error', lambda: bool(statuses) and stream_status(statuses) == (
+        DiagnosticStatus.ERROR, 'the process that streams ~/reference_states was ended by '
+        'SIGKILL; it is started again with the next plan that is published'))
+    assert statuses[-1].status[0].level == DiagnosticStatus.OK  # plans are made all the same
     heard.clear()
+    assert planner.report(publish=True, duration=6.0).error_code == 0
     planner.wait('states', lambda: bool(heard))
+    planner.wait('recovery', lambda: stream_status(statuses) == (DiagnosticStatus.OK, 'ready'))
 
 
-@pytest.mark.parametrize('number', [signal.SIGKILL, signal.SIGINT])
-def test_process_that_streams_ends_with_its_planner(tmp_path: Path,
-                                                    number: signal.Signals) -> None:
+AGAIN = 'the process that streams ~/reference_states is gone: it is started again'
+
+
+def streamer_of(monkeypatch: pytest.MonkeyPatch, node: FakeNode,
+                *processes: FakeProcess) -> Streamer:
+    """Return a streamer that starts these processes one after another."""
+    left = iter(processes)
+    monkeypatch.setattr('subprocess.Popen', lambda *_, **__: next(left))
+    return Streamer(node)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize('dead', [FakeProcess(BrokenPipe()), FakeProcess(io.BytesIO(), 1)])
+def test_plan_is_not_lost_where_the_process_is_gone_or_dies_just_then(
+        monkeypatch: pytest.MonkeyPatch, plan_of: PlanFactory, dead: FakeProcess) -> None:
+    sent, node, plan = io.BytesIO(), FakeNode(), plan_of('ei50')
+    reference = sample_reference(plan, SamplingSettings())
+    streamer = streamer_of(monkeypatch, node, dead, FakeProcess(sent))
+    streamer.start(plan, reference, PlannerSettings.for_arm(plan.arm))
+    assert pickle.loads(sent.getvalue()).times_ns.tolist() == reference.times_ns.tolist()
+    assert node.said == [AGAIN]
+
+
+def test_process_that_dies_again_does_not_spoil_the_plan(monkeypatch: pytest.MonkeyPatch,
+                                                         plan_of: PlanFactory) -> None:
+    node, plan = FakeNode(), plan_of('ei50')
+    dead = [FakeProcess(BrokenPipe()) for _ in range(2)]
+    streamer = streamer_of(monkeypatch, node, *dead)
+    streamer.start(plan, sample_reference(plan, SamplingSettings()),
+                   PlannerSettings.for_arm(plan.arm))
+    assert node.said == [AGAIN, 'the plan is not streamed: Broken pipe']
+
+
+@pytest.mark.parametrize(('code', 'end'), [
+    (None, None), (1, 'has ended with code 1'), (-15, 'was ended by SIGTERM'),
+    (-99, 'was ended by signal 99')])
+def test_failure_tells_how_the_process_ended(monkeypatch: pytest.MonkeyPatch, code: int | None,
+                                             end: str | None) -> None:
+    streamer = streamer_of(monkeypatch, FakeNode(), FakeProcess(io.BytesIO(), code))
+    assert streamer.failure == ('' if end is None else (
+        f'the process that streams ~/reference_states {end}; it is started again with the next '
+        'plan that is published'))
+
+
+def test_process_that_streams_ends_with_a_planner_that_is_killed(tmp_path: Path) -> None:
     with Planner(tmp_path, 'korayem_rigid', 'mortal', record=False) as planner:
-        planner.report(publish=True, duration=20.0)
-        (streamer,) = children(planner.process.process.pid)
-        planner.stop(number)
-        planner.wait('end', lambda: gone(streamer), 5)
+        check_that_the_stream_ends(planner, signal.SIGKILL, -9)

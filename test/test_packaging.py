@@ -1,7 +1,9 @@
 """Package descriptions, entry points and installed files agree with one another."""
 
 import ast
+from dataclasses import replace
 from importlib import metadata
+import math
 from pathlib import Path
 import re
 import sys
@@ -13,6 +15,7 @@ import flex_planner
 from flex_planner.arm_files import load_arm
 from flex_planner.ros.parameters import as_mapping
 from flex_planner.ros.settings import PlannerSettings
+from flex_planner.ros.simulator_settings import SimulatorSettings
 from packaging.requirements import Requirement
 import pytest
 import yaml
@@ -117,13 +120,19 @@ def test_parameter_and_launch_files_are_installed():
         assert wanted
 
 
-def test_parameter_file_repeats_the_defaults_of_the_planner():
+@pytest.mark.parametrize(('node', 'settings', 'chosen'), [
+    ('flex_planner', PlannerSettings, {'effort_weights': [1 / 8, 1 / 8]}),
+    ('arm_simulator', SimulatorSettings, {
+        'initial_positions': pytest.approx([math.pi / 3, -2 * math.pi / 3])})])
+def test_parameter_file_lists_every_parameter_with_its_default(node, settings, chosen):
     text = (ROOT / 'config' / 'planner.yaml').read_text()
-    written = yaml.safe_load(text)['flex_planner']['ros__parameters']
-    defaults = as_mapping(PlannerSettings.for_arm(load_arm(written.pop('arm'))))
-    assert written.pop('effort_weights') == [1 / 8, 1 / 8]  # the paper's
-    assert {'payload_accuracy', 'payload_step'} <= written.keys()
-    assert written == {name: defaults.get(name) for name in written}
+    written = yaml.safe_load(text)[node]['ros__parameters']
+    defaults = as_mapping(settings.for_arm(load_arm(written.pop('arm'))))
+    assert written == {**defaults, **chosen}
+    # ROS does not take 3 for 3.0
+    kinds = {name: type(value) for name, value in defaults.items()}
+    assert {name: type(value) for name, value in written.items()} == kinds
+    replace(settings(**defaults), **written)
 
 
 def test_launch_files_are_those_of_the_planner_alone_with_an_arm_and_with_ros2_control():

@@ -26,6 +26,7 @@ from flex_planner.recording import (
 )
 from flex_planner.report import check_motion, RecordedRequest, report_page, write_report
 from flex_planner.report.check import resimulated_states
+from flex_planner.report.frequencies import NaturalFrequencies
 from flex_planner.report.spectra import spectrum
 from flex_planner.simulation import simulate
 import numpy as np
@@ -367,6 +368,56 @@ def test_spectrum_of_uneven_times_or_no_signals_is_empty() -> None:
     assert spectrum(times, np.ones((4, 0)))[1].shape == (0, 0)
 
 
+# Natural frequencies
+
+
+def test_natural_frequencies_are_those_of_the_arm_over_its_postures(
+        request_of_plan: RecordedRequest) -> None:
+    found = NaturalFrequencies.of(request_of_plan)
+    assert found is not None
+    # as flex-planner arm tells them: pinned links do not feel the payload while joints are locked
+    expected = np.array([[18.14] * 2, [18.14] * 2, [72.55] * 2, [72.55] * 2])
+    np.testing.assert_allclose(found.locked, expected, atol=5e-3)
+    assert (found.free[:, 0] > found.locked[:, 1]).all()
+    assert (np.ptp(found.free, axis=1) > 0.05).all()  # they depend on the posture
+
+
+def test_spectra_peak_at_the_natural_frequencies_with_the_joints_free(
+        request_of_plan: RecordedRequest) -> None:
+    motion, found = request_of_plan.motion, NaturalFrequencies.of(request_of_plan)
+    assert motion is not None
+    assert found is not None
+    lines, amplitudes = spectrum(motion.times[:-1], motion.coordinates[:-1, 2:])
+    for ends in found.free.reshape(2, 4)[:, [0, 3]]:  # pairs that the spectrum cannot tell apart
+        near = np.flatnonzero(np.abs(lines - ends.mean()) < 15)
+        peaks = lines[near[amplitudes[near].argmax(axis=0)]]
+        # a line of the spectrum is 1 Hz wide
+        assert (peaks > ends[0] - 1).all()
+        assert (peaks < ends[1] + 1).all()
+
+
+def test_natural_frequencies_are_marked_in_the_spectra_and_named(
+        request_of_plan: RecordedRequest) -> None:
+    data, found = Page(report_page(request_of_plan)).data, NaturalFrequencies.of(request_of_plan)
+    assert found is not None
+    marked = {plot['key']: plot['bands'] for plot in data['plots'] if plot['bands']}
+    assert marked.keys() == {'modes_spectrum', 'modal_rates_spectrum'}
+    for bands in marked.values():
+        assert bands['name'] == 'natural frequencies, joints free, over the postures of the motion'
+        assert bands['labels'] == ['f1', 'f2', 'f3', 'f4']
+        np.testing.assert_allclose(bands['ranges'], found.free, rtol=1e-12)
+    (table,) = [table for table in data['tables'] if table['title'].startswith('Natural freq')]
+    assert table['columns'] == ['', 'joints free (marked in the spectra)', 'joints locked']
+    assert table['rows'][0][2] == '18.14'
+
+
+def test_rigid_arms_and_failures_have_no_natural_frequencies(trials: Path, failure: Path) -> None:
+    for path in (trials, failure):
+        request = RecordedRequest.read(path)
+        assert NaturalFrequencies.of(request) is None
+        assert 'natural frequencies, joints free' not in report_page(request)
+
+
 # In a browser
 
 
@@ -395,6 +446,10 @@ mouse('pointerleave', 0.5);
 result.restored = first === canvas.toDataURL() && second === other.toDataURL();
 document.querySelector('#torques button').click();
 result.hidden = first !== canvas.toDataURL();
+const marked = document.querySelector('#modes_spectrum canvas');
+const bands = marked.toDataURL();
+[...document.querySelectorAll('#modes_spectrum button')].at(-1).click();
+result.bands = bands !== marked.toDataURL();
 </script>
 </body>
 """
@@ -419,10 +474,11 @@ def test_browser_draws_zooms_and_toggles(plan: Path, tmp_path: Path) -> None:
     for _ in range(3):  # on a busy machine the browser may not have drawn by the time it is asked
         seen = opened(page, '--enable-logging=stderr', '--dump-dom')
         attributes = dict(re.findall(r'data-(\w+)="([^"]*)"', seen))
-        if attributes['zoomed'] == attributes['restored'] == attributes['hidden'] == 'true':
+        worked = {attributes[name] for name in ('zoomed', 'restored', 'hidden', 'bands')}
+        if worked == {'true'}:
             break
     assert attributes['plots'] == '10'
-    assert attributes['zoomed'] == attributes['restored'] == attributes['hidden'] == 'true'
+    assert worked == {'true'}
     assert all(float(value) for value in attributes['readouts'].split(','))
     assert 'Certificate when planned' in seen
 

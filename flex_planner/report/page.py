@@ -21,8 +21,9 @@ from flex_planner import __version__
 from flex_planner.errors import RecordingError
 from flex_planner.report.check import MotionCheck
 from flex_planner.report.contents import RecordedRequest
+from flex_planner.report.frequencies import NaturalFrequencies
 from flex_planner.report.plots import Plot, plots, Series
-from flex_planner.report.tables import tables, verdict
+from flex_planner.report.tables import Table, tables, verdict
 from flex_planner.validation import Array
 
 _FOLDER = Path(__file__).parent
@@ -32,7 +33,8 @@ _PLAIN = ('key', 'title', 'x_label', 'y_label', 'group', 'log', 'equal')
 
 def report_page(request: RecordedRequest, check: MotionCheck | None = None) -> str:
     """Return the report of a recording as HTML."""
-    drawn = plots(request, check)
+    frequencies = NaturalFrequencies.of(request)
+    drawn = plots(request, check, frequencies)
     template = Template((_FOLDER / 'page.html').read_text(encoding='utf-8'))
     passed = request.solved and (check is None or check.passed)
     kind = 'find_max_payload' if request.search is not None else 'plan_path'
@@ -40,7 +42,7 @@ def report_page(request: RecordedRequest, check: MotionCheck | None = None) -> s
         title=escape(f'{kind}: {request.arm.name}'), kind='' if passed else 'failed',
         file=escape(f'{request.path.name}, report of flex_planner {__version__}'),
         verdict=escape(verdict(request, check)), hidden='' if drawn else 'hidden',
-        data=_json(_content(request, check, drawn)),
+        data=_json(_content(tables(request, check, frequencies), drawn)),
         script=(_FOLDER / 'plots.js').read_text(encoding='utf-8'))
 
 
@@ -63,8 +65,7 @@ def write_report(path: Path, request: RecordedRequest, check: MotionCheck | None
         raise RecordingError(f'cannot write {path}: {error.strerror or error}') from error
 
 
-def _content(request: RecordedRequest, check: MotionCheck | None,
-             drawn: list[Plot]) -> dict[str, Any]:
+def _content(told: list[Table], drawn: list[Plot]) -> dict[str, Any]:
     """Return tables and plots; the arrays along x are shared."""
     axes: dict[str, list[float | None]] = {}
     names: dict[bytes, str] = {}
@@ -82,9 +83,9 @@ def _content(request: RecordedRequest, check: MotionCheck | None,
                 'colour': series.colour, 'dashed': series.dashed, 'dots': series.dots}
 
     shown = [{**{name: getattr(plot, name) for name in _PLAIN},
+              'bands': None if plot.bands is None else asdict(plot.bands),
               'series': [line(series) for series in plot.series]} for plot in drawn]
-    return {'tables': [asdict(table) for table in tables(request, check)], 'axes': axes,
-            'plots': shown}
+    return {'tables': [asdict(table) for table in told], 'axes': axes, 'plots': shown}
 
 
 def _numbers(values: Array) -> list[float | None]:

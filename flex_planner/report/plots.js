@@ -4,6 +4,7 @@
 
 const COLOURS = ['#0b62a4', '#c8501e', '#2a8a3e', '#8e44ad', '#b8860b', '#137a7f', '#a3195b',
   '#555555'];
+const BAND = 'rgba(60, 60, 60, 0.22)';
 const MARGIN = { left: 74, right: 14, top: 10, bottom: 42 };
 
 function element(tag, parent, text = '', className = '') {
@@ -60,6 +61,7 @@ class Plot {
     this.canvas = element('canvas', this.figure);
     this.canvas.setAttribute('role', 'img');
     this.canvas.setAttribute('aria-label', `${spec.title}: ${spec.y_label} over ${spec.x_label}`);
+    this.bands = spec.bands && { ...spec.bands, shown: true };
     this.addLegend();
     this.addMouse();
     this.zoom = null;
@@ -70,20 +72,27 @@ class Plot {
   addLegend() {
     const legend = element('div', this.figure, '', 'legend');
     for (const entry of this.series) {
-      const button = element('button', legend);
-      button.type = 'button';
-      const swatch = element('span', button, '', entry.dashed ? 'swatch dashed' : 'swatch');
-      swatch.style.borderColor = entry.colour;
-      element('span', button, entry.name);
+      const button = this.addButton(legend, entry, entry.dashed ? 'swatch dashed' : 'swatch',
+        entry.colour);
       entry.readout = element('output', button);
-      button.setAttribute('aria-pressed', 'true');
-      button.addEventListener('click', () => {
-        entry.shown = !entry.shown;
-        button.setAttribute('aria-pressed', String(entry.shown));
-        this.draw();
-      });
     }
+    if (this.bands) this.addButton(legend, this.bands, 'swatch band', BAND);
     this.position = element('span', legend, '', 'position');
+  }
+
+  // Add what shows and hides a line, or the bands.
+  addButton(legend, entry, kind, colour) {
+    const button = element('button', legend);
+    button.type = 'button';
+    element('span', button, '', kind).style.borderColor = colour;
+    element('span', button, entry.name);
+    button.setAttribute('aria-pressed', 'true');
+    button.addEventListener('click', () => {
+      entry.shown = !entry.shown;
+      button.setAttribute('aria-pressed', String(entry.shown));
+      this.draw();
+    });
+    return button;
   }
 
   addMouse() {
@@ -213,7 +222,9 @@ class Plot {
     pen.beginPath();
     pen.rect(MARGIN.left, MARGIN.top, this.width, this.height);
     pen.clip();
+    if (this.bands && this.bands.shown) this.drawBands(pen);
     for (const entry of this.series) if (entry.shown) this.drawSeries(pen, entry);
+    if (this.bands && this.bands.shown) this.labelBands(pen);
     this.drawMark(pen);
     pen.restore();
   }
@@ -253,6 +264,24 @@ class Plot {
     pen.moveTo(x0, y0);
     pen.lineTo(x1, y1);
     pen.stroke();
+  }
+
+  drawBands(pen) {
+    pen.fillStyle = BAND;
+    for (const [low, high] of this.bands.ranges) {
+      const width = Math.max(this.px(high) - this.px(low), 2);
+      pen.fillRect(this.px((low + high) / 2) - width / 2, MARGIN.top, width, this.height);
+    }
+  }
+
+  // Labels of neighbours are on two lines: they are close where frequencies are.
+  labelBands(pen) {
+    Object.assign(pen, { textAlign: 'left', lineWidth: 3, strokeStyle: '#fff', fillStyle: '#333' });
+    this.bands.ranges.forEach(([, high], i) => {
+      const place = [this.bands.labels[i], this.px(high) + 3, MARGIN.top + (i % 2 ? 27 : 14)];
+      pen.strokeText(...place);
+      pen.fillText(...place);
+    });
   }
 
   drawSeries(pen, { xs, y, colour, dashed, dots }) {

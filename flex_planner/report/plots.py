@@ -8,6 +8,7 @@ from typing import Any
 
 from flex_planner.report.check import MotionCheck
 from flex_planner.report.contents import RecordedMotion, RecordedRequest
+from flex_planner.report.frequencies import NaturalFrequencies
 from flex_planner.report.spectra import spectrum
 from flex_planner.validation import Array
 import numpy as np
@@ -42,6 +43,27 @@ class Series:
     dots: bool = False
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bands:
+    """
+    Ranges along x that are marked from top to bottom.
+
+    Attributes
+    ----------
+    name : str
+        In the legend.
+    labels : list of str
+        At each range.
+    ranges : list of [low, high]
+        In the unit of x.
+
+    """
+
+    name: str
+    labels: list[str]
+    ranges: list[list[float]]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Plot:
     """
@@ -57,6 +79,8 @@ class Plot:
         Plots of one group are zoomed together; empty for none.
     log, equal : bool
         Logarithmic upwards; the same scale in both directions.
+    bands : Bands or None
+        What is marked.
 
     """
 
@@ -68,16 +92,19 @@ class Plot:
     group: str = ''
     log: bool = False
     equal: bool = False
+    bands: Bands | None = None
 
 
-def plots(request: RecordedRequest, check: MotionCheck | None = None) -> list[Plot]:
+def plots(request: RecordedRequest, check: MotionCheck | None = None,
+          frequencies: NaturalFrequencies | None = None) -> list[Plot]:
     """Return the plots of a report; those of the motion only where there is one."""
-    found = [] if request.motion is None else _motion_plots(request, request.motion, check)
+    found = [] if request.motion is None else _motion_plots(request, request.motion, check,
+                                                            _bands(frequencies))
     return [*found, *([] if request.search is None else _search_plots(request.search))]
 
 
-def _motion_plots(request: RecordedRequest, motion: RecordedMotion,
-                  check: MotionCheck | None) -> list[Plot]:
+def _motion_plots(request: RecordedRequest, motion: RecordedMotion, check: MotionCheck | None,
+                  bands: Bands | None) -> list[Plot]:
     arm, n = request.arm, request.arm.n_joints
     joints, modes, t = request.joint_names, arm.modal_names, motion.times
     found = [
@@ -93,9 +120,9 @@ def _motion_plots(request: RecordedRequest, motion: RecordedMotion,
             _over_time('modes', 'Modal displacements', 'displacement [m]', t, bends, modes),
             _over_time('modal_rates', 'Modal rates', 'rate [m/s]', t, rates, modes),
             _spectrum('modes_spectrum', 'Spectrum of the modal displacements', 'amplitude [m]',
-                      t[moving], bends[moving], modes),
+                      t[moving], bends[moving], modes, bands),
             _spectrum('modal_rates_spectrum', 'Spectrum of the modal rates', 'amplitude [m/s]',
-                      t[moving], rates[moving], modes)]
+                      t[moving], rates[moving], modes, bands)]
     names = [*joints, *modes]
     return [
         *found,
@@ -125,12 +152,21 @@ def _over_time(key: str, title: str, unit: str, times: Array, values: Array,
         Series(name=name, x=times, y=values[:, i], colour=i) for i, name in enumerate(names)])
 
 
+def _bands(frequencies: NaturalFrequencies | None) -> Bands | None:
+    """Return where spectra should have their peaks: under given torques the joints are free."""
+    if frequencies is None:
+        return None
+    ranges = frequencies.free.tolist()
+    return Bands(name='natural frequencies, joints free, over the postures of the motion',
+                 labels=[f'f{k}' for k in range(1, len(ranges) + 1)], ranges=ranges)
+
+
 def _spectrum(key: str, title: str, unit: str, times: Array, values: Array,
-              names: Sequence[str]) -> Plot:
+              names: Sequence[str], bands: Bands | None) -> Plot:
     """Return the spectra of columns."""
     frequencies, amplitudes = spectrum(times, values)
     return Plot(key=key, title=title, x_label='frequency [Hz]', y_label=unit, log=True,
-                group='frequency', series=[
+                group='frequency', bands=bands, series=[
                     Series(name=name, x=frequencies, y=amplitudes[:, i], colour=i)
                     for i, name in enumerate(names)])
 

@@ -10,6 +10,7 @@ from flex_planner.arm import Arm
 from flex_planner.certify import CertificateLimits
 from flex_planner.report.check import MotionCheck
 from flex_planner.report.contents import RecordedRequest
+from flex_planner.report.frequencies import NaturalFrequencies
 import numpy as np
 
 Cells = tuple[str, ...]
@@ -52,7 +53,8 @@ def verdict(request: RecordedRequest, check: MotionCheck | None = None) -> str:
     return f'{found}Solved and certified when it was planned; the check of the recording {again}.'
 
 
-def tables(request: RecordedRequest, check: MotionCheck | None = None) -> list[Table]:
+def tables(request: RecordedRequest, check: MotionCheck | None = None,
+           frequencies: NaturalFrequencies | None = None) -> list[Table]:
     """Return the tables of a report."""
     found = [_task(request), _outcome(request)]
     if request.solved:
@@ -61,6 +63,8 @@ def tables(request: RecordedRequest, check: MotionCheck | None = None) -> list[T
         found.append(check_table(check))
     if request.motion is not None:
         found.append(_joints(request))
+    if frequencies is not None:
+        found.append(_frequencies(frequencies))
     if request.search is not None:
         found += [_search(request.search), *_trials(request.search)]
     if len(request.report.tried_weights):
@@ -147,6 +151,16 @@ def _joints(request: RecordedRequest) -> Table:
                    for name, torque, part, speed, share, full in rows))
 
 
+def _frequencies(frequencies: NaturalFrequencies) -> Table:
+    """Return how the arm rings with the payload of the plan."""
+    pairs = zip(frequencies.free, frequencies.locked, strict=True)
+    return Table(
+        title='Natural frequencies over the postures of the motion [Hz]',
+        columns=('', 'joints free (marked in the spectra)', 'joints locked'),
+        rows=tuple((f'f{k}', _span(*free), _span(*locked))
+                   for k, (free, locked) in enumerate(pairs, 1)))
+
+
 def _search(search: Any) -> Table:
     """Return how the maximum payload was searched."""
     return Table(title='Search for the maximum payload', rows=(
@@ -212,6 +226,12 @@ def _settings(request: RecordedRequest) -> Table:
 
 def _percent(share: float) -> str:
     return f'{share:.1%}' if np.isfinite(share) else '–'
+
+
+def _span(low: float, high: float) -> str:
+    """Return a range, or the one number that it is."""
+    ends = [f'{value:.4g}' for value in (low, high)]
+    return ends[0] if ends[0] == ends[1] else ' to '.join(ends)
 
 
 def _cells(row: Iterable[float]) -> Cells:

@@ -9,6 +9,7 @@ import time
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from flex_planner.ros.desk import Desk
+from flex_planner.ros.streamer import Streamer
 from flex_planner_interfaces.msg import PlanReport
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
@@ -53,10 +54,11 @@ class Record:
 
 class Diagnostics:
     """
-    Publishes one status a second.
+    Publishes the status of the planner and of its stream once a second.
 
-    OK; WARN if the last request failed; ERROR if it failed for a reason inside the node, which
-    are RECORDING_FAILED and UNKNOWN.
+    planner: OK; WARN if the last request failed; ERROR if it failed for a reason inside the node,
+    which are RECORDING_FAILED and UNKNOWN. reference states: ERROR while the process that streams
+    them is gone, else OK.
 
     Parameters
     ----------
@@ -66,24 +68,37 @@ class Diagnostics:
         Its requests.
     record : Record
         How they ended.
+    streamer : Streamer
+        Streams the reference states.
     arm : str
         Name of the arm.
 
     """
 
-    def __init__(self, node: Node, desk: Desk, record: Record, arm: str) -> None:
+    def __init__(self, node: Node, desk: Desk, record: Record, streamer: Streamer,
+                 arm: str) -> None:
         self._node, self._desk, self._record, self._arm = node, desk, record, arm
+        self._streamer = streamer
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 1)
         node.create_timer(_PERIOD, self._publish, callback_group=ReentrantCallbackGroup())
 
     def _publish(self) -> None:
-        status = DiagnosticStatus(
+        message = DiagnosticArray(status=[self._of_planner(), self._of_stream()])
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        self._publisher.publish(message)
+
+    def _of_planner(self) -> DiagnosticStatus:
+        return DiagnosticStatus(
             level=self._level(), name=f'{self._node.get_name()}: planner', message=self._message(),
             hardware_id=self._arm,
             values=[KeyValue(key=key, value=str(value)) for key, value in self._values().items()])
-        message = DiagnosticArray(status=[status])
-        message.header.stamp = self._node.get_clock().now().to_msg()
-        self._publisher.publish(message)
+
+    def _of_stream(self) -> DiagnosticStatus:
+        failure = self._streamer.failure
+        return DiagnosticStatus(
+            level=DiagnosticStatus.ERROR if failure else DiagnosticStatus.OK,
+            name=f'{self._node.get_name()}: reference states', message=failure or 'ready',
+            hardware_id=self._arm)
 
     def _level(self) -> bytes:
         code = self._record.error_code

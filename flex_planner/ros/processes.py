@@ -27,14 +27,18 @@ class NodeProcess:
         Names to be replaced.
     log : Path, optional
         File for what the node says; default: the standard error of this process.
+    parameter_file : Path, optional
+        Parameters as ROS keeps them in YAML; those given one by one count more.
 
     """
 
     def __init__(self, module: str, parameters: Mapping[str, object] | None = None,
-                 remappings: Mapping[str, str] | None = None, log: Path | None = None) -> None:
+                 remappings: Mapping[str, str] | None = None, log: Path | None = None,
+                 parameter_file: Path | None = None) -> None:
         pairs = [f'{name}:={_yaml(value)}' for name, value in (parameters or {}).items()]
         rules = [f'{name}:={target}' for name, target in (remappings or {}).items()]
-        arguments = [word for pair in pairs for word in ('-p', pair)]
+        arguments = ['--params-file', str(parameter_file)] if parameter_file else []
+        arguments += [word for pair in pairs for word in ('-p', pair)]
         arguments += [word for rule in rules for word in ('-r', rule)]
         with ExitStack() as stack:
             output = stack.enter_context(log.open('wb')) if log else None

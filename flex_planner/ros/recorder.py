@@ -73,7 +73,8 @@ class OutcomeRecorder:
         Parameters
         ----------
         settings : PlannerSettings
-            Parameters at the request, kept in an attachment.
+            Parameters at the request, kept in an attachment; they tell where it goes and from
+            which size on it is split.
         stamp : int
             When the request was accepted [ns since 1970].
         task : MotionTask
@@ -101,7 +102,8 @@ class OutcomeRecorder:
         path = settings.output_folder() / self._name(stamp, search)
         report.recording = str(path)
         with Recording.create(path.parent, path.name, self._types,
-                              custom_data={'flex_planner': __version__}) as recording:
+                              custom_data={'flex_planner': __version__},
+                              max_bytes=settings.max_recording_size or None) as recording:
             recording.attach('scenario.yaml', self._scenario(settings).encode(),
                              media_type='application/yaml', time_ns=stamp)
             recording.write(self._task, task, stamp)

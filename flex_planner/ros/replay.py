@@ -10,7 +10,7 @@ from pathlib import Path
 import time
 from typing import Any
 
-from flex_planner.errors import InvalidValueError, RecordingError
+from flex_planner.errors import FlexPlannerError, InvalidValueError, RecordingError
 from flex_planner.recording import (
     check_definition,
     definition_folder,
@@ -24,7 +24,7 @@ from flex_planner.recording import (
     TopicSummary,
 )
 from flex_planner.ros.parameters import declare, described
-from flex_planner.ros.running import run_node
+from flex_planner.ros.running import CannotGoOnError, run_node
 import rclpy
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
@@ -57,7 +57,8 @@ class Replay(Node):  # type: ignore[misc]
     """
     Publishes the messages of a recording, then ends.
 
-    Topics whose types are not installed, or differ, are left out, which is logged.
+    Topics whose types are not installed, or differ, are left out, which is logged. Where the
+    recording cannot be read any further, the node ends with code 1.
 
     Parameters
     ----------
@@ -127,13 +128,21 @@ class Replay(Node):  # type: ignore[misc]
         while (left := self._begin + self._due - time.monotonic()) <= 0:
             self._send()
             self._sent += 1
-            following = next(self._messages, None)
+            following = self._next()
             if following is None:
                 self._finish()
                 return
             self._due, self._send = following
         self._timer.timer_period_ns = max(round(left * 1e9), _SHORTEST_WAIT_NS)
         self._timer.reset()
+
+    def _next(self) -> tuple[float, partial[None]] | None:
+        """Return the next message, None after the last."""
+        try:
+            return next(self._messages, None)
+        except FlexPlannerError as error:
+            raise CannotGoOnError(f'the replay ends after {self._sent} messages: {error}') \
+                from error
 
     def _finish(self) -> None:
         """End, once subscribers have got everything."""
@@ -161,7 +170,7 @@ def _profile(qos: QosProfile) -> QoSProfile:
 
 
 def replay(settings: ReplaySettings, args: list[str] | None = None) -> None:
-    """Publish a recording and end the process, with code 0 unless it cannot be read."""
+    """Publish a recording and end the process, with code 0 unless it cannot be read to its end."""
     run_node(lambda: Replay(settings), 'replay', args)
 
 

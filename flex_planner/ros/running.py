@@ -24,9 +24,16 @@ _LAST_RESORT = 3.0  # [s] after a signal
 _AFTER_ERROR = 0.01  # [s]; an error that comes again and again must not fill disk and processor
 
 
+class CannotGoOnError(FlexPlannerError):
+    """Raised by a callback that ends its node: what it is for can no longer be done."""
+
+
 def run_node(create: Callable[[], Node], name: str, args: list[str] | None) -> None:
     """
-    Run a node until SIGINT or SIGTERM, then exit with code 0; code 1 if it cannot start.
+    Run a node until SIGINT or SIGTERM, then exit with code 0.
+
+    The code is 1 if it cannot start, or a callback raises CannotGoOnError; the reason is logged.
+    Any other exception of a callback is logged, and the node goes on.
 
     Parameters
     ----------
@@ -86,7 +93,7 @@ def _spin_once(executor: SingleThreadedExecutor, name: str) -> None:
     """
     try:
         executor.spin_once(timeout_sec=_LONGEST_WAIT)
-    except ExternalShutdownException:
+    except (ExternalShutdownException, CannotGoOnError):
         raise
     except Exception as error:
         if not rclpy.ok():

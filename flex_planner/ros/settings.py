@@ -16,6 +16,8 @@ from flex_planner.validation import vector
 
 # of the largest payload [kg]
 MIN_ACCURACY, MAX_ACCURACY = 1e-6, 1e3
+# of a file of a recording [bytes]: a slip in the unit must not make a file of every message
+MIN_RECORDING_SIZE, MAX_RECORDING_SIZE = 2**16, 2**40
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,6 +77,9 @@ class PlannerSettings:
     recording_folder: str = described(
         '', 'Folder of the recordings; empty for $ROS_HOME/flex_planner.', read_only=True)
     record: bool = described(True, 'Whether to record every request with its outcome.')
+    max_recording_size: int = described(
+        0, 'Size from which on a recording continues in another file, at least 65536 [bytes]; 0: '
+        'recordings are never split.', lowest=0, highest=MAX_RECORDING_SIZE)
 
     def __post_init__(self) -> None:
         if self.elbow not in (-1, 1):
@@ -82,6 +87,9 @@ class PlannerSettings:
         vector('effort_weights', self.effort_weights, len(self.joint_names), above=0)
         if len(set(self.joint_names)) != len(self.joint_names) or '' in self.joint_names:
             raise InvalidValueError('joint_names', self.joint_names, 'different names')
+        if 0 < self.max_recording_size < MIN_RECORDING_SIZE:
+            raise InvalidValueError('max_recording_size', self.max_recording_size,
+                                    f'0 or at least {MIN_RECORDING_SIZE} bytes')
         self.solver()
         self.sampling()
 
