@@ -1,5 +1,5 @@
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint bench clean
+.PHONY: help setup demo paper test lint bench clean
 
 # The interpreter for .venv; a finished .venv stays as it is unless PYTHON is given.
 ifeq ($(origin PYTHON),undefined)
@@ -7,10 +7,11 @@ PYTHON := python3
 SETUP_FLAGS := --keep-python
 endif
 
-CODE := bench flex_planner launch test tools setup.py
+CODE := bench examples flex_planner launch test tools setup.py
 
 help:
 	@echo 'make demo     plan motions of a flexible arm through a ROS 2 node; results in output/'
+	@echo 'make paper    recompute Korayem et al. 2009 and write docs/paper.md (1 to 3 minutes)'
 	@echo 'make test     check the style and run all tests'
 	@echo 'make setup    only create .venv and build into install/'
 	@echo 'make lint     only check the style'
@@ -25,6 +26,9 @@ setup:
 
 demo: setup
 	@tools/run python -m flex_planner.demo
+
+paper: setup
+	@tools/run flex-planner paper --output docs
 
 test: lint
 	tools/run python -m pytest

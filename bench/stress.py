@@ -58,8 +58,8 @@ class Client:
 
     def wait(self, future: Future) -> Any:
         """Return a result, or raise TimeoutError."""
-        # spin_until_future_complete() leaves tasks behind while a goal runs, and after some hundred
-        # calls this client, not the node, takes tens of milliseconds
+        # spin_until_future_complete() leaves tasks behind while a goal runs, and after some
+        # hundred calls this client, not the node, takes tens of milliseconds
         end = time.monotonic() + PATIENCE
         while not future.done():
             if time.monotonic() > end:
@@ -136,7 +136,6 @@ def endure(client: Client, process: Any) -> float:
         sizes.append(memory(process.pid))
     print(f'{REQUESTS} requests answered in {time.monotonic() - began:.0f} s; codes: '
           f'{dict(sorted(codes.items()))}')
-    print([round(s, 1) for s in sizes[::50]])
     print(f'memory: {sizes[0]:.1f} MB after the first, {sizes[SETTLED - 1]:.1f} MB after '
           f'{SETTLED}, {sizes[-1]:.1f} MB at the end')
     return float(np.median(sizes[-20:]) - np.median(sizes[SETTLED - 10:SETTLED + 10]))

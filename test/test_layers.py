@@ -13,7 +13,7 @@ import pytest
 
 ROOT = Path(flex_planner.__file__).parent
 # beside the core, never imported by it
-BESIDE = {'arm_report', 'cli', 'comparison_report', 'demo', 'motion_report', 'plotting',
+BESIDE = {'arm_report', 'cli', 'comparison_report', 'demo', 'motion_report', 'paper', 'plotting',
           'recording', 'report', 'ros'}
 BLOCKED = ['rclpy', 'flex_planner_interfaces', 'matplotlib', 'mcap', 'mcap_ros2', 'rosbags',
            'geometry_msgs', 'sensor_msgs', 'trajectory_msgs', 'builtin_interfaces']

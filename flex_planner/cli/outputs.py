@@ -138,6 +138,4 @@ def _drawn(plan: Plan) -> Motion:
     """Return a solved plan as arrays, finer than a controller needs it."""
     from flex_planner.plotting import Motion
 
-    samples = plan.uniform_samples(_DRAWN_SAMPLES)
-    return Motion(times=samples.times, coordinates=samples.coordinates, rates=samples.rates,
-                  torques=samples.torques, tip=samples.tip)
+    return Motion.of(plan.uniform_samples(_DRAWN_SAMPLES))

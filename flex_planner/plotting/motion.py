@@ -8,6 +8,7 @@ from pathlib import Path
 
 from flex_planner.arm import Arm
 from flex_planner.kinematics import link_points
+from flex_planner.plan import Samples
 from flex_planner.plotting.figures import finish, save, say
 from flex_planner.validation import Array
 from matplotlib.axes import Axes
@@ -41,6 +42,12 @@ class Motion:
     rates: Array
     torques: Array
     tip: Array
+
+    @classmethod
+    def of(cls, samples: Samples) -> Motion:
+        """Return a sampled plan."""
+        return cls(times=samples.times, coordinates=samples.coordinates, rates=samples.rates,
+                   torques=samples.torques, tip=samples.tip)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

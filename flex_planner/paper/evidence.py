@@ -1,0 +1,127 @@
+"""What a section of the paper led to: tables, statements that were put to the test, pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+
+from flex_planner.validation import Array
+
+
+class Verdict(Enum):
+    """What became of a statement of the paper; the value is shown to people."""
+
+    CONFIRMED = 'confirmed'
+    CORRECTED = 'corrected'
+    NOT_REPRODUCIBLE = 'not reproducible'
+
+
+def confirmed_if(holds: bool) -> Verdict:
+    """Return what became of a statement that a number decides."""
+    return Verdict.CONFIRMED if holds else Verdict.CORRECTED
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Claim:
+    """
+    A statement of the paper, put to the test.
+
+    Attributes
+    ----------
+    said : str
+        What the paper says, in our words.
+    found : str
+        The number that it turned into, and the reason for the verdict.
+    verdict : Verdict
+        What became of it.
+
+    """
+
+    said: str
+    found: str
+    verdict: Verdict
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table:
+    """A table as text, cell by cell."""
+
+    title: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Curve:
+    """
+    A line of a diagram.
+
+    Attributes
+    ----------
+    x, y : numpy.ndarray, shape (k,)
+        Its points.
+    label : str
+        In the legend; empty for none.
+    color, style : str
+        As Matplotlib takes them.
+    width : float
+        Of the line [pt].
+
+    """
+
+    x: Array
+    y: Array
+    label: str = ''
+    color: str = 'C0'
+    style: str = '-'
+    width: float = 1.3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Panel:
+    """A diagram; `equal` gives both axes the same scale, `log` the vertical one decades."""
+
+    title: str
+    x_label: str
+    y_label: str
+    curves: tuple[Curve, ...]
+    equal: bool = False
+    log: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Picture:
+    """Diagrams in rows of `columns`, saved as NAME.png."""
+
+    name: str
+    caption: str
+    panels: tuple[Panel, ...]
+    columns: int = 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Section:
+    """
+    What a section of the paper led to.
+
+    Attributes
+    ----------
+    key, title : str
+        Such as ``5.2`` and ``Minimum effort and speed``.
+    text : str
+        What was computed, as Markdown.
+    tables, claims, pictures : tuple
+        Its contents.
+    values : dict of str to float
+        The numbers behind the text, by name, in SI units.
+
+    """
+
+    key: str
+    title: str
+    text: str
+    tables: Sequence[Table] = ()
+    claims: Sequence[Claim] = ()
+    pictures: Sequence[Picture] = ()
+    values: dict[str, float] = field(default_factory=dict)

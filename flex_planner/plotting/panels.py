@@ -1,0 +1,54 @@
+"""Pictures made of equal diagrams, such as those of a paper."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from flex_planner.paper.evidence import Panel, Picture
+from flex_planner.plotting.figures import save
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+import numpy as np
+
+_WIDTH, _HEIGHT, _LEGEND = 5.2, 3.7, 0.5
+
+
+def draw_picture(folder: Path, picture: Picture) -> Path:
+    """Write a picture as NAME.png and return its path."""
+    columns = min(picture.columns, len(picture.panels))
+    rows = -(-len(picture.panels) // columns)
+    figure = Figure(figsize=(_WIDTH * columns, _HEIGHT * rows + _LEGEND), layout='constrained')
+    axes = np.atleast_1d(figure.subplots(rows, columns)).ravel()
+    for panel, one in zip(picture.panels, axes, strict=False):
+        _draw(one, panel)
+    for empty in axes[len(picture.panels):]:
+        empty.set_axis_off()
+    _add_legends(figure, list(axes[:len(picture.panels)]), 2 * columns)
+    path = folder / f'{picture.name}.png'
+    save(figure, path)
+    return path
+
+
+def _draw(axes: Axes, panel: Panel) -> None:
+    """Draw a diagram."""
+    for curve in panel.curves:
+        axes.plot(curve.x, curve.y, curve.style, color=curve.color, linewidth=curve.width,
+                  label=curve.label or None, markersize=5)
+    if panel.log:
+        axes.set_yscale('log')
+    if panel.equal:
+        axes.set_aspect('equal', adjustable='datalim')
+    axes.set(title=panel.title, xlabel=panel.x_label, ylabel=panel.y_label)
+    axes.grid(alpha=0.3)
+
+
+def _add_legends(figure: Figure, axes: Sequence[Axes], columns: int) -> None:
+    """Say what the lines are: once below where all diagrams have the same, else in each."""
+    handles, labels = axes[0].get_legend_handles_labels()
+    if all(one.get_legend_handles_labels()[1] == labels for one in axes):
+        figure.legend(handles, labels, loc='outside lower center', ncols=columns,
+                      fontsize='small')
+    else:
+        for one in axes:
+            one.legend(fontsize='small')
