@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import math
 import os
 from pathlib import Path
+import re
 import sys
 from typing import Any
 
@@ -68,13 +69,13 @@ def preset_files() -> dict[str, Path]:
     return {path.stem: path for path in reversed(files)}
 
 
-def load_arm(name: str) -> Arm:
+def load_arm(name: str | os.PathLike[str]) -> Arm:
     """
     Return the arm described by a preset or a file.
 
     Parameters
     ----------
-    name : str
+    name : str or path
         Name of a preset in ``config/arms``, or path of a YAML file.
 
     Raises
@@ -83,7 +84,7 @@ def load_arm(name: str) -> Arm:
         If the file is missing, is no YAML, or a field is unknown, missing or out of bounds.
 
     """
-    path = find_arm_file(name)
+    path = find_arm_file(os.fspath(name))
     try:
         if path.stat().st_size > _MAX_BYTES:
             raise ArmFileError(f'{path}: the file is larger than {_MAX_BYTES} bytes')
@@ -127,6 +128,12 @@ class _StrictLoader(yaml.SafeLoader):
                 raise yaml.constructor.ConstructorError(
                     None, None, f'field {key_node.value!r} is given twice', key_node.start_mark)
         return super().construct_mapping(node, deep)
+
+
+# YAML 1.1, which PyYAML reads, takes 7e10 and 7.0e10 for text
+_StrictLoader.add_implicit_resolver(
+    'tag:yaml.org,2002:float', re.compile(r'[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+$'),
+    list('-+.0123456789'))
 
 
 class _Section:

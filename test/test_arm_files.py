@@ -318,3 +318,12 @@ def test_source_tree_comes_before_installations(tmp_path: Path,
     Path(write(folder, COMPLETE)).rename(folder / 'korayem_rigid.yaml')
     monkeypatch.setenv('AMENT_PREFIX_PATH', str(tmp_path))
     assert load_arm('korayem_rigid').name == own
+
+
+@pytest.mark.parametrize('text', ['50', '50.0', '5e1', '5.0e1', '5.E+1', '+.5e2', '5.0E1'])
+def test_numbers_may_have_any_usual_form(tmp_path: Path, text: str) -> None:
+    preset = preset_files()['korayem_ei50'].read_text()
+    assert 'flexural_rigidity: 50.0' in preset
+    path = tmp_path / 'arm.yaml'
+    path.write_text(preset.replace('flexural_rigidity: 50.0', f'flexural_rigidity: {text}'))
+    assert load_arm(path).flexural_rigidities().tolist() == [50.0, 50.0]

@@ -8,6 +8,7 @@ milliseconds on long meshes, and every other thread of the process stands still 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import ctypes
 
 import numpy as np
@@ -17,7 +18,7 @@ from scipy.linalg import cython_lapack
 Array = NDArray[np.float64]
 
 
-def _routine(name: str, arguments: int) -> ctypes._CFuncPtr:
+def _routine(name: str, arguments: int) -> Callable[..., None]:
     """Return a LAPACK routine that SciPy exports; all its arguments are pointers."""
     capsule = cython_lapack.__pyx_capi__[name]
     api = ctypes.pythonapi

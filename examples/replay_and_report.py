@@ -1,0 +1,69 @@
+"""
+Record a plan, read the recording back, check it again from the recording alone, report.
+
+A recording is what the planner node leaves of every request: rosbag2-compatible MCAP with the
+request, its outcome, the trajectories, and the arm. Whoever has it can rebuild arm and motion
+without the planner. Making it takes ROS 2, reading it does not.
+
+    tools/run python examples/replay_and_report.py
+
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+import sys
+
+from flex_planner.arm_files import load_arm
+from flex_planner.cli.recording import RequestRecorder
+from flex_planner.cli.request import Request
+from flex_planner.path import plan_path
+from flex_planner.recording import definition_folder, MessageTypes, read_recording
+from flex_planner.reference import sample_reference
+from flex_planner.report import check_motion, RecordedRequest, verdict, write_report
+from flex_planner.task import postures_from_points, Task
+import numpy as np
+
+FOLDER = Path('output')
+
+
+def recorded() -> Path:
+    """Plan a motion, record it as the node would, and return the folder."""
+    arm, points = load_arm('korayem_ei50'), (np.array([0.5, 0.0]), np.array([0.5, 0.5]))
+    start, goal = postures_from_points(arm, *points, elbow=-1)
+    task = Task(arm=arm, start_positions=start, goal_positions=goal, duration=1.0,
+                payload_mass=1.0, effort_weights=np.full(2, 1 / 8))
+    request = Request(task=task, points=points, elbow=-1, time_limit=30.0)
+    plan = plan_path(task)
+    if not plan.solved:
+        sys.exit(plan.message)
+    recorder = RequestRecorder(request, FOLDER / 'recordings')
+    return recorder.record_plan(plan, sample_reference(plan, request.sampling))
+
+
+def main() -> None:
+    """Record, read, check, report."""
+    path = recorded()
+    print(f'recording: {path}')
+
+    # as messages, in the order of their times; any rosbag2 tool reads them as well
+    types = MessageTypes.load([definition_folder('flex_planner_interfaces')])
+    counts = Counter(entry.topic.name for entry in read_recording(path, types))
+    print('\n'.join(f'  {count:5d} {topic}' for topic, count in counts.items()))
+
+    # as arm, parameters and arrays, and once more through the dynamics: here the torques are
+    # interpolated between the samples, as a controller does it
+    request = RecordedRequest.read(path)
+    check = check_motion(request)
+    for finding in check.findings:
+        print(f'{finding.name}: {finding}')
+
+    page = FOLDER / 'replay_and_report.html'
+    write_report(page, request, check)
+    print(f'{verdict(request, check)}\nreport: {page}, to be opened in any browser\n'
+          f'tools/run flex-planner replay {path} publishes it again')
+
+
+if __name__ == '__main__':
+    main()
