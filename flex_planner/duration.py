@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain
 
 from flex_planner.collocation import CollocationSolution, Settings, solve
 from flex_planner.errors import InvalidTaskError
@@ -18,6 +19,7 @@ from flex_planner.ladder import LADDER, planned, STATUSES, STOPPED
 from flex_planner.limit_search import collected, is_near, plan_near, width
 from flex_planner.model import ArmModel
 from flex_planner.motion import MotionProblem, task_parameters
+from flex_planner.neighbours import foreseen
 from flex_planner.payload import find_max_payload, MaxPayload
 from flex_planner.plan import Plan, PlanStatus
 from flex_planner.progress import Monitor, StoppedError
@@ -32,6 +34,9 @@ _MIN_ACCURACY, _MAX_ACCURACY = 1e-7, 100.0
 _EXACTNESS = 10.0
 # durations tried to start from, in units of the one of the task
 _LONGER = (1.0, 3.0, 12.0)
+# share of the duration that the room of a start should be
+_MIDDLE = 0.01
+_MOST_RATIO = 100.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -78,10 +83,17 @@ class MinDuration:
         """Return whether the shortest duration is known to the accuracy asked for."""
         return self.status is PlanStatus.SOLVED
 
+    @property
+    def middle(self) -> Stop | None:
+        """Return the last motion that leaves some room: a start for searches of its kind."""
+        roomy = [stop for stop in self.stops if stop.room >= _MIDDLE * stop.value]
+        return roomy[-1] if roomy else next(iter(self.stops), None)
+
 
 def find_min_duration(task: Task, *, model: ArmModel | None = None,
                       settings: Settings | None = None, monitor: Monitor | None = None,
-                      accuracy: float = 1e-4) -> MinDuration:
+                      accuracy: float = 1e-4, start_from: MinDuration | None = None,
+                      before: MinDuration | None = None, ratio: float = 1.0) -> MinDuration:
     """
     Find the shortest duration in which the arm can make a motion with the payload of the task.
 
@@ -94,6 +106,12 @@ def find_min_duration(task: Task, *, model: ArmModel | None = None,
     accuracy : float
         Largest width of the bracket, 1e-7 to 100, but not less than a millionth of the duration
         [s].
+    start_from : MinDuration, optional
+        A search of a similar task, tried first.
+    before : MinDuration, optional
+        The one before `start_from` on a line of tasks, see `find_max_payload`.
+    ratio : float
+        Of the step from `start_from` to this task to the step before, within +-100.
 
     Returns
     -------
@@ -109,28 +127,32 @@ def find_min_duration(task: Task, *, model: ArmModel | None = None,
 
     """
     number('accuracy', accuracy, at_least=_MIN_ACCURACY, at_most=_MAX_ACCURACY, unit='s')
+    number('ratio', ratio, at_least=-_MOST_RATIO, at_most=_MOST_RATIO)
     if not np.isfinite([joint.motor.stall_torque for joint in task.arm.joints]).all():
         raise InvalidTaskError('a motor of the arm has no stall torque, so no duration is the '
                                'shortest')
     if not task.ends_at_rest:
         raise InvalidTaskError('the shortest duration is that of a motion which ends at rest')
     monitor = monitor or Monitor()
-    before = monitor.iteration, monitor.elapsed
+    began = monitor.iteration, monitor.elapsed
     fixed = replace(task, time_weight=0.0)
     problem = MotionProblem(model or ArmModel(task.arm), fixed, task_parameters(fixed))
     try:
-        found = _found(task, problem, settings or Settings(), monitor, accuracy)
+        found = _found(task, problem, settings or Settings(), monitor, accuracy, start_from,
+                       before, ratio)
     except StoppedError as stop:
         found = MinDuration(task=task, status=STATUSES[stop.reason], message=str(stop))
-    return replace(found, iterations=monitor.iteration - before[0],
-                   planning_time=monitor.elapsed - before[1])
+    return replace(found, iterations=monitor.iteration - began[0],
+                   planning_time=monitor.elapsed - began[1])
 
 
 def _found(task: Task, problem: MotionProblem, settings: Settings, monitor: Monitor,
-           accuracy: float) -> MinDuration:
+           accuracy: float, start: MinDuration | None, before: MinDuration | None,
+           ratio: float) -> MinDuration:
     """Follow the price of time to the limit, then plan there."""
     monitor.phase = 'duration at a rising price'
-    stops = _stops(problem, settings, monitor, accuracy)
+    stops = (_foreseen_stops(problem, settings, monitor, accuracy, start, before, ratio)
+             or _stops(problem, settings, monitor, accuracy, start.middle if start else None))
     last = stops[-1]
     if last.stopped:
         return MinDuration(task=task, status=STOPPED[last.result.status],
@@ -142,7 +164,7 @@ def _found(task: Task, problem: MotionProblem, settings: Settings, monitor: Moni
         stops = _stops_from(first.problem, first.solution, settings, monitor, accuracy)
         last = stops[-1]
     plan = plan_near(changed(problem, duration=last.value), last.result.solution, settings,
-                     monitor)
+                     monitor, last)
     lower = max(0.0, last.value - last.room)
     found = MinDuration(task=task, status=plan.status, message=plan.message, plan=plan,
                         duration=last.value if plan.solved else np.inf, lower=lower,
@@ -166,13 +188,31 @@ def _stops_from(problem: MotionProblem, solution: CollocationSolution, settings:
     return [stop, *(each for each in collected(family, accuracy) if each.result.converged)]
 
 
-def _stops(problem: MotionProblem, settings: Settings, monitor: Monitor,
-           accuracy: float) -> list[Stop]:
+def _foreseen_stops(problem: MotionProblem, settings: Settings, monitor: Monitor, accuracy: float,
+                    start: MinDuration | None, before: MinDuration | None,
+                    ratio: float) -> list[Stop]:
+    """Return the motions from the one that two searches lead to; none without success."""
+    if start is None or before is None or not (start.stops and before.stops):
+        return []
+    way, bare = on_the_way(settings, _EXACTNESS * accuracy), without_weights(problem)
+    slow = changed(bare, duration=MAX_DURATION)
+    first = foreseen(slow, before.stops[-1], start.stops[-1], ratio, settings, monitor,
+                     payload=False)
+    if first is None:
+        return []
+    further = () if first.stopped else durations(
+        first.problem, first.result, way, monitor, lambda duration: width(accuracy, duration))
+    stops = collected(chain([first], further), accuracy)
+    return stops if stops[-1].stopped or is_near(stops, accuracy) else []
+
+
+def _stops(problem: MotionProblem, settings: Settings, monitor: Monitor, accuracy: float,
+           start: Stop | None) -> list[Stop]:
     """Return the motions on the way to the shortest duration."""
     way, bare = on_the_way(settings, _EXACTNESS * accuracy), without_weights(problem)
     for factor in _LONGER:
         slow = changed(bare, duration=min(factor * problem.task.duration, MAX_DURATION))
-        stops = collected(quickest(slow, way, monitor,
+        stops = collected(quickest(slow, way, monitor, start=start,
                                    enough=lambda duration: width(accuracy, duration)), accuracy)
         if stops[0].result.converged or stops[0].stopped:
             break
@@ -211,9 +251,20 @@ def payload_against_duration(task: Task, durations: ArrayLike, *, model: ArmMode
 
 def _against_duration(tasks: list[Task], model: ArmModel, settings: Settings | None,
                       monitor: Monitor, accuracy: float) -> Iterator[MaxPayload]:
-    before: MaxPayload | None = None
+    near: MaxPayload | None = None
+    far: MaxPayload | None = None
     for task in tasks:
         found = find_max_payload(task, model=model, settings=settings, monitor=monitor,
-                                 accuracy=accuracy, start_from=before)
+                                 accuracy=accuracy, start_from=near, before=far,
+                                 ratio=_step_ratio(far, near, task))
         yield found
-        before = found if found.solved else before
+        if found.solved:
+            near, far = found, near
+
+
+def _step_ratio(far: MaxPayload | None, near: MaxPayload | None, task: Task) -> float:
+    """Return the step in duration to a task over the step before it."""
+    if far is None or near is None or near.task.duration == far.task.duration:
+        return 1.0
+    ratio = (task.duration - near.task.duration) / (near.task.duration - far.task.duration)
+    return float(np.clip(ratio, -_MOST_RATIO, _MOST_RATIO))

@@ -214,7 +214,8 @@ def worth(problem: MotionProblem, guess: CollocationSolution, price: float, sett
         return Stop(value=payload, price=price, result=found, problem=problem)
     if not found.converged or payload < 0:
         return None
-    return Stop(value=payload, price=price, result=replace(found, solution=inner),
+    return Stop(value=payload, price=price,
+                result=replace(found, solution=inner, errors=found.errors[:problem.size]),
                 problem=ahead.with_payload(payload))
 
 
@@ -244,7 +245,9 @@ def worth_time(problem: MotionProblem, guess: CollocationSolution, price: float,
     if not found.converged or not duration > 0:
         return None
     return Stop(value=duration, price=price, problem=ahead.fixed(duration),
-                result=replace(found, solution=ahead.restricted(found.solution)))
+                result=replace(found, solution=ahead.restricted(found.solution),
+                               errors=found.errors[:problem.size],
+                               switches=found.switches * duration))
 
 
 def longer_durations(problem: MotionProblem, first: CollocationResult, settings: Settings,

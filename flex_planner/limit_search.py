@@ -11,7 +11,7 @@ from flex_planner.limits import steady
 from flex_planner.motion import MotionProblem
 from flex_planner.plan import Plan
 from flex_planner.progress import Monitor
-from flex_planner.strategies import Attempt, QUICK, Strategy, weights_raised
+from flex_planner.strategies import Attempt, has_weights, QUICK, Strategy, weights_raised
 import numpy as np
 
 _MOST_STOPS = 100
@@ -45,10 +45,20 @@ def width(accuracy: float, value: float) -> float:
 
 
 def plan_near(problem: MotionProblem, start: CollocationSolution, settings: Settings,
-              monitor: Monitor) -> Plan:
-    """Return the plan of a problem from a motion of least effort that is nearly its own."""
+              monitor: Monitor, stop: Stop | None = None) -> Plan:
+    """Return the plan of a problem from a motion nearly its own; that of a stop may be it."""
     def found(problem: MotionProblem, settings: Settings, monitor: Monitor) -> Attempt:
+        if stop is not None and _is_solution(stop, problem, settings):
+            return Attempt(result=stop.result)
         return Attempt(result=weights_raised(problem, start, settings, monitor))
 
     rungs: tuple[tuple[str, Strategy], ...] = (('limit found', found), *QUICK)
     return planned(problem, rungs, settings, monitor)
+
+
+def _is_solution(stop: Stop, problem: MotionProblem, settings: Settings) -> bool:
+    """Return whether a stop is the solution of a problem, as exact as it has to be."""
+    one, other = stop.problem.task, problem.task
+    return (not has_weights(problem) and one.payload_mass == other.payload_mass
+            and one.duration == other.duration and stop.result.converged
+            and float(stop.result.errors.max()) <= settings.error_tolerance)

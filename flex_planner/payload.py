@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from itertools import chain
 
 from flex_planner.certify import totals
 from flex_planner.collocation import CollocationSolution, Settings, solve
@@ -23,6 +24,7 @@ from flex_planner.ladder import LADDER, planned, STATUSES, STOPPED
 from flex_planner.limit_search import collected, is_near, plan_near, width
 from flex_planner.model import ArmModel
 from flex_planner.motion import holding_limit, MotionProblem, task_parameters
+from flex_planner.neighbours import foreseen
 from flex_planner.plan import Plan, PlanStatus
 from flex_planner.progress import Monitor, StoppedError
 from flex_planner.strategies import without_weights
@@ -38,6 +40,7 @@ _HELD = 1 - 1e-9
 _EXACTNESS = 10.0
 # share of the payload that the room of a start should be
 _MIDDLE = 0.01
+_MOST_RATIO = 100.0
 
 
 class PayloadMethod(Enum):
@@ -140,8 +143,8 @@ class MaxPayload:
 def find_max_payload(task: Task, *, model: ArmModel | None = None,
                      settings: Settings | None = None, monitor: Monitor | None = None,
                      method: PayloadMethod = PayloadMethod.DIRECT, accuracy: float = 1e-3,
-                     step: float | None = None,
-                     start_from: MaxPayload | None = None) -> MaxPayload:
+                     step: float | None = None, start_from: MaxPayload | None = None,
+                     before: MaxPayload | None = None, ratio: float = 1.0) -> MaxPayload:
     """
     Find the largest payload that the arm can carry from start to goal in the task's duration.
 
@@ -165,6 +168,11 @@ def find_max_payload(task: Task, *, model: ArmModel | None = None,
         [kg].
     start_from : MaxPayload, optional
         A search of a similar task by the direct method, tried first.
+    before : MaxPayload, optional
+        The one before `start_from` on a line of tasks: the motion is continued along that line,
+        which takes a fraction of the time where motors switch alike.
+    ratio : float
+        Of the step from `start_from` to this task to the step before, within +-100.
 
     Returns
     -------
@@ -183,20 +191,21 @@ def find_max_payload(task: Task, *, model: ArmModel | None = None,
     number('accuracy', accuracy, at_least=_MIN_ACCURACY, at_most=_MAX_ACCURACY, unit='kg')
     step = max(_STEP, accuracy) if step is None else step
     number('step', step, at_least=accuracy, at_most=MAX_PAYLOAD, unit='kg')
+    number('ratio', ratio, at_least=-_MOST_RATIO, at_most=_MOST_RATIO)
     _check(task)
     monitor = monitor or Monitor()
-    before = monitor.iteration, monitor.elapsed
+    began = monitor.iteration, monitor.elapsed
     search = _Search(MotionProblem(model or ArmModel(task.arm), task, task_parameters(task)),
                      settings or Settings(), monitor, accuracy)
     try:
         if method is PayloadMethod.DIRECT:
-            found = search.direct(start_from.middle if start_from else None)
+            found = search.direct(start_from, before, ratio)
         else:
             found = search.incremental(step)
     except StoppedError as stop:
         found = search.failed(method, STATUSES[stop.reason], str(stop))
-    return replace(found, iterations=monitor.iteration - before[0],
-                   planning_time=monitor.elapsed - before[1])
+    return replace(found, iterations=monitor.iteration - began[0],
+                   planning_time=monitor.elapsed - began[1])
 
 
 def _check(task: Task) -> None:
@@ -229,17 +238,19 @@ class _Search:
                           front=_front(self._stops), stops=_priced(self._stops),
                           trials=tuple(trials))
 
-    def direct(self, start: Stop | None) -> MaxPayload:
+    def direct(self, start: MaxPayload | None, before: MaxPayload | None,
+               ratio: float) -> MaxPayload:
         """Follow the price to the limit, then plan there."""
-        failure = self._follow_price(start)
-        if failure is not None:
-            return failure
+        if not self._foresee(start, before, ratio):
+            failure = self._follow_price(start.middle if start else None)
+            if failure is not None:
+                return failure
         last = self._stops[-1]
         if last.stopped:
             return self.failed(PayloadMethod.DIRECT, STOPPED[last.result.status],
                                last.result.message)
         near = is_near(self._stops, self._accuracy)
-        plan = self._plan(last.value, last.result.solution)
+        plan = self._plan(last.value, last.result.solution, last)
         found = MaxPayload(task=self._problem.task, method=PayloadMethod.DIRECT,
                            status=plan.status, message=plan.message,
                            front=_front(self._stops), stops=_priced(self._stops),
@@ -252,6 +263,23 @@ class _Search:
             return replace(found, status=PlanStatus.NOT_CONVERGED, message=(
                 f'{found.payload:.6g} kg can be carried, but it was not shown that no more can'))
         return _described(found)
+
+    def _foresee(self, start: MaxPayload | None, before: MaxPayload | None,
+                 ratio: float) -> bool:
+        """Collect the stop that two searches lead to, and further ones; False without success."""
+        if start is None or before is None or not (start.stops and before.stops):
+            return False
+        bare, monitor = without_weights(self._problem), self._monitor
+        monitor.phase = 'payload at a rising price'
+        first = foreseen(bare, before.stops[-1], start.stops[-1], ratio, self._settings, monitor,
+                         payload=True)
+        if first is None:
+            return False
+        way = on_the_way(self._settings, _EXACTNESS * self._accuracy)
+        further = () if first.stopped else payloads(first.problem, first.result, way, monitor,
+                                                    self._enough)
+        self._stops = collected(chain([first], further), self._accuracy)
+        return self._stops[-1].stopped or is_near(self._stops, self._accuracy)
 
     def _follow_price(self, start: Stop | None) -> MaxPayload | None:
         """Collect stops up to the limit; return the failure if there is no first motion."""
@@ -289,10 +317,10 @@ class _Search:
         return replace(found, status=plan.status, payload=limit * _HELD, upper=limit, plan=plan,
                        held=True, limiting_joint=joint)
 
-    def _plan(self, payload: float, start: CollocationSolution) -> Plan:
+    def _plan(self, payload: float, start: CollocationSolution, stop: Stop | None = None) -> Plan:
         """Return the plan with a payload, from the motion of one like it."""
         return plan_near(changed(self._problem, payload_mass=payload), start, self._settings,
-                         self._monitor)
+                         self._monitor, stop)
 
     def incremental(self, step: float) -> MaxPayload:
         """Raise the payload of the task step by step."""
