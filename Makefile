@@ -31,7 +31,8 @@ paper: setup
 	@tools/run flex-planner paper --output docs
 
 test: lint
-	tools/run python -m pytest
+	tools/run python -m pytest -n auto --dist loadfile -m 'not alone'
+	tools/run python -m pytest -m alone
 
 lint: setup
 	tools/run ruff check

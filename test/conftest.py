@@ -32,6 +32,17 @@ TaskFactory = Callable[..., Task]
 PlanFactory = Callable[..., Plan]
 
 
+# nodes, simulators and clusters have processes of their own, and some of them are timed
+ALONE = ('test_demo', 'test_examples', 'test_map_execution', 'test_node', 'test_simulator')
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the tests that do not run beside others."""
+    for item in items:
+        if item.path.name.startswith(ALONE):
+            item.add_marker(pytest.mark.alone)
+
+
 @pytest.fixture(scope='session')
 def rigid_arm() -> Arm:
     return load_arm('korayem_rigid')

@@ -78,8 +78,8 @@ def _finished(keys: Sequence[str], reduced: bool, processes: int,
     order = sorted(keys, key=lambda key: key not in _LONGEST)
     context = multiprocessing.get_context('spawn')
     with _one_thread_each(), ProcessPoolExecutor(processes, context) as pool:
-        jobs = {pool.submit(_one, key, reduced, pictures): key for key in order}
         try:
+            jobs = {pool.submit(_one, key, reduced, pictures): key for key in order}
             for job in as_completed(jobs):
                 yield jobs[job], job.result()
         except BaseException:
