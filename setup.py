@@ -20,6 +20,7 @@ setup(
         (f'share/{package_name}', ['package.xml']),
         (f'share/{package_name}/config', glob('config/*.yaml')),
         (f'share/{package_name}/config/arms', glob('config/arms/*.yaml')),
+        (f'share/{package_name}/config/studies', glob('config/studies/*.yaml')),
         (f'share/{package_name}/launch', glob('launch/*.py')),
     ],
     install_requires=[
@@ -32,7 +33,10 @@ setup(
         'scipy>=1.11',
         'zstandard>=0.22',
     ],
-    extras_require={'test': ['autograd', 'hypothesis', 'mcap-ros2-support', 'mpmath', 'pytest',
+    # for flex-planner map
+    extras_require={'maps': ['dask>=2024.1', 'distributed>=2024.1', 'xarray>=2024.1',
+                             'zarr>=2.16'],
+                    'test': ['autograd', 'hypothesis', 'mcap-ros2-support', 'mpmath', 'pytest',
                              'pytest-timeout']},
     zip_safe=False,
     entry_points={

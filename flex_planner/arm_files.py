@@ -1,27 +1,17 @@
-"""
-Arm files: YAML in physical quantities, read strictly.
-
-An unknown key is an error, so that a misspelt quantity is never silently left out. The presets
-lie in ``config/arms``.
-
-"""
+"""Arm files: YAML in physical quantities, read strictly; the presets lie in ``config/arms``."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping
 import math
 import os
 from pathlib import Path
-import re
 import sys
-from typing import Any
 
 from flex_planner.arm import Arm, Joint, Link, Motor, Node
 from flex_planner.errors import FlexPlannerError, InvalidValueError
-from flex_planner.validation import number
-import yaml
+from flex_planner.yaml_files import read_yaml, Section, YamlFileError
 
-_MAX_BYTES = 1_000_000
 _UNITS = {'length': 'm', 'mass': 'kg', 'linear_density': 'kg/m', 'density': 'kg/m^3',
           'flexural_rigidity': 'N m^2', 'youngs_modulus': 'N/m^2', 'width': 'm',
           'thickness': 'm', 'second_moment_of_area': 'm^4', 'shape_mass': 'kg',
@@ -86,20 +76,23 @@ def load_arm(name: str | os.PathLike[str]) -> Arm:
     """
     path = find_arm_file(os.fspath(name))
     try:
-        if path.stat().st_size > _MAX_BYTES:
-            raise ArmFileError(f'{path}: the file is larger than {_MAX_BYTES} bytes')
-        content = yaml.load(path.read_text(encoding='utf-8'), _StrictLoader)
-    except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
-        raise ArmFileError(f'{path}: cannot be read: {error}') from None
-    try:
-        return arm_from_mapping(content)
+        return arm_from_mapping(read_yaml(path)[1])
+    except YamlFileError as error:
+        raise ArmFileError(str(error)) from None
     except InvalidValueError as error:
         raise ArmFileError(f'{path}: {error}') from error
 
 
-def arm_from_mapping(content: object) -> Arm:
+def arm_from_mapping(content: object, path: str = '') -> Arm:
     """
     Return the arm described by the content of an arm file.
+
+    Parameters
+    ----------
+    content : object
+        As YAML has it.
+    path : str
+        Where it stands in another file, for messages.
 
     Raises
     ------
@@ -107,7 +100,7 @@ def arm_from_mapping(content: object) -> Arm:
         Naming the field by its path in the file, e.g. ``links[1].length``.
 
     """
-    top = _Section('', content)
+    top = Section(path, content)
     arm: Arm = top.build(
         Arm, name=top.text('name'), source=top.text('source', ''),
         links=tuple(_link(section) for section in top.sections('links')),
@@ -117,83 +110,8 @@ def arm_from_mapping(content: object) -> Arm:
     return arm
 
 
-class _StrictLoader(yaml.SafeLoader):
-    """YAML in which a key may be given once only."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        """Return a mapping; PyYAML itself would keep the last of equal keys silently."""
-        keys = [key.value for key, _ in node.value]
-        for key_node, _ in node.value:
-            if keys.count(key_node.value) > 1:
-                raise yaml.constructor.ConstructorError(
-                    None, None, f'field {key_node.value!r} is given twice', key_node.start_mark)
-        return super().construct_mapping(node, deep)
-
-
-# YAML 1.1, which PyYAML reads, takes 7e10 and 7.0e10 for text
-_StrictLoader.add_implicit_resolver(
-    'tag:yaml.org,2002:float', re.compile(r'[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+$'),
-    list('-+.0123456789'))
-
-
-class _Section:
-    """A mapping of an arm file that knows its path and which keys were read."""
-
-    def __init__(self, path: str, content: object) -> None:
-        if not isinstance(content, Mapping):
-            raise InvalidValueError(path or 'the file', content, 'a mapping of fields')
-        self.path = path
-        self._left: dict[Any, Any] = dict(content)
-
-    def name(self, key: str) -> str:
-        """Return the path of a field."""
-        return f'{self.path}.{key}' if self.path else key
-
-    def has(self, key: str) -> bool:
-        """Return whether a field is given."""
-        return key in self._left
-
-    def take(self, key: str, default: Any = None) -> Any:
-        """Return a field; without a default it must be there."""
-        if key not in self._left and default is None:
-            raise InvalidValueError(self.name(key), None, 'given')
-        return self._left.pop(key, default)
-
-    def number(self, key: str, *, above: float = -math.inf) -> float:
-        """Return a number, checked here because others are computed from it."""
-        return number(self.name(key), self.take(key), above=above, unit=_UNITS[key])
-
-    def text(self, key: str, default: str | None = None) -> str:
-        """Return a text field."""
-        value = self.take(key, default)
-        if not isinstance(value, str):
-            raise InvalidValueError(self.name(key), value, 'text')
-        return value
-
-    def sections(self, key: str, optional: bool = False) -> Iterator[_Section]:
-        """Return the entries of a list of mappings."""
-        entries = self.take(key, () if optional else None)
-        if not isinstance(entries, Sequence) or isinstance(entries, str):
-            raise InvalidValueError(self.name(key), entries, 'a list')
-        return (_Section(f'{self.name(key)}[{i}]', entry) for i, entry in enumerate(entries))
-
-    def finish(self) -> None:
-        """Refuse fields that nobody read."""
-        for key in self._left:
-            raise InvalidValueError(self.name(str(key)), self._left[key],
-                                    'left out: there is no such field')
-
-    def build(self, kind: Any, **values: Any) -> Any:
-        """Construct a part; its errors name the field by its path."""
-        self.finish()
-        try:
-            return kind(**values)
-        except InvalidValueError as error:
-            raise type(error)(self.name(error.field), error.value, error.bound) from None
-
-
-def _link(section: _Section) -> Link:
-    length = section.number('length', above=0)
+def _link(section: Section) -> Link:
+    length = _number(section, 'length')
     area, second_moment = _cross_section(section)
     density = _one_of(section, {
         'linear_density': lambda value: value, 'mass': lambda value: value / length,
@@ -205,43 +123,48 @@ def _link(section: _Section) -> Link:
             'flexural_rigidity': lambda value: value,
             'youngs_modulus': lambda value: value * second_moment})
     family = section.take('mode_family', 'pinned_pinned')
-    shape = {name: section.number(name) for name in ('shape_mass', 'shape_inertia')
-             if family == 'clamped_mass'}
+    shape = {name: _number(section, name, above=-math.inf)
+             for name in ('shape_mass', 'shape_inertia') if family == 'clamped_mass'}
     link: Link = section.build(
         Link, length=length, linear_density=density, modes=modes, flexural_rigidity=rigidity,
         mode_family=family, damping_ratio=section.take('damping_ratio', 0.0), **shape)
     return link
 
 
-def _cross_section(section: _Section) -> tuple[float, float]:
+def _number(section: Section, key: str, above: float = 0.0) -> float:
+    """Return a quantity in its unit."""
+    return section.number(key, above=above, unit=_UNITS[key])
+
+
+def _cross_section(section: Section) -> tuple[float, float]:
     """Return area [m^2] and second moment [m^4] of the section; NaN where they are not given."""
     if section.has('section'):
-        part = _Section(section.name('section'), section.take('section'))
-        width, thickness = part.number('width', above=0), part.number('thickness', above=0)
+        part = section.section('section')
+        width, thickness = _number(part, 'width'), _number(part, 'thickness')
         part.finish()
         return width * thickness, width * thickness**3 / 12
     if section.has('second_moment_of_area'):
-        return math.nan, section.number('second_moment_of_area', above=0)
+        return math.nan, _number(section, 'second_moment_of_area')
     return math.nan, math.nan
 
 
-def _one_of(section: _Section, ways: Mapping[str, Callable[[float], float]]) -> float:
+def _one_of(section: Section, ways: Mapping[str, Callable[[float], float]]) -> float:
     """Return a quantity that may be given in several ways, but has to be given in one."""
     given = [name for name in ways if section.has(name)]
     if len(given) != 1:
         raise InvalidValueError(section.name(' or '.join(ways)),
                                 ' and '.join(given) or None, 'given, one of them')
-    result = ways[given[0]](section.number(given[0], above=0))
+    result = ways[given[0]](_number(section, given[0]))
     if math.isnan(result):
         needs = 'section' if given[0] == 'density' else 'section or second_moment_of_area'
         raise InvalidValueError(section.name(needs), None, f'given with {given[0]}')
     return result
 
 
-def _joint(section: _Section) -> Joint:
+def _joint(section: Section) -> Joint:
     motor = Motor()
     if section.has('motor'):
-        part = _Section(section.name('motor'), section.take('motor'))
+        part = section.section('motor')
         motor = part.build(Motor, stall_torque=part.take('stall_torque'),
                            no_load_speed=part.take('no_load_speed', math.inf))
     joint: Joint = section.build(
@@ -251,7 +174,7 @@ def _joint(section: _Section) -> Joint:
     return joint
 
 
-def _node(section: _Section) -> Node:
+def _node(section: Section) -> Node:
     node: Node = section.build(Node, mass=section.take('mass', 0.0),
                                inertia=section.take('inertia', 0.0))
     return node

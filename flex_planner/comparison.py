@@ -132,7 +132,7 @@ def compare(task: Task, *, model: ArmModel | None = None, mismatch: Mismatch | N
 
 def _outcomes(flexible: Plan, rigid: Plan, setting: Setting) -> tuple[Outcome, ...]:
     """Carry out every way whose plan is solved."""
-    references = {plan is rigid: _sampled(plan, setting.monitor)
+    references = {plan is rigid: finely_sampled(plan, setting.monitor)
                   for plan in (flexible, rigid) if plan.solved}
     plans = {False: flexible, True: rigid}
     found = []
@@ -143,7 +143,7 @@ def _outcomes(flexible: Plan, rigid: Plan, setting: Setting) -> tuple[Outcome, .
     return tuple(found)
 
 
-def _sampled(plan: Plan, monitor: Monitor) -> Reference:
+def finely_sampled(plan: Plan, monitor: Monitor) -> Reference:
     """Return samples as close as they may be."""
     step = max(_STEP, plan.task.duration / (MAX_SAMPLES - 1))
     settings = SamplingSettings(longest_step=step, torque_tolerance=_TORQUE_TOLERANCE)

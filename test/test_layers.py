@@ -13,8 +13,8 @@ import pytest
 
 ROOT = Path(flex_planner.__file__).parent
 # beside the core, never imported by it
-BESIDE = {'arm_report', 'cli', 'comparison_report', 'demo', 'motion_report', 'paper', 'plotting',
-          'recording', 'report', 'ros'}
+BESIDE = {'arm_report', 'cli', 'comparison_report', 'demo', 'maps', 'motion_report', 'paper',
+          'plotting', 'recording', 'report', 'ros'}
 BLOCKED = ['rclpy', 'flex_planner_interfaces', 'matplotlib', 'mcap', 'mcap_ros2', 'rosbags',
            'geometry_msgs', 'sensor_msgs', 'trajectory_msgs', 'builtin_interfaces']
 

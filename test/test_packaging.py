@@ -89,7 +89,8 @@ def test_pinned_versions_satisfy_setup():
 
 def test_what_is_imported_is_declared():
     ros = {depend.name for depend in parse_package(str(ROOT / 'package.xml')).exec_depends}
-    pip = {Requirement(line).name for line in setup_keyword('install_requires')}
+    lines = [*setup_keyword('install_requires'), *setup_keyword('extras_require')['maps']]
+    pip = {Requirement(line).name for line in lines}
     imported = imported_modules() - sys.stdlib_module_names - {'flex_planner'}
     declared = {'yaml' if name == 'pyyaml' else name for name in ros | pip}
     assert imported - declared == set()

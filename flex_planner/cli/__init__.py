@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import sys
 
 from flex_planner import __version__
-from flex_planner.cli import arm, compare, motion, paper, recordings
+from flex_planner.cli import arm, compare, maps, motion, paper, recordings
 from flex_planner.cli.options import with_joined_lists
 from flex_planner.cli.watching import CanceledError
 from flex_planner.errors import FlexPlannerError
@@ -50,6 +50,7 @@ def _parser() -> argparse.ArgumentParser:
     arm.add_command(commands)
     motion.add_commands(commands)
     compare.add_command(commands)
+    maps.add_command(commands)
     paper.add_command(commands)
     recordings.add_commands(commands)
     return parser

@@ -1,0 +1,60 @@
+"""What ``flex-planner map`` shows while it computes, and when it is done."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+import math
+from typing import TYPE_CHECKING
+
+from flex_planner.cli.watching import Display
+from flex_planner.maps.cells import CellCode
+from flex_planner.motion_report import Row
+import numpy as np
+
+if TYPE_CHECKING:
+    from flex_planner.maps.tally import Tally
+    import xarray as xr
+
+_SELDOM = 10.0  # [s], between two lines where there is no terminal
+_OFTEN = 0.1  # [s], on a terminal
+_BAR = 10
+
+
+class MapDisplay(Display):
+    """Shows how far a map is: on a terminal as a line that is rewritten, elsewhere at times."""
+
+    def show(self, tally: Tally) -> None:
+        """Show it, unless it was shown a moment ago."""
+        if self.elapsed > self._shown + (_OFTEN if self._terminal else _SELDOM):
+            if self._terminal:
+                self._rewrite(progress_line(tally, bar=True))
+            else:
+                self._shown = self.elapsed
+                self.begin(progress_line(tally))
+
+
+def progress_line(tally: Tally, *, bar: bool = False) -> str:
+    """Return how far a map is, in a line."""
+    full = _BAR * tally.done // tally.cells
+    drawn = f'[{"#" * full}{"." * (_BAR - full)}] ' if bar else ''
+    text = f'{drawn}{tally.done}/{tally.cells} cells, {tally.failed} failed'
+    if math.isnan(tally.rate):
+        return text
+    left = str(timedelta(seconds=math.ceil(tally.time_left))) if tally.rate else 'unknown time'
+    return f'{text}, {tally.rate:.3g} cells/s, {left} left'
+
+
+def outcome_rows(tally: Tally, dataset: xr.Dataset) -> list[Row]:
+    """Return what came of a map, and how long it took."""
+    rows = [('cells', f'{tally.done} of {tally.cells}')]
+    rows += [(f'  {code.name.lower().replace("_", " ")}', f'{tally.of(code)}, {code.meaning}')
+             for code in CellCode if tally.of(code)]
+    quantity = dataset[dataset.attrs['quantity']]
+    values = quantity.values[np.isfinite(quantity.values)]
+    if values.size:
+        rows.append((quantity.attrs['long_name'], f'{values.min():.6g} to {values.max():.6g} '
+                                                  f'{quantity.attrs["units"]}'))
+    if tally.computed:
+        rows.append(('computed', f'{tally.computed} cells in {tally.elapsed:.1f} s, '
+                                 f'{tally.computed / tally.elapsed:.3g} cells/s'))
+    return rows

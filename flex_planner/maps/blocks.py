@@ -1,0 +1,125 @@
+"""
+Blocks of neighbouring cells, solved one after the other.
+
+A cell starts from its neighbours in the block: where two of them lead towards it, their motions
+are continued along that line; else from one of them; else from nothing. Blocks know nothing of one
+another, so that their order does not matter.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import product
+import time
+from typing import NamedTuple
+
+from flex_planner.duration import MinDuration
+from flex_planner.errors import FlexPlannerError, SingularError, UnreachableError
+from flex_planner.ladder import STATUSES
+from flex_planner.maps.cells import CellCode, CellResult
+from flex_planner.maps.ends import close
+from flex_planner.maps.solving import Found, Solver, task_of
+from flex_planner.maps.study import Block, Study
+from flex_planner.progress import Monitor, StoppedError
+from flex_planner.task import Task
+
+Index = tuple[int, ...]
+_LONGEST_MESSAGE = 300
+
+
+class Neighbours(NamedTuple):
+    """What a cell starts from: two cells on a line with it, the nearer one first; or fewer."""
+
+    near: Found | None = None
+    far: Found | None = None
+    ratio: float = 1.0
+
+
+def blocks(study: Study) -> list[Block]:
+    """Return the blocks of the grid in its order."""
+    sides = [[slice(first, min(first + side, size)) for first in range(0, size, side)]
+             for size, side in zip(study.shape, study.block_shape, strict=True)]
+    return list(product(*sides))
+
+
+def solve_block(study: Study, block: Block, monitor: Monitor | None = None) -> list[CellResult]:
+    """
+    Return what became of every cell of a block, in the order of their indices.
+
+    A cell that fails is a result with a code, whatever happened.
+
+    Parameters
+    ----------
+    study : Study
+        What is asked.
+    block : tuple of slice
+        One of `blocks`.
+    monitor : Monitor, optional
+        May cancel, which leaves cells pending.
+
+    """
+    return list(cells_solved(study, block, monitor))
+
+
+def cells_solved(study: Study, block: Block,
+                 monitor: Monitor | None = None) -> Iterator[CellResult]:
+    """Yield the results of `solve_block` one by one."""
+    hopeless = {result.index: result for result in study.known_failures(block)}
+    solver, done = Solver(study), dict[Index, Found]()
+    for index in product(*(range(part.start, part.stop) for part in block)):
+        if index in hopeless:
+            yield hopeless[index]
+            continue
+        result, found = _solved(study, solver, index, done, monitor)
+        if found is not None and (result.code is CellCode.SOLVED
+                                  or isinstance(found, MinDuration)):
+            done[index] = found
+        yield result
+
+
+def _solved(study: Study, solver: Solver, index: Index, done: dict[Index, Found],
+            monitor: Monitor | None) -> tuple[CellResult, Found | None]:
+    """Return what became of a cell, and the motion for its neighbours."""
+    began, limited = time.monotonic(), Monitor(time_limit=study.cell_time_limit)
+    if monitor is not None:
+        limited.canceled = monitor.canceled
+    found, start = None, Neighbours()
+    try:
+        task = study.task(index)
+        start = _neighbours(study, index, task, done)
+        found = solver.solve(index, task, limited, *start)
+        result = solver.result(index, found)
+    except StoppedError as stop:
+        result = CellResult(index=index, code=CellCode.of(STATUSES[stop.reason]),
+                            message=str(stop))
+    except (UnreachableError, SingularError) as error:
+        result = CellResult(index=index, code=CellCode.UNREACHABLE, message=str(error))
+    except FlexPlannerError as error:
+        result = CellResult(index=index, code=CellCode.INVALID, message=str(error))
+    except Exception as error:  # one cell must not cost the others
+        result = CellResult(index=index, code=CellCode.FAILED,
+                            message=f'{type(error).__name__}: {error}')
+    return replace(result, message=result.message[:_LONGEST_MESSAGE], warm=start.near is not None,
+                   seconds=time.monotonic() - began), found
+
+
+def _neighbours(study: Study, index: Index, task: Task,
+                done: dict[Index, Found]) -> Neighbours:
+    """Return the cells that a cell starts from, unless the arm turns the other way there."""
+    best = Neighbours()
+    for axis in reversed(range(len(index))):  # along a line of the block where there is one
+        line = [done.get((*index[:axis], index[axis] - back, *index[axis + 1:]))
+                for back in (1, 2)]
+        near, far = (one if one is not None and close(task_of(one), task) else None
+                     for one in line)
+        if near is None:
+            continue
+        if far is not None and type(far) is type(near):
+            values = study.axes[axis].values
+            here = index[axis]
+            ratio = (values[here] - values[here - 1]) / (values[here - 1] - values[here - 2])
+            return Neighbours(near, far, float(ratio))
+        best = best if best.near is not None else Neighbours(near)
+    return best

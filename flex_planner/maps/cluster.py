@@ -1,0 +1,143 @@
+"""The processes that a map is computed in: a Dask cluster of one's own, or one that is there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+import logging
+import os
+import signal
+
+import dask
+from dask.system import CPU_COUNT
+from distributed import Client, LocalCluster, Worker, WorkerPlugin
+from distributed.system import MEMORY_LIMIT
+from flex_planner.errors import FlexPlannerError
+
+ATTEMPTS = 3  # at a block that ends its process, or raises
+LOST = 'the scheduler was lost; finished blocks are kept, and are not computed again'
+_CONNECTING = 10.0  # [s]
+_CLOSING = 5.0  # [s]
+# a block is solved in one thread; more of them would only be in each other's way
+_SINGLE = dict.fromkeys(('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS'), '1')
+_SHARE = 0.9  # of the memory, for all workers together
+_SETTINGS = {
+    'distributed.scheduler.allowed-failures': ATTEMPTS - 1,
+    # one block at a time in each process: another one is not blamed for the end of it
+    'distributed.scheduler.worker-saturation': 1.0,
+    # else a process that happens to be starting again that long after its end is given up
+    'distributed.deploy.lost-worker-timeout': '1000 hours',
+}
+_NOISY = ('distributed', 'distributed.client', 'tornado.application')
+
+
+class ClusterError(FlexPlannerError):
+    """The processes that should compute a map cannot be had, or are lost."""
+
+
+class _KeepOnInterrupt(WorkerPlugin):  # type: ignore[misc]
+    """Leaves it to the client what Ctrl-C does: a terminal sends it to every process."""
+
+    def setup(self, worker: Worker) -> None:
+        """Ignore it."""
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+@contextmanager
+def local_cluster(workers: int) -> Iterator[Client]:
+    """
+    Provide a client of processes on this machine, which end with it.
+
+    Parameters
+    ----------
+    workers : int
+        How many.
+
+    Raises
+    ------
+    ClusterError
+        If they cannot be started.
+
+    """
+    with _quiet(), _environment(_SINGLE), dask.config.set(_SETTINGS):
+        try:
+            cluster = LocalCluster(
+                n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None,
+                memory_limit=int(_SHARE * MEMORY_LIMIT / workers), silence_logs=logging.CRITICAL)
+        except (OSError, RuntimeError) as error:
+            raise ClusterError(f'cannot start {workers} processes: {error}') from error
+        try:
+            with Client(cluster, set_as_default=False) as client:
+                client.register_plugin(_KeepOnInterrupt())
+                yield client
+        finally:
+            cluster.close(timeout=_CLOSING)
+
+
+@contextmanager
+def remote_cluster(address: str) -> Iterator[Client]:
+    """
+    Provide a client of a cluster that is there.
+
+    Parameters
+    ----------
+    address : str
+        Of its scheduler, such as ``tcp://host:8786``.
+
+    Raises
+    ------
+    ClusterError
+        If it does not answer, or has no workers.
+
+    """
+    with _quiet():
+        try:
+            client = Client(address, timeout=_CONNECTING, set_as_default=False)
+        except (OSError, ValueError, TimeoutError) as error:
+            raise ClusterError(f'no scheduler answers at {address}: {error}') from error
+        with client:
+            try:
+                client.wait_for_workers(1, timeout=_CONNECTING)
+            except TimeoutError:
+                raise ClusterError(f'the scheduler at {address} has no workers') from None
+            yield client
+
+
+def default_workers() -> int:
+    """Return the number of processors that this process may use."""
+    return int(CPU_COUNT)
+
+
+def threads(client: Client) -> dict[str, int]:
+    """Return the number of threads of every worker, by address; ClusterError if it is lost."""
+    try:
+        threads: dict[str, int] = client.nthreads()
+    except Exception as error:
+        raise ClusterError(LOST) from error
+    return threads
+
+
+@contextmanager
+def _environment(values: dict[str, str]) -> Iterator[None]:
+    """Set environment variables for a while; Dask hands them on, and adds some of its own."""
+    before = dict(os.environ)
+    os.environ.update(values)
+    try:
+        yield
+    finally:
+        os.environ.clear()
+        os.environ.update(before)
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep what Dask logs of workers that come and go from the terminal."""
+    loggers = [logging.getLogger(name) for name in _NOISY]
+    levels = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.setLevel(level)

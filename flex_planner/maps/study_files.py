@@ -1,0 +1,168 @@
+"""Study files: what the fields of the YAML mean, read as strictly as those of arms."""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+from typing import Any
+
+from flex_planner.arm import Arm, MAX_MODES
+from flex_planner.arm_files import arm_from_mapping, ArmFileError, load_arm
+from flex_planner.errors import InvalidValueError
+from flex_planner.joint_control import Gains
+from flex_planner.maps.axes import Axis, read_axes
+from flex_planner.maps.ends import End
+from flex_planner.maps.quantities import Quantity
+from flex_planner.mismatch import AS_GIVEN, Mismatch
+from flex_planner.validation import Array, integer, number, vector
+from flex_planner.yaml_files import Section
+import numpy as np
+
+# of searches, as find_max_payload and find_min_duration have them
+_ACCURACIES = {Quantity.MAX_PAYLOAD: 1e-3, Quantity.MIN_DURATION: 1e-4}
+_GIVEN_BY = {'duration': 'duration', 'payload_mass': 'payload_mass',
+             'velocity_weights': 'velocity_weight'}
+
+
+def read_fields(top: Section, folder: Path) -> dict[str, Any]:
+    """
+    Return the arguments of `Study` that a file gives; paths are relative to its folder.
+
+    Raises
+    ------
+    FlexPlannerError
+        Naming the field by its path in the file.
+
+    """
+    name, quantity = top.text('name'), _quantity(top)
+    arm = _arm(top, folder)
+    axes = read_axes(top.section('axes'))
+    _refuse_given_twice(top, axes)
+    ends = {end: _end(top, end, axes) for end in ('start', 'goal')}
+    numbers = {key: top.take(key) for key in (
+        'duration', 'payload_mass', 'effort_weights', 'velocity_weights', 'tolerance', 'elbow',
+        'cell_time_limit') if top.has(key)}
+    if 'duration' not in {*numbers, *(axis.name for axis in axes)}:
+        raise InvalidValueError('duration', None, 'given')
+    return {'name': name, 'arm': arm, 'quantity': quantity, 'axes': axes, **ends, **numbers,
+            'accuracy': top.take('accuracy', _ACCURACIES.get(quantity, math.nan)),
+            'block_shape': _block_shape(top, axes),
+            **_simulated(top, quantity, arm.n_joints)}
+
+
+def _quantity(top: Section) -> Quantity:
+    """Return the quantity by its key."""
+    given = top.text('quantity')
+    kinds = {quantity.key: quantity for quantity in Quantity}
+    if given not in kinds:
+        raise InvalidValueError('quantity', given, f'one of {list(kinds)}')
+    return kinds[given]
+
+
+def _arm(top: Section, folder: Path) -> Arm:
+    """Return the arm: a preset, a file or a mapping, with another number of modes if given."""
+    given = top.take('arm')
+    if isinstance(given, str):
+        is_path = given.endswith(('.yaml', '.yml')) or os.sep in given
+        try:
+            arm = load_arm(folder / given if is_path else given)
+        except ArmFileError as error:
+            raise ArmFileError(f'arm: {error}') from error
+    else:
+        arm = arm_from_mapping(given, 'arm')
+    if not top.has('modes'):
+        return arm
+    modes = integer('modes', top.take('modes'), at_least=0, at_most=MAX_MODES)
+    if modes and not arm.n_modes:
+        raise InvalidValueError('modes', modes, 'left out: every link of the arm is rigid')
+    return Mismatch(modes=modes).applied(arm)
+
+
+def _refuse_given_twice(top: Section, axes: tuple[Axis, ...]) -> None:
+    """Refuse a field whose value an axis gives."""
+    names = {axis.name for axis in axes}
+    for key, axis in _GIVEN_BY.items():
+        if axis in names and top.has(key):
+            raise InvalidValueError(key, top.take(key), f'left out: the axis {axis} gives it')
+    for key in ('start', 'goal'):
+        if {f'{key}_x', f'{key}_y'} <= names and top.has(key):
+            raise InvalidValueError(key, top.take(key),
+                                    f'left out: the axes {key}_x and {key}_y give it')
+
+
+def _end(top: Section, name: str, axes: tuple[Axis, ...]) -> End:
+    """Return the start or the goal, given as a point, as angles or by axes."""
+    angles = f'{name}_angles'
+    if top.has(angles):
+        if top.has(name):
+            raise InvalidValueError(angles, top.take(angles), f'left out where {name} is given')
+        return End(name=name, angles=_numbers(angles, top.take(angles)))
+    if {f'{name}_x', f'{name}_y'} <= {axis.name for axis in axes}:
+        return End(name=name)
+    if not top.has(name):
+        raise InvalidValueError(f'{name} or {angles}', None, 'given, one of them')
+    point = _numbers(name, top.take(name))
+    if point.size != 2:
+        raise InvalidValueError(name, point.tolist(), 'a point [x, y] in m')
+    return End(name=name, point=point)
+
+
+def _numbers(field: str, values: object) -> Array:
+    """Return a list of numbers."""
+    if not isinstance(values, list) or not values or not all(
+            isinstance(entry, (int, float)) and not isinstance(entry, bool) for entry in values):
+        raise InvalidValueError(field, values, 'a list of numbers')
+    return np.array(values, dtype=np.float64)
+
+
+def _block_shape(top: Section, axes: tuple[Axis, ...]) -> tuple[int, ...]:
+    """Return the sizes of blocks, 1 along axes that are left out; empty if none are given."""
+    if not top.has('block'):
+        return ()
+    sides = top.section('block')
+    shape = tuple(integer(f'block.{axis.name}', sides.take(axis.name, 1), at_least=1,
+                          at_most=axis.values.size) for axis in axes)
+    sides.finish()
+    return shape
+
+
+def _simulated(top: Section, quantity: Quantity, joints: int) -> dict[str, Any]:
+    """Return what is said about the simulated arm."""
+    if quantity is not Quantity.RESIDUAL_VIBRATION:
+        for key in ('mismatch', 'gains', 'settling'):
+            if top.has(key):
+                raise InvalidValueError(key, top.take(key), 'left out: only residual_vibration '
+                                                            'has a simulated arm')
+        return {}
+    fields: dict[str, Any] = {}
+    if top.has('mismatch'):
+        fields = _mismatch(top.section('mismatch'), joints)
+    if top.has('gains'):
+        part = top.section('gains')
+        gains = {key: _per_joint(part, key, joints) for key in ('stiffness', 'damping')}
+        fields['gains'] = part.build(Gains, **gains)
+    if top.has('settling'):
+        fields['settling'] = top.take('settling')
+    return fields
+
+
+def _mismatch(part: Section, joints: int) -> dict[str, Any]:
+    """Return how the simulated arm and its payload differ."""
+    fields: dict[str, Any] = {}
+    if part.has('payload_mass'):
+        fields['plant_payload'] = part.number('payload_mass', at_least=0, unit='kg')
+    friction = (_per_joint(part, 'added_friction', joints) if part.has('added_friction')
+                else np.zeros(0))
+    fields['mismatch'] = part.build(
+        Mismatch, modes=part.take('modes', AS_GIVEN), added_friction=friction,
+        rigidity_scale=part.take('rigidity_scale', 1.0))
+    return fields
+
+
+def _per_joint(part: Section, key: str, joints: int) -> Array:
+    """Return a list with an entry a joint; a number stands for all of them."""
+    given, field = part.take(key), part.name(key)
+    if not isinstance(given, list):
+        return np.full(joints, number(field, given))
+    return vector(field, _numbers(field, given), joints)
