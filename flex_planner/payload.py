@@ -182,8 +182,9 @@ def find_max_payload(task: Task, *, model: ArmModel | None = None,
     Raises
     ------
     InvalidTaskError
-        If no motor has a limit, if the duration is free, if the arm need not come to rest at
-        the goal, or if a motor is too weak to hold the arm with the task's payload there.
+        If no motor has a limit, if the goal is the start, if the duration is free, if the arm need
+        not come to rest at the goal, or if a motor is too weak to hold the arm with the task's
+        payload there.
     InvalidValueError
         If accuracy or step breaks its bound.
 
@@ -216,6 +217,10 @@ def _check(task: Task) -> None:
     if task.time_weight:
         raise InvalidTaskError(f'time_weight is {task.time_weight:g}, but must be 0: the largest '
                                'payload is that of a given duration')
+    if (not task.arm.gravity.any() and not task.start_velocities.any()
+            and (task.start_positions == task.goal_positions).all()):
+        raise InvalidTaskError('goal_positions are start_positions: no payload is too large for '
+                               'an arm that stays where it is')
     if not task.ends_at_rest:
         raise InvalidTaskError('the largest payload is that of a motion which ends at rest: '
                                'goal_position_weights and goal_velocity_weights must be inf, '

@@ -573,6 +573,13 @@ def test_arm_without_motor_limits_is_refused(rigid_arm: Arm, paper_task: TaskFac
         find_max_payload(paper_task(arm_with(rigid_arm, (inf, inf))))
 
 
+def test_arm_that_stays_where_it_is_has_no_largest_payload(paper_task: TaskFactory,
+                                                           rigid_arm: Arm) -> None:
+    task = paper_task(rigid_arm)
+    with pytest.raises(InvalidTaskError, match='goal_positions are start_positions'):
+        find_max_payload(replace(task, goal_positions=task.start_positions))
+
+
 @pytest.mark.parametrize(('options', 'message'), [
     ({'accuracy': 0.0}, 'accuracy is 0.0, but must be a number >= 1e-06 and <= 1000 kg'),
     ({'accuracy': 1001.0}, 'accuracy is 1001.0, but must be a number >= 1e-06 and <= 1000 kg'),
