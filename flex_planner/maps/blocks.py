@@ -9,7 +9,6 @@ another, so that their order does not matter.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
 import time
@@ -60,23 +59,32 @@ def solve_block(study: Study, block: Block, monitor: Monitor | None = None) -> l
         May cancel, which leaves cells pending.
 
     """
-    return list(cells_solved(study, block, monitor))
-
-
-def cells_solved(study: Study, block: Block,
-                 monitor: Monitor | None = None) -> Iterator[CellResult]:
-    """Yield the results of `solve_block` one by one."""
-    hopeless = {result.index: result for result in study.known_failures(block)}
+    results = {result.index: result for result in study.known_failures(block)}
     solver, done = Solver(study), dict[Index, Found]()
-    for index in product(*(range(part.start, part.stop) for part in block)):
-        if index in hopeless:
-            yield hopeless[index]
-            continue
-        result, found = _solved(study, solver, index, done, monitor)
-        if found is not None and (result.code is CellCode.SOLVED
-                                  or isinstance(found, MinDuration)):
-            done[index] = found
-        yield result
+    cells = list(product(*(range(part.start, part.stop) for part in block)))
+    for index in cells:
+        if index not in results:
+            results[index] = _added(study, solver, index, done, monitor)
+    # what did not converge may do so from the neighbours on the other sides
+    for index in reversed(cells):
+        if results[index].code is CellCode.NOT_CONVERGED and done:
+            results[index] = _together(results[index], _added(study, solver, index, done, monitor))
+    return [results[index] for index in cells]
+
+
+def _added(study: Study, solver: Solver, index: Index, done: dict[Index, Found],
+           monitor: Monitor | None) -> CellResult:
+    """Return what became of a cell, and keep its motion for the neighbours."""
+    result, found = _solved(study, solver, index, done, monitor)
+    if found is not None and (result.code is CellCode.SOLVED or isinstance(found, MinDuration)):
+        done[index] = found
+    return result
+
+
+def _together(first: CellResult, second: CellResult) -> CellResult:
+    """Return the second try of a cell with the cost of both."""
+    return replace(second, iterations=first.iterations + second.iterations,
+                   seconds=first.seconds + second.seconds)
 
 
 def _solved(study: Study, solver: Solver, index: Index, done: dict[Index, Found],
@@ -107,19 +115,24 @@ def _solved(study: Study, solver: Solver, index: Index, done: dict[Index, Found]
 
 def _neighbours(study: Study, index: Index, task: Task,
                 done: dict[Index, Found]) -> Neighbours:
-    """Return the cells that a cell starts from, unless the arm turns the other way there."""
+    """Return the cells that a cell starts from."""
     best = Neighbours()
     for axis in reversed(range(len(index))):  # along a line of the block where there is one
-        line = [done.get((*index[:axis], index[axis] - back, *index[axis + 1:]))
-                for back in (1, 2)]
-        near, far = (one if one is not None and close(task_of(one), task) else None
-                     for one in line)
-        if near is None:
-            continue
-        if far is not None and type(far) is type(near):
-            values = study.axes[axis].values
-            here = index[axis]
-            ratio = (values[here] - values[here - 1]) / (values[here - 1] - values[here - 2])
-            return Neighbours(near, far, float(ratio))
-        best = best if best.near is not None else Neighbours(near)
+        for back in (1, -1):
+            near, far = (_there(index, axis, steps * back, task, done) for steps in (1, 2))
+            if near is None:
+                continue
+            if far is not None and type(far) is type(near):
+                here, values = index[axis], study.axes[axis].values
+                ratio = ((values[here] - values[here - back])
+                         / (values[here - back] - values[here - 2 * back]))
+                return Neighbours(near, far, float(ratio))
+            best = best if best.near is not None else Neighbours(near)
     return best
+
+
+def _there(index: Index, axis: int, back: int, task: Task,
+           done: dict[Index, Found]) -> Found | None:
+    """Return what was found so many cells before one, unless the arm turns the other way."""
+    found = done.get((*index[:axis], index[axis] - back, *index[axis + 1:]))
+    return found if found is not None and close(task_of(found), task) else None
