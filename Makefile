@@ -31,8 +31,10 @@ paper: setup
 	@tools/run flex-planner paper --output docs
 
 test: lint
-	tools/run python -m pytest -n auto --dist loadfile -m 'not alone'
-	tools/run python -m pytest -m alone
+	@failed=0; \
+	tools/run python -m pytest -n auto --dist loadfile -m 'not alone' || failed=1; \
+	tools/run python -m pytest -m alone || failed=1; \
+	exit $$failed
 
 lint: setup
 	tools/run ruff check
