@@ -9,17 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import chain
 
 from flex_planner.collocation import CollocationSolution, Settings, solve
 from flex_planner.errors import InvalidTaskError
-from flex_planner.families import changed, durations, on_the_way, Stop
+from flex_planner.families import changed, durations, Stop
 from flex_planner.family_starts import quickest
 from flex_planner.ladder import LADDER, planned, STATUSES, STOPPED
-from flex_planner.limit_search import collected, is_near, plan_near, width
+from flex_planner.limit_search import collected, is_near, middle, plan_near, way_to, width
 from flex_planner.model import ArmModel
 from flex_planner.motion import MotionProblem, task_parameters
-from flex_planner.neighbours import foreseen
+from flex_planner.neighbours import check_ratio, continued_stops, step_ratio
 from flex_planner.payload import find_max_payload, MaxPayload
 from flex_planner.plan import Plan, PlanStatus
 from flex_planner.progress import Monitor, StoppedError
@@ -30,13 +29,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 _MIN_ACCURACY, _MAX_ACCURACY = 1e-7, 100.0
-# of motions on the way, by accuracy of the duration [1/s]
-_EXACTNESS = 10.0
 # durations tried to start from, in units of the one of the task
 _LONGER = (1.0, 3.0, 12.0)
-# share of the duration that the room of a start should be
-_MIDDLE = 0.01
-_MOST_RATIO = 100.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -86,8 +80,7 @@ class MinDuration:
     @property
     def middle(self) -> Stop | None:
         """Return the last motion that leaves some room: a start for searches of its kind."""
-        roomy = [stop for stop in self.stops if stop.room >= _MIDDLE * stop.value]
-        return roomy[-1] if roomy else next(iter(self.stops), None)
+        return middle(self.stops)
 
 
 def find_min_duration(task: Task, *, model: ArmModel | None = None,
@@ -127,7 +120,7 @@ def find_min_duration(task: Task, *, model: ArmModel | None = None,
 
     """
     number('accuracy', accuracy, at_least=_MIN_ACCURACY, at_most=_MAX_ACCURACY, unit='s')
-    number('ratio', ratio, at_least=-_MOST_RATIO, at_most=_MOST_RATIO)
+    check_ratio(ratio)
     if not np.isfinite([joint.motor.stall_torque for joint in task.arm.joints]).all():
         raise InvalidTaskError('a motor of the arm has no stall torque, so no duration is the '
                                'shortest')
@@ -151,8 +144,10 @@ def _found(task: Task, problem: MotionProblem, settings: Settings, monitor: Moni
            ratio: float) -> MinDuration:
     """Follow the price of time to the limit, then plan there."""
     monitor.phase = 'duration at a rising price'
-    stops = (_foreseen_stops(problem, settings, monitor, accuracy, start, before, ratio)
-             or _stops(problem, settings, monitor, accuracy, start.middle if start else None))
+    exact = continued_stops(
+        changed(without_weights(problem), duration=MAX_DURATION), before.stops if before else (),
+        start.stops if start else (), ratio, accuracy, settings, monitor, payload=False)
+    stops = exact or _stops(problem, settings, monitor, accuracy, start.middle if start else None)
     last = stops[-1]
     if last.stopped:
         return MinDuration(task=task, status=STOPPED[last.result.status],
@@ -164,7 +159,7 @@ def _found(task: Task, problem: MotionProblem, settings: Settings, monitor: Moni
         stops = _stops_from(first.problem, first.solution, settings, monitor, accuracy)
         last = stops[-1]
     plan = plan_near(changed(problem, duration=last.value), last.result.solution, settings,
-                     monitor, last)
+                     monitor, last if exact else None)
     lower = max(0.0, last.value - last.room)
     found = MinDuration(task=task, status=plan.status, message=plan.message, plan=plan,
                         duration=last.value if plan.solved else np.inf, lower=lower,
@@ -181,35 +176,17 @@ def _found(task: Task, problem: MotionProblem, settings: Settings, monitor: Moni
 def _stops_from(problem: MotionProblem, solution: CollocationSolution, settings: Settings,
                 monitor: Monitor, accuracy: float) -> list[Stop]:
     """Return the motions on the way from one that took all strategies to find."""
-    way = on_the_way(settings, _EXACTNESS * accuracy)
+    way = way_to(accuracy, settings)
     first = solve(problem, solution, way, monitor)
     stop = Stop(value=problem.task.duration, price=0.0, result=first, problem=problem)
     family = durations(problem, first, way, monitor, lambda duration: width(accuracy, duration))
     return [stop, *(each for each in collected(family, accuracy) if each.result.converged)]
 
 
-def _foreseen_stops(problem: MotionProblem, settings: Settings, monitor: Monitor, accuracy: float,
-                    start: MinDuration | None, before: MinDuration | None,
-                    ratio: float) -> list[Stop]:
-    """Return the motions from the one that two searches lead to; none without success."""
-    if start is None or before is None or not (start.stops and before.stops):
-        return []
-    way, bare = on_the_way(settings, _EXACTNESS * accuracy), without_weights(problem)
-    slow = changed(bare, duration=MAX_DURATION)
-    first = foreseen(slow, before.stops[-1], start.stops[-1], ratio, settings, monitor,
-                     payload=False)
-    if first is None:
-        return []
-    further = () if first.stopped else durations(
-        first.problem, first.result, way, monitor, lambda duration: width(accuracy, duration))
-    stops = collected(chain([first], further), accuracy)
-    return stops if stops[-1].stopped or is_near(stops, accuracy) else []
-
-
 def _stops(problem: MotionProblem, settings: Settings, monitor: Monitor, accuracy: float,
            start: Stop | None) -> list[Stop]:
     """Return the motions on the way to the shortest duration."""
-    way, bare = on_the_way(settings, _EXACTNESS * accuracy), without_weights(problem)
+    way, bare = way_to(accuracy, settings), without_weights(problem)
     for factor in _LONGER:
         slow = changed(bare, duration=min(factor * problem.task.duration, MAX_DURATION))
         stops = collected(quickest(slow, way, monitor, start=start,
@@ -254,17 +231,10 @@ def _against_duration(tasks: list[Task], model: ArmModel, settings: Settings | N
     near: MaxPayload | None = None
     far: MaxPayload | None = None
     for task in tasks:
+        ratio = step_ratio(far.task.duration, near.task.duration, task.duration) if (
+            far is not None and near is not None) else 1.0
         found = find_max_payload(task, model=model, settings=settings, monitor=monitor,
-                                 accuracy=accuracy, start_from=near, before=far,
-                                 ratio=_step_ratio(far, near, task))
+                                 accuracy=accuracy, start_from=near, before=far, ratio=ratio)
         yield found
-        if found.solved:
+        if found.solved and (near is None or near.task.duration != task.duration):
             near, far = found, near
-
-
-def _step_ratio(far: MaxPayload | None, near: MaxPayload | None, task: Task) -> float:
-    """Return the step in duration to a task over the step before it."""
-    if far is None or near is None or near.task.duration == far.task.duration:
-        return 1.0
-    ratio = (task.duration - near.task.duration) / (near.task.duration - far.task.duration)
-    return float(np.clip(ratio, -_MOST_RATIO, _MOST_RATIO))

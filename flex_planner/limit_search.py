@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from flex_planner.collocation import CollocationSolution, Settings
-from flex_planner.families import Stop
+from flex_planner.families import on_the_way, Stop
 from flex_planner.ladder import planned
 from flex_planner.limits import steady
 from flex_planner.motion import MotionProblem
@@ -16,6 +16,21 @@ import numpy as np
 
 _MOST_STOPS = 100
 _FINEST = 1e-6
+# of motions on the way, by accuracy of the value [1/kg, 1/s]
+_EXACTNESS = 10.0
+# share of the value that the room of a start should be
+_MIDDLE = 0.01
+
+
+def way_to(accuracy: float, settings: Settings) -> Settings:
+    """Return settings for motions on the way to a limit that is wanted to an accuracy."""
+    return on_the_way(settings, _EXACTNESS * accuracy)
+
+
+def middle(stops: Sequence[Stop]) -> Stop | None:
+    """Return the last motion that leaves some room: a start for searches of its kind."""
+    roomy = [stop for stop in stops if stop.room >= _MIDDLE * stop.value]
+    return roomy[-1] if roomy else next(iter(stops), None)
 
 
 def collected(stops: Iterable[Stop], accuracy: float) -> list[Stop]:

@@ -10,15 +10,18 @@ where they will be; then values, too, are continued along a straight line.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 from flex_planner.collocation import CollocationSolution, Settings
 from flex_planner.collocation.mesh import defects, levelled
 from flex_planner.errors import FlexPlannerError
-from flex_planner.families import changed, Stop, worth, worth_time
+from flex_planner.families import changed, durations, payloads, Stop, worth, worth_time
+from flex_planner.limit_search import collected, is_near, way_to, width
 from flex_planner.motion import Indices, MotionProblem
 from flex_planner.progress import Monitor
-from flex_planner.validation import Array
+from flex_planner.validation import Array, number
 import numpy as np
 
 # of the span: nodes nearer than this to a switch are moved onto it
@@ -27,6 +30,46 @@ _SAME = 1e-6
 _FEW = 10
 # of the tolerance, what a mesh is made for; how much coarser than its predecessor it may be
 _MARGIN, _COARSER = 0.1, 0.5
+_MOST_RATIO = 100.0
+
+
+def check_ratio(ratio: float) -> None:
+    """Raise InvalidValueError unless motions may be continued so far."""
+    number('ratio', ratio, at_least=-_MOST_RATIO, at_most=_MOST_RATIO)
+
+
+def step_ratio(far: float, near: float, here: float) -> float:
+    """Return the step from near to here over that from far to near, as far as allowed."""
+    return float(np.clip((here - near) / (near - far), -_MOST_RATIO, _MOST_RATIO))
+
+
+def continued_stops(problem: MotionProblem, before: Sequence[Stop], here: Sequence[Stop],
+                    ratio: float, accuracy: float, settings: Settings, monitor: Monitor, *,
+                    payload: bool) -> list[Stop]:
+    """
+    Return the motions up to a limit, from the one that two searches lead to; else none.
+
+    Parameters
+    ----------
+    problem, ratio, settings, monitor, payload
+        As of `foreseen`.
+    before, here : sequence of Stop
+        Of the two searches, ending near the limits of their tasks.
+    accuracy : float
+        To which the limit is wanted [kg, s].
+
+    """
+    if not (before and here):
+        return []
+    first = foreseen(problem, before[-1], here[-1], ratio, settings, monitor, payload=payload)
+    if first is None:
+        return []
+    family = payloads if payload else durations
+    further = () if first.stopped else family(
+        first.problem, first.result, way_to(accuracy, settings), monitor,
+        lambda value: width(accuracy, value))
+    stops = collected(chain([first], further), accuracy)
+    return stops if stops[-1].stopped or is_near(stops, accuracy) else []
 
 
 def foreseen(problem: MotionProblem, before: Stop, here: Stop, ratio: float, settings: Settings,

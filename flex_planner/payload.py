@@ -12,19 +12,18 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from itertools import chain
 
 from flex_planner.certify import totals
 from flex_planner.collocation import CollocationSolution, Settings, solve
 from flex_planner.errors import InvalidTaskError
-from flex_planner.families import changed, on_the_way, payloads, Stop
+from flex_planner.families import changed, payloads, Stop
 from flex_planner.family_starts import heaviest
 from flex_planner.incremental import PayloadTrial, raised_payload
 from flex_planner.ladder import LADDER, planned, STATUSES, STOPPED
-from flex_planner.limit_search import collected, is_near, plan_near, width
+from flex_planner.limit_search import collected, is_near, middle, plan_near, way_to, width
 from flex_planner.model import ArmModel
 from flex_planner.motion import holding_limit, MotionProblem, task_parameters
-from flex_planner.neighbours import foreseen
+from flex_planner.neighbours import check_ratio, continued_stops
 from flex_planner.plan import Plan, PlanStatus
 from flex_planner.progress import Monitor, StoppedError
 from flex_planner.strategies import without_weights
@@ -36,11 +35,6 @@ _MIN_ACCURACY, _MAX_ACCURACY = 1e-6, 1e3
 _STEP = 1.0
 # of the payload that the motors can just hold, kept clear of rounding
 _HELD = 1 - 1e-9
-# of motions on the way, by accuracy of the payload [1/kg]
-_EXACTNESS = 10.0
-# share of the payload that the room of a start should be
-_MIDDLE = 0.01
-_MOST_RATIO = 100.0
 
 
 class PayloadMethod(Enum):
@@ -136,8 +130,7 @@ class MaxPayload:
     @property
     def middle(self) -> Stop | None:
         """Return the last motion that leaves some room: a start for searches of its kind."""
-        roomy = [stop for stop in self.stops if stop.room >= _MIDDLE * stop.value]
-        return roomy[-1] if roomy else next(iter(self.stops), None)
+        return middle(self.stops)
 
 
 def find_max_payload(task: Task, *, model: ArmModel | None = None,
@@ -192,7 +185,7 @@ def find_max_payload(task: Task, *, model: ArmModel | None = None,
     number('accuracy', accuracy, at_least=_MIN_ACCURACY, at_most=_MAX_ACCURACY, unit='kg')
     step = max(_STEP, accuracy) if step is None else step
     number('step', step, at_least=accuracy, at_most=MAX_PAYLOAD, unit='kg')
-    number('ratio', ratio, at_least=-_MOST_RATIO, at_most=_MOST_RATIO)
+    check_ratio(ratio)
     _check(task)
     monitor = monitor or Monitor()
     began = monitor.iteration, monitor.elapsed
@@ -246,7 +239,8 @@ class _Search:
     def direct(self, start: MaxPayload | None, before: MaxPayload | None,
                ratio: float) -> MaxPayload:
         """Follow the price to the limit, then plan there."""
-        if not self._foresee(start, before, ratio):
+        exact = self._continued(start, before, ratio)
+        if not exact:
             failure = self._follow_price(start.middle if start else None)
             if failure is not None:
                 return failure
@@ -255,7 +249,7 @@ class _Search:
             return self.failed(PayloadMethod.DIRECT, STOPPED[last.result.status],
                                last.result.message)
         near = is_near(self._stops, self._accuracy)
-        plan = self._plan(last.value, last.result.solution, last)
+        plan = self._plan(last.value, last.result.solution, last if exact else None)
         found = MaxPayload(task=self._problem.task, method=PayloadMethod.DIRECT,
                            status=plan.status, message=plan.message,
                            front=_front(self._stops), stops=_priced(self._stops),
@@ -269,27 +263,20 @@ class _Search:
                 f'{found.payload:.6g} kg can be carried, but it was not shown that no more can'))
         return _described(found)
 
-    def _foresee(self, start: MaxPayload | None, before: MaxPayload | None,
-                 ratio: float) -> bool:
-        """Collect the stop that two searches lead to, and further ones; False without success."""
-        if start is None or before is None or not (start.stops and before.stops):
-            return False
-        bare, monitor = without_weights(self._problem), self._monitor
-        monitor.phase = 'payload at a rising price'
-        first = foreseen(bare, before.stops[-1], start.stops[-1], ratio, self._settings, monitor,
-                         payload=True)
-        if first is None:
-            return False
-        way = on_the_way(self._settings, _EXACTNESS * self._accuracy)
-        further = () if first.stopped else payloads(first.problem, first.result, way, monitor,
-                                                    self._enough)
-        self._stops = collected(chain([first], further), self._accuracy)
-        return self._stops[-1].stopped or is_near(self._stops, self._accuracy)
+    def _continued(self, start: MaxPayload | None, before: MaxPayload | None,
+                   ratio: float) -> bool:
+        """Collect the stops that two searches lead to; False without success."""
+        self._monitor.phase = 'payload at a rising price'
+        self._stops = continued_stops(
+            without_weights(self._problem), before.stops if before else (),
+            start.stops if start else (), ratio, self._accuracy, self._settings, self._monitor,
+            payload=True)
+        return bool(self._stops)
 
     def _follow_price(self, start: Stop | None) -> MaxPayload | None:
         """Collect stops up to the limit; return the failure if there is no first motion."""
         bare, monitor = without_weights(self._problem), self._monitor
-        way = on_the_way(self._settings, _EXACTNESS * self._accuracy)
+        way = way_to(self._accuracy, self._settings)
         monitor.phase = 'payload at a rising price'
         self._stops = collected(heaviest(bare, way, monitor, start=start, enough=self._enough),
                                 self._accuracy)

@@ -191,8 +191,8 @@ def test_search_reports_its_phases(rigid_model: ArmModel, paper_task: TaskFactor
     reports: list[Progress] = []
     found = find_min_duration(paper_task(rigid_model.arm), model=rigid_model,
                               monitor=Monitor(report=reports.append))
-    # the last motion is exact enough to be the plan, without another iteration
-    assert {each.phase for each in reports} == {'duration at a rising price'}
+    assert list(dict.fromkeys(each.phase for each in reports)) == ['duration at a rising price',
+                                                                   'limit found']
     assert len(reports) == found.iterations
     assert found.planning_time > 0
 
@@ -228,11 +228,11 @@ def test_payload_of_an_arm_that_bends_grows_with_the_duration(ei5_model: ArmMode
 
 def test_duration_that_is_too_short_is_passed_over(rigid_model: ArmModel,
                                                    paper_task: TaskFactory) -> None:
-    short, first, _, third = payload_against_duration(
-        paper_task(rigid_model.arm), [0.6, 1.0, 1.05, 1.1], model=rigid_model)
+    short, first, second = payload_against_duration(paper_task(rigid_model.arm), [0.6, 1.0, 1.05],
+                                                    model=rigid_model)
     assert short.status is PlanStatus.INFEASIBLE
     assert first.payload <= HEAVIEST <= first.upper
-    assert third.iterations < first.iterations / 2
+    assert second.iterations < first.iterations
 
 
 def test_durations_are_searched_one_by_one(rigid_model: ArmModel, paper_task: TaskFactory) -> None:
@@ -317,7 +317,8 @@ def test_bad_accuracy_is_named_with_its_bound(rigid_model: ArmModel, paper_task:
 
 @both_stops
 @pytest.mark.parametrize(('phase', 'iterations'), [
-    ('duration at a rising price', 0), ('duration at a rising price', 20), ('limit found', 0)])
+    ('duration at a rising price', 0), ('duration at a rising price', 20), ('limit found', 0),
+    ('limit found', 1)])
 def test_search_is_stopped_wherever_it_is(rigid_model: ArmModel, paper_task: TaskFactory,
                                           phase: str, iterations: int, status: PlanStatus) -> None:
     monitor = stopped_in(phase, status, iterations)
@@ -352,7 +353,7 @@ def test_search_is_stopped_in_its_last_simulation(rigid_model: ArmModel, paper_t
     monitor = Monitor()
 
     def due() -> bool:
-        late = monitor.phase == 'limit found'
+        late = monitor.iteration == whole
         if late and status is PlanStatus.TIMEOUT:
             monitor.time_limit = -1.0
         return late and status is PlanStatus.CANCELED

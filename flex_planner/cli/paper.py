@@ -11,7 +11,7 @@ import sys
 from flex_planner import __version__
 from flex_planner.cli.options import Commands
 from flex_planner.cli.outputs import check_folder
-from flex_planner.cli.watching import Display
+from flex_planner.cli.watching import Display, interruptible
 from flex_planner.validation import integer
 
 _PAGE, _PICTURES = 'paper.md', 'images/paper'
@@ -52,11 +52,12 @@ def _paper(options: argparse.Namespace) -> int:
     display.begin(f'{len(keys)} sections in {processes} processes')
     page, pictures = options.output / _PAGE, options.output / _PICTURES
     try:
-        sections = list(computed(
-            keys, reduced=options.reduced, processes=processes,
-            pictures=None if options.no_plot else pictures,
-            report=lambda key, done, count: display.begin(
-                f'section {key} is done, {done} of {count}')).values())
+        with interruptible() as canceled:
+            sections = list(computed(
+                keys, reduced=options.reduced, processes=processes, canceled=canceled,
+                pictures=None if options.no_plot else pictures,
+                report=lambda key, done, count: display.begin(
+                    f'section {key} is done, {done} of {count}')).values())
     finally:
         display.close()
     remark = (f'Computed in {display.elapsed:.0f} s by flex_planner {__version__} on '

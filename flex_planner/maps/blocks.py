@@ -21,6 +21,7 @@ from flex_planner.maps.cells import CellCode, CellResult
 from flex_planner.maps.ends import close
 from flex_planner.maps.solving import Found, Solver, task_of
 from flex_planner.maps.study import Block, Study
+from flex_planner.neighbours import step_ratio
 from flex_planner.progress import Monitor, StoppedError
 from flex_planner.task import Task
 
@@ -59,58 +60,70 @@ def solve_block(study: Study, block: Block, monitor: Monitor | None = None) -> l
         May cancel, which leaves cells pending.
 
     """
-    results = {result.index: result for result in study.known_failures(block)}
-    solver, done = Solver(study), dict[Index, Found]()
-    cells = list(product(*(range(part.start, part.stop) for part in block)))
-    for index in cells:
-        if index not in results:
-            results[index] = _added(study, solver, index, done, monitor)
-    # what did not converge may do so from the neighbours on the other sides
-    for index in reversed(cells):
-        if results[index].code is CellCode.NOT_CONVERGED and done:
-            results[index] = _together(results[index], _added(study, solver, index, done, monitor))
-    return [results[index] for index in cells]
+    return _Block(study, block, monitor).results()
 
 
-def _added(study: Study, solver: Solver, index: Index, done: dict[Index, Found],
-           monitor: Monitor | None) -> CellResult:
-    """Return what became of a cell, and keep its motion for the neighbours."""
-    result, found = _solved(study, solver, index, done, monitor)
-    if found is not None and (result.code is CellCode.SOLVED or isinstance(found, MinDuration)):
-        done[index] = found
-    return result
+class _Block:
+    """A block on its way: what was found so far, and what each cell started from."""
 
+    def __init__(self, study: Study, block: Block, monitor: Monitor | None) -> None:
+        self._study, self._monitor, self._solver = study, monitor, Solver(study)
+        self._cells = list(product(*(range(part.start, part.stop) for part in block)))
+        self._results = {result.index: result for result in study.known_failures(block)}
+        self._done: dict[Index, Found] = {}
+        self._starts: dict[Index, Neighbours] = {}
 
-def _together(first: CellResult, second: CellResult) -> CellResult:
-    """Return the second try of a cell with the cost of both."""
-    return replace(second, iterations=first.iterations + second.iterations,
-                   seconds=first.seconds + second.seconds)
+    def results(self) -> list[CellResult]:
+        """Return what became of the cells."""
+        for index in self._cells:
+            if index not in self._results:
+                self._results[index] = self._added(index)
+        # what did not converge may do so from the neighbours on the other sides
+        for index in reversed(self._cells):
+            if self._results[index].code is CellCode.NOT_CONVERGED:
+                self._try_again(index)
+        return [self._results[index] for index in self._cells]
 
+    def _try_again(self, index: Index) -> None:
+        """Solve a cell once more, unless it would start as it did."""
+        first = self._results[index]
+        start = _neighbours(self._study, index, self._study.task(index), self._done)
+        if start == self._starts[index]:
+            return
+        second = self._added(index)
+        self._results[index] = replace(second, iterations=first.iterations + second.iterations,
+                                       seconds=first.seconds + second.seconds)
 
-def _solved(study: Study, solver: Solver, index: Index, done: dict[Index, Found],
-            monitor: Monitor | None) -> tuple[CellResult, Found | None]:
-    """Return what became of a cell, and the motion for its neighbours."""
-    began, limited = time.monotonic(), Monitor(time_limit=study.cell_time_limit)
-    if monitor is not None:
-        limited.canceled = monitor.canceled
-    found, start = None, Neighbours()
-    try:
-        task = study.task(index)
-        start = _neighbours(study, index, task, done)
-        found = solver.solve(index, task, limited, *start)
-        result = solver.result(index, found)
-    except StoppedError as stop:
-        result = CellResult(index=index, code=CellCode.of(STATUSES[stop.reason]),
-                            message=str(stop))
-    except (UnreachableError, SingularError) as error:
-        result = CellResult(index=index, code=CellCode.UNREACHABLE, message=str(error))
-    except FlexPlannerError as error:
-        result = CellResult(index=index, code=CellCode.INVALID, message=str(error))
-    except Exception as error:  # one cell must not cost the others
-        result = CellResult(index=index, code=CellCode.FAILED,
-                            message=f'{type(error).__name__}: {error}')
-    return replace(result, message=result.message[:_LONGEST_MESSAGE], warm=start.near is not None,
-                   seconds=time.monotonic() - began), found
+    def _added(self, index: Index) -> CellResult:
+        """Return what became of a cell, and keep its motion for the neighbours."""
+        began, limited = time.monotonic(), Monitor(time_limit=self._study.cell_time_limit)
+        if self._monitor is not None:
+            limited.canceled = self._monitor.canceled
+        result = self._solved(index, limited)
+        start = self._starts.get(index, Neighbours())
+        return replace(result, message=result.message[:_LONGEST_MESSAGE],
+                       warm=start.near is not None, seconds=time.monotonic() - began)
+
+    def _solved(self, index: Index, monitor: Monitor) -> CellResult:
+        """Solve a cell; whatever happens is a result."""
+        try:
+            task = self._study.task(index)
+            start = self._starts[index] = _neighbours(self._study, index, task, self._done)
+            found = self._solver.solve(index, task, monitor, *start)
+            result = self._solver.result(index, found)
+            if result.code is CellCode.SOLVED or isinstance(found, MinDuration):
+                self._done[index] = found
+            return result
+        except StoppedError as stop:
+            return CellResult(index=index, code=CellCode.of(STATUSES[stop.reason]),
+                              message=str(stop))
+        except (UnreachableError, SingularError) as error:
+            return CellResult(index=index, code=CellCode.UNREACHABLE, message=str(error))
+        except FlexPlannerError as error:
+            return CellResult(index=index, code=CellCode.INVALID, message=str(error))
+        except Exception as error:  # one cell must not cost the others
+            return CellResult(index=index, code=CellCode.FAILED,
+                              message=f'{type(error).__name__}: {error}')
 
 
 def _neighbours(study: Study, index: Index, task: Task,
@@ -124,9 +137,8 @@ def _neighbours(study: Study, index: Index, task: Task,
                 continue
             if far is not None and type(far) is type(near):
                 here, values = index[axis], study.axes[axis].values
-                ratio = ((values[here] - values[here - back])
-                         / (values[here - back] - values[here - 2 * back]))
-                return Neighbours(near, far, float(ratio))
+                return Neighbours(near, far, step_ratio(
+                    values[here - 2 * back], values[here - back], values[here]))
             best = best if best.near is not None else Neighbours(near)
     return best
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 import logging
-import os
 import signal
 
 import dask
@@ -13,13 +12,12 @@ from dask.system import CPU_COUNT
 from distributed import Client, LocalCluster, Worker, WorkerPlugin
 from distributed.system import MEMORY_LIMIT
 from flex_planner.errors import FlexPlannerError
+from flex_planner.processors import one_thread_each
 
 ATTEMPTS = 3  # at a block that ends its process, or raises
 LOST = 'the scheduler was lost; finished blocks are kept, and are not computed again'
 _CONNECTING = 10.0  # [s]
 _CLOSING = 5.0  # [s]
-# a block is solved in one thread; more of them would only be in each other's way
-_SINGLE = dict.fromkeys(('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS'), '1')
 _SHARE = 0.9  # of the memory, for all workers together
 _SETTINGS = {
     'distributed.scheduler.allowed-failures': ATTEMPTS - 1,
@@ -59,7 +57,7 @@ def local_cluster(workers: int) -> Iterator[Client]:
         If they cannot be started.
 
     """
-    with _quiet(), _environment(_SINGLE), dask.config.set(_SETTINGS):
+    with _quiet(), one_thread_each(), dask.config.set(_SETTINGS):
         try:
             cluster = LocalCluster(
                 n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None,
@@ -115,18 +113,6 @@ def threads(client: Client) -> dict[str, int]:
     except Exception as error:
         raise ClusterError(LOST) from error
     return threads
-
-
-@contextmanager
-def _environment(values: dict[str, str]) -> Iterator[None]:
-    """Set environment variables for a while; Dask hands them on, and adds some of its own."""
-    before = dict(os.environ)
-    os.environ.update(values)
-    try:
-        yield
-    finally:
-        os.environ.clear()
-        os.environ.update(before)
 
 
 @contextmanager

@@ -9,6 +9,8 @@ from flex_planner.duration import payload_against_duration
 from flex_planner.execution import Outcome, Way
 from flex_planner.paper.cases import (
     certified,
+    enclosed,
+    largest,
     NoPlanError,
     paper_arm,
     point_to_point,
@@ -23,7 +25,6 @@ from flex_planner.paper.evidence import (
     Section,
     Table,
 )
-from flex_planner.payload import find_max_payload, MaxPayload
 from flex_planner.task import Task
 from flex_planner.validation import Array
 import numpy as np
@@ -66,7 +67,7 @@ def front(*, reduced: bool = False) -> Section:
 
 def _front(task: Task, name: str, color: str) -> Curve:
     """Return the least effort of light payloads and of those that the search met."""
-    found = _searched(task).front
+    found = largest(task).front
     light = [(payload, certified(point_to_point(task.arm, payload)).cost) for payload in _GRID]
     heavy = [(float(payload), float(effort))
              for payload, effort in zip(found.payloads, found.efforts, strict=True)
@@ -76,29 +77,19 @@ def _front(task: Task, name: str, color: str) -> Curve:
 
 
 def _against_duration(task: Task, durations: Array, name: str, color: str) -> Curve:
-    found = [_solved(one) for one in payload_against_duration(task, durations)]
+    found = [enclosed(one) for one in payload_against_duration(task, durations)]
     return Curve(x=np.array([one.task.duration for one in found]),
                  y=np.array([one.payload for one in found]), label=name, color=color, style='.-')
-
-
-def _searched(task: Task, accuracy: float = 1e-3) -> MaxPayload:
-    return _solved(find_max_payload(task, accuracy=accuracy))
-
-
-def _solved(found: MaxPayload) -> MaxPayload:
-    if not found.solved:
-        raise NoPlanError(f'{found.task.arm.name}, {found.task.duration:g} s: {found.message}')
-    return found
 
 
 def clamped(*, reduced: bool = False) -> Section:
     """Return what links carry that are clamped to their hubs, as real ones are."""
     rigidities = () if reduced else tuple(
         rigidity for rigidity in STIFFNESS_LIMITS if not math.isinf(rigidity))
-    pinned = {rigidity: _searched(point_to_point(paper_arm(rigidity, 1), 1.0))
+    pinned = {rigidity: largest(point_to_point(paper_arm(rigidity, 1), 1.0))
               for rigidity in rigidities}
-    built_in = {rigidity: _searched(point_to_point(paper_arm(rigidity, 1, 'clamped_free'), 1.0),
-                                    _CLAMPED_ACCURACY) for rigidity in rigidities}
+    built_in = {rigidity: largest(point_to_point(paper_arm(rigidity, 1, 'clamped_free'), 1.0),
+                                  _CLAMPED_ACCURACY) for rigidity in rigidities}
     light = certified(point_to_point(paper_arm(50.0, 1, 'clamped_free'), 1.0))
     rows = tuple((f'{rigidity:g}', f'{STIFFNESS_LIMITS[rigidity]:g}',
                   f'{pinned[rigidity].payload:.4f}', f'{found.payload:.4f} - {found.upper:.4f}')
@@ -167,7 +158,7 @@ def modes(*, reduced: bool = False) -> Section:
     counts = (1, 2) if reduced else (1, 2, 3, 4)
     costs = {count: certified(point_to_point(paper_arm(_SOFT, count), 1.0)).cost
              for count in counts}
-    limits = {count: _searched(point_to_point(paper_arm(_SOFT, count), 1.0)) for count in counts}
+    limits = {count: largest(point_to_point(paper_arm(_SOFT, count), 1.0)) for count in counts}
     rows = tuple((str(count), f'{costs[count]:.9f}', f'{one.payload:.5f} - {one.upper:.5f}')
                  for count, one in limits.items())
     return Section(

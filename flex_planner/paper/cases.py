@@ -9,6 +9,7 @@ from flex_planner.arm import Arm, Joint, Link, Motor, Node
 from flex_planner.arm_files import load_arm
 from flex_planner.errors import FlexPlannerError
 from flex_planner.path import plan_path
+from flex_planner.payload import find_max_payload, MaxPayload
 from flex_planner.plan import Plan
 from flex_planner.task import postures_from_points, Task
 import numpy as np
@@ -70,6 +71,26 @@ def turn(arm: Arm, modal_weight: float = 0.0) -> Task:
     weights = np.array([0.0, 0.0, modal_weight, modal_weight]) if modal_weight else np.zeros(0)
     return Task(arm=arm, start_positions=np.array(start), goal_positions=np.array(goal),
                 duration=duration, velocity_weights=weights, tolerance=EPSILON)
+
+
+def largest(task: Task, accuracy: float = 1e-3) -> MaxPayload:
+    """
+    Return the largest payload of a task, to an accuracy [kg].
+
+    Raises
+    ------
+    NoPlanError
+        If it is not found.
+
+    """
+    return enclosed(find_max_payload(task, accuracy=accuracy))
+
+
+def enclosed(found: MaxPayload) -> MaxPayload:
+    """Return a search that succeeded; NoPlanError for others."""
+    if not found.solved:
+        raise NoPlanError(f'{found.task.arm.name}, {found.task.duration:g} s: {found.message}')
+    return found
 
 
 def certified(task: Task, start_from: Plan | None = None) -> Plan:

@@ -9,6 +9,7 @@ from flex_planner.paper.cases import (
     ACCURACY,
     certified,
     EPSILON,
+    largest,
     LIMITS,
     NoPlanError,
     paper_arm,
@@ -21,7 +22,6 @@ from flex_planner.paper.diagrams import joint_panels, POINTS, tip_panel
 from flex_planner.paper.evidence import Claim, confirmed_if, Picture, Section, Table, Verdict
 from flex_planner.payload import find_max_payload, MaxPayload, PayloadMethod
 from flex_planner.plan import peaks, Plan, Samples
-from flex_planner.task import Task
 from flex_planner.validation import Array
 import numpy as np
 
@@ -32,9 +32,9 @@ _NEARLY_ALL = 0.95  # of the time
 
 def study(*, reduced: bool = False) -> Section:
     """Return what came of section 5.3."""
-    found = {_RIGID: _largest(point_to_point(paper_arm(_RIGID), 1.0))}
+    found = {_RIGID: largest(point_to_point(paper_arm(_RIGID), 1.0))}
     if not reduced:
-        found |= {rigidity: _largest(point_to_point(paper_arm(rigidity), 1.0))
+        found |= {rigidity: largest(point_to_point(paper_arm(rigidity), 1.0))
                   for rigidity in STIFFNESS_LIMITS if not math.isinf(rigidity)}
     rigid = _plan_of(found[_RIGID])
     light = {payload: certified(point_to_point(rigid.arm, payload)) for payload in PAYLOADS}
@@ -70,13 +70,6 @@ def study(*, reduced: bool = False) -> Section:
 
 def _named(rigidity: float) -> str:
     return 'rigid' if math.isinf(rigidity) else f'EI = {rigidity:g} N m^2'
-
-
-def _largest(task: Task) -> MaxPayload:
-    found = find_max_payload(task, accuracy=1e-3)
-    if not found.solved:
-        raise NoPlanError(f'{task.arm.name}: {found.message}')
-    return found
 
 
 def _plan_of(found: MaxPayload) -> Plan:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import as_completed, ProcessPoolExecutor
-from contextlib import contextmanager
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 import multiprocessing
-import os
 from pathlib import Path
+import signal
+import time
 from typing import Protocol
 
 from flex_planner.paper import (
@@ -20,6 +20,8 @@ from flex_planner.paper import (
     slips,
 )
 from flex_planner.paper.evidence import Section
+from flex_planner.processors import one_thread_each
+from flex_planner.progress import StoppedError, StopReason
 
 
 class Study(Protocol):
@@ -36,11 +38,13 @@ STUDIES: dict[str, Study] = {
     '6.2': beyond.clamped, '6.3': beyond.feedforward, '6.4': beyond.modes, '7': slips.study}
 # begun first, as they take longest
 _LONGEST = ('6.2', '6.1', '6.4')
+_OFTEN, _PATIENCE = 0.1, 2.0  # [s], between two looks at Ctrl-C; until a process is killed
 Report = Callable[[str, int, int], None]
 
 
 def computed(keys: Sequence[str], *, reduced: bool, processes: int, report: Report,
-             pictures: Path | None = None) -> dict[str, Section]:
+             pictures: Path | None = None,
+             canceled: Callable[[], bool] = lambda: False) -> dict[str, Section]:
     """
     Return sections by their key, in the order of `STUDIES`.
 
@@ -56,54 +60,58 @@ def computed(keys: Sequence[str], *, reduced: bool, processes: int, report: Repo
         Told of every section that is done: its key, how many are, of how many.
     pictures : Path, optional
         Folder for the pictures; nothing is drawn without.
+    canceled : callable
+        Returns True once the work should stop, which it does at once.
 
     Raises
     ------
     NoPlanError
         If a motion could not be planned.
+    StoppedError
+        If it was canceled.
     OSError
         If a picture cannot be written.
 
     """
     found: dict[str, Section] = {}
-    for key, section in _finished(keys, reduced, processes, pictures):
+    for key, section in _finished(keys, reduced, processes, pictures, canceled):
         found[key] = section
         report(key, len(found), len(keys))
     return {key: found[key] for key in STUDIES if key in found}
 
 
-def _finished(keys: Sequence[str], reduced: bool, processes: int,
-              pictures: Path | None) -> Iterator[tuple[str, Section]]:
+def _finished(keys: Sequence[str], reduced: bool, processes: int, pictures: Path | None,
+              canceled: Callable[[], bool]) -> Iterator[tuple[str, Section]]:
     """Yield sections as they are done."""
     order = sorted(keys, key=lambda key: key not in _LONGEST)
     context = multiprocessing.get_context('spawn')
-    with _one_thread_each(), ProcessPoolExecutor(processes, context) as pool:
+    # Ctrl-C in a terminal reaches all processes, and is for the first one alone
+    pool = ProcessPoolExecutor(processes, context, signal.signal, (signal.SIGINT, signal.SIG_IGN))
+    with one_thread_each(), pool:
+        jobs = {pool.submit(_one, key, reduced, pictures): key for key in order}
         try:
-            jobs = {pool.submit(_one, key, reduced, pictures): key for key in order}
-            for job in as_completed(jobs):
-                yield jobs[job], job.result()
+            left: set[Future[Section]] = set(jobs)
+            while left:
+                done, left = wait(left, _OFTEN, FIRST_COMPLETED)
+                for job in done:
+                    yield jobs[job], job.result()
+                if canceled():
+                    raise StoppedError(StopReason.CANCELED)
         except BaseException:
-            # who waits for Ctrl-C does not wait for what is being computed
-            for process in multiprocessing.active_children():
-                process.terminate()
+            _end_children()
             pool.shutdown(wait=False, cancel_futures=True)
             raise
 
 
-@contextmanager
-def _one_thread_each() -> Iterator[None]:
-    """Keep new processes to one processor: they would only get into each other's way."""
-    names = ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS')
-    before = {name: os.environ.get(name) for name in names}
-    os.environ.update(dict.fromkeys(names, '1'))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+def _end_children() -> None:
+    """End what is being computed, without waiting for its result."""
+    children = multiprocessing.active_children()
+    for process in children:
+        process.terminate()
+    until = time.monotonic() + _PATIENCE
+    for process in children:
+        process.join(max(0.0, until - time.monotonic()))
+        process.kill()
 
 
 def _one(key: str, reduced: bool, pictures: Path | None) -> Section:

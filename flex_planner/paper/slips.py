@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 import math
 
 from flex_planner.certify import hamiltonian_drift
@@ -10,9 +11,14 @@ from flex_planner.inverse_kinematics import inverse_kinematics
 from flex_planner.kinematics import tip_position
 from flex_planner.model import ArmModel, Parameters
 from flex_planner.motion import MotionProblem, task_parameters
-from flex_planner.paper.cases import certified, NoPlanError, paper_arm, point_to_point
+from flex_planner.paper.cases import (
+    certified,
+    largest,
+    NoPlanError,
+    paper_arm,
+    point_to_point,
+)
 from flex_planner.paper.evidence import Section, Table
-from flex_planner.payload import find_max_payload
 from flex_planner.statics import natural_modes
 from flex_planner.validation import Array
 import numpy as np
@@ -70,10 +76,7 @@ def _angle() -> Rows:
     arm = paper_arm(math.inf)
     tips = [tip_position(arm, np.radians([[60.0, angle]]))[0] for angle in (-60.0, -120.0)]
     right = point_to_point(arm, 1.0)
-    wrong = find_max_payload(right.__class__(
-        arm=arm, start_positions=np.radians([60.0, -60.0]),
-        goal_positions=right.goal_positions, duration=right.duration, payload_mass=1.0,
-        effort_weights=right.effort_weights))
+    wrong = largest(replace(right, start_positions=np.radians([60.0, -60.0])))
     solved = np.degrees(inverse_kinematics(arm, np.array([0.5, 0.0]), elbow=-1))
     return [('(28): theta_2(0) = -60 deg', '-120 deg',
              f'With theta_1 = 60 deg the tip is at ({tips[0][0]:.3f}, {tips[0][1]:.3f}) m for -60 '

@@ -44,9 +44,9 @@ def _draw(axes: Axes, panel: Panel) -> None:
 
 
 def _add_legends(figure: Figure, axes: Sequence[Axes], columns: int) -> None:
-    """Say what the lines are: once below where all diagrams have the same, else in each."""
+    """Say what the lines are: once below where the first diagram has them all, else in each."""
     handles, labels = axes[0].get_legend_handles_labels()
-    if all(one.get_legend_handles_labels()[1] == labels for one in axes):
+    if all(set(one.get_legend_handles_labels()[1]) <= set(labels) for one in axes):
         figure.legend(handles, labels, loc='outside lower center', ncols=columns,
                       fontsize='small')
     else:

@@ -1,0 +1,27 @@
+"""How processes that compute side by side share the processors."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+import os
+
+_ONE_THREAD = dict.fromkeys(('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS'), '1')
+
+
+@contextmanager
+def one_thread_each() -> Iterator[None]:
+    """
+    Let processes that are started meanwhile compute in one thread each.
+
+    Their linear algebra would otherwise take all processors in each of them. The environment is
+    as it was afterwards, whatever else was added to it.
+
+    """
+    before = dict(os.environ)
+    os.environ.update(_ONE_THREAD)
+    try:
+        yield
+    finally:
+        os.environ.clear()
+        os.environ.update(before)
