@@ -228,11 +228,12 @@ def test_payload_of_an_arm_that_bends_grows_with_the_duration(ei5_model: ArmMode
 
 def test_duration_that_is_too_short_is_passed_over(rigid_model: ArmModel,
                                                    paper_task: TaskFactory) -> None:
-    short, first, second = payload_against_duration(paper_task(rigid_model.arm), [0.6, 1.0, 1.05],
-                                                    model=rigid_model)
+    short, first, second, third = payload_against_duration(
+        paper_task(rigid_model.arm), [0.6, 1.0, 1.05, 1.1], model=rigid_model)
     assert short.status is PlanStatus.INFEASIBLE
     assert first.payload <= HEAVIEST <= first.upper
     assert second.iterations < first.iterations
+    assert third.iterations < first.iterations / 2  # two neighbours tell where the motion goes
 
 
 def test_durations_are_searched_one_by_one(rigid_model: ArmModel, paper_task: TaskFactory) -> None:
