@@ -12,8 +12,8 @@ from dataclasses import dataclass, field, replace
 
 from flex_planner.collocation import CollocationSolution, Settings, solve
 from flex_planner.errors import InvalidTaskError
-from flex_planner.families import changed, durations, Stop
-from flex_planner.family_starts import quickest
+from flex_planner.families import changed, durations, Start, Stop
+from flex_planner.family_starts import quickest, taken_over
 from flex_planner.ladder import LADDER, planned, STATUSES, STOPPED
 from flex_planner.limit_search import collected, is_near, middle, plan_near, way_to, width
 from flex_planner.model import ArmModel
@@ -189,7 +189,9 @@ def _stops(problem: MotionProblem, settings: Settings, monitor: Monitor, accurac
     way, bare = way_to(accuracy, settings), without_weights(problem)
     for factor in _LONGER:
         slow = changed(bare, duration=min(factor * problem.task.duration, MAX_DURATION))
-        stops = collected(quickest(slow, way, monitor, start=start,
+        first = None if start is None else taken_over(slow, Start.of(start), way, monitor,
+                                                      payload=False)
+        stops = collected(quickest(slow, way, monitor, first=first,
                                    enough=lambda duration: width(accuracy, duration)), accuracy)
         if stops[0].result.converged or stops[0].stopped:
             break

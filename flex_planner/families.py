@@ -103,6 +103,30 @@ class Stop:
         return reserve(self.problem, self.result.solution) / self.price
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Start:
+    """
+    What a search may start from: a motion on the way to the limit of a similar task.
+
+    Attributes
+    ----------
+    value, price : float
+        As of `Stop`.
+    solution : CollocationSolution
+        Of that motion.
+
+    """
+
+    value: float
+    price: float
+    solution: CollocationSolution
+
+    @classmethod
+    def of(cls, stop: Stop) -> Start:
+        """Return a stop as a start."""
+        return cls(value=stop.value, price=stop.price, solution=stop.result.solution)
+
+
 def reserve(problem: MotionProblem, solution: CollocationSolution) -> float:
     """
     Return what the cost of a motion would grow by with every motor on its limit all the time.

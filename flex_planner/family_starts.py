@@ -15,6 +15,7 @@ from flex_planner.families import (
     Family,
     no_aim,
     payloads,
+    Start,
     Stop,
     worth,
     worth_time,
@@ -31,30 +32,29 @@ _LIFT, _LIFTS, _MOST_RIGID = 0.03, 3, 15
 
 
 def heaviest(problem: MotionProblem, settings: Settings, monitor: Monitor, *,
-             start: Stop | None = None, enough: Enough = no_aim) -> Iterator[Stop]:
+             first: Stop | None = None, enough: Enough = no_aim) -> Iterator[Stop]:
     """
     Yield heavier and heavier payloads from that of the problem on.
 
     A flexible arm starts from the heavy end of the same arm made rigid: where the payload is free
     at a price its motion is near, while with a given payload the phase of what rings is not.
-    Where that fails it starts from the payload of the problem. The first to be tried is a motion
-    of a similar task, if one is given.
+    Where that fails it starts from the payload of the problem. A first motion that is known, see
+    `taken_over`, spares all that.
 
     """
-    return _family(problem, payloads, settings, monitor, start, enough)
+    return _family(problem, payloads, settings, monitor, first, enough)
 
 
 def quickest(problem: MotionProblem, settings: Settings, monitor: Monitor, *,
-             start: Stop | None = None, enough: Enough = no_aim) -> Iterator[Stop]:
+             first: Stop | None = None, enough: Enough = no_aim) -> Iterator[Stop]:
     """Yield shorter and shorter durations from that of the problem on, see `heaviest`."""
-    return _family(problem, durations, settings, monitor, start, enough)
+    return _family(problem, durations, settings, monitor, first, enough)
 
 
 def _family(problem: MotionProblem, family: Family, settings: Settings, monitor: Monitor,
-            start: Stop | None, enough: Enough) -> Iterator[Stop]:
+            first: Stop | None, enough: Enough) -> Iterator[Stop]:
     """Yield the motions of a family, the first one included."""
     payload = family is payloads
-    first = None if start is None else _taken_over(problem, start, payload, settings, monitor)
     if first is None and problem.model.arm.n_modes:
         rigid = _rigid_stops(problem, family, settings, monitor)
         first = _lifted_first(problem, rigid, payload, settings, monitor)
@@ -95,25 +95,39 @@ def _lifted_first(problem: MotionProblem, stops: list[Stop], payload: bool, sett
     for stop in reversed(stops[-_LIFTS:]):
         if stop.stopped:
             return stop
-        found = _taken_over(problem, stop, payload, settings, monitor)
+        found = taken_over(problem, Start.of(stop), settings, monitor, payload=payload)
         if found is not None:
             return found
     return None
 
 
-def _taken_over(problem: MotionProblem, stop: Stop, payload: bool, settings: Settings,
-                monitor: Monitor) -> Stop | None:
-    """Return the motion at the price of another arm's or task's; None if there is none beyond."""
-    solution, price = stop.result.solution, stop.price
+def taken_over(problem: MotionProblem, start: Start, settings: Settings, monitor: Monitor, *,
+               payload: bool) -> Stop | None:
+    """
+    Return the motion at the price of another arm's or task's; None if there is none beyond.
+
+    Parameters
+    ----------
+    problem : MotionProblem
+        With the least payload, or the longest duration, that is of interest.
+    start : Start
+        Of the other arm or task.
+    settings, monitor
+        Of the solver.
+    payload : bool
+        Whether the payload is free, else the duration.
+
+    """
+    solution, price = start.solution, start.price
     if solution.nodes.shape[1] not in (problem.size, 4 * problem.model.arm.n_joints):
         return None  # of an arm with other modes
     try:
         if payload:
-            near = changed(problem, payload_mass=stop.value)
+            near = changed(problem, payload_mass=start.value)
             found = worth(near, _fitted(near, solution, settings), price, settings, monitor)
             beyond = found is not None and found.value > problem.task.payload_mass
         else:
-            near = changed(problem, duration=stop.value)
+            near = changed(problem, duration=start.value)
             found = worth_time(near, _fitted(near, solution, settings), price, settings, monitor)
             beyond = found is not None and found.value < problem.task.duration
     except FlexPlannerError:  # too heavy to hold

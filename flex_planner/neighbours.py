@@ -100,7 +100,7 @@ def foreseen(problem: MotionProblem, before: Stop, here: Stop, ratio: float, set
     try:
         near = (changed(problem, payload_mass=value) if payload
                 else changed(problem, duration=value))
-        guess = continued(_thinned(before, settings), _thinned(here, settings), ratio,
+        guess = continued(thinned(before, settings), thinned(here, settings), ratio,
                           near.task.duration)
         found = (worth if payload else worth_time)(near, guess, here.price, few, monitor)
     except FlexPlannerError:  # too heavy to hold, or no duration
@@ -112,7 +112,7 @@ def foreseen(problem: MotionProblem, before: Stop, here: Stop, ratio: float, set
     return found if beyond else None
 
 
-def _thinned(stop: Stop, settings: Settings) -> Switched:
+def thinned(stop: Stop, settings: Settings) -> Switched:
     """Return a motion on as few intervals as its exactness needs: else meshes only grow."""
     solution, result = stop.result.solution, stop.result
     error = float(result.errors.max()) / (_MARGIN * settings.error_tolerance)

@@ -7,7 +7,7 @@ Optimal paths for a given payload: Korayem et al. 2009, section 4.1.
 
 from __future__ import annotations
 
-from flex_planner.collocation import Settings
+from flex_planner.collocation import CollocationSolution, Settings
 from flex_planner.ladder import LADDER, planned
 from flex_planner.model import ArmModel
 from flex_planner.motion import MotionProblem, task_parameters
@@ -18,9 +18,12 @@ from flex_planner.strategies import warm_start
 from flex_planner.task import Task
 from flex_planner.weight_search import adapted
 
+WARM_START = 'warm start'
+
 
 def plan_path(task: Task, *, model: ArmModel | None = None, settings: Settings | None = None,
-              monitor: Monitor | None = None, start_from: Plan | None = None,
+              monitor: Monitor | None = None,
+              start_from: Plan | CollocationSolution | None = None,
               objectives: Objectives | None = None) -> Plan:
     """
     Plan the motion of a task that minimises eq. (6) within the motor limits of eq. (15).
@@ -35,9 +38,9 @@ def plan_path(task: Task, *, model: ArmModel | None = None, settings: Settings |
         Of the boundary-value solver.
     monitor : Monitor, optional
         Receives progress, and may cancel or limit the time.
-    start_from : Plan, optional
-        A solved plan of a similar task, tried first; any mesh, any duration, the same number of
-        coordinates.
+    start_from : Plan or CollocationSolution, optional
+        A solved plan of a similar task, or its solution, tried first; any mesh, any duration, the
+        same number of coordinates.
     objectives : Objectives, optional
         What the motion must keep besides: weights of the task are raised until it does, fig. 1
         of the paper. `Plan.objectives` tells how.
@@ -57,9 +60,8 @@ def plan_path(task: Task, *, model: ArmModel | None = None, settings: Settings |
     settings, monitor = settings or Settings(), monitor or Monitor()
     model = model or ArmModel(task.arm)
     problem = MotionProblem(model, task, task_parameters(task))
-    rungs = LADDER
-    if start_from is not None and start_from.solution is not None:
-        rungs = (('warm start', warm_start(start_from.solution)), *LADDER)
+    start = start_from.solution if isinstance(start_from, Plan) else start_from
+    rungs = LADDER if start is None else ((WARM_START, warm_start(start)), *LADDER)
     if objectives is not None:
         objectives.check(task)
     plan = planned(problem, rungs, settings, monitor)

@@ -16,8 +16,8 @@ from enum import Enum
 from flex_planner.certify import totals
 from flex_planner.collocation import CollocationSolution, Settings, solve
 from flex_planner.errors import InvalidTaskError
-from flex_planner.families import changed, payloads, Stop
-from flex_planner.family_starts import heaviest
+from flex_planner.families import changed, payloads, Start, Stop
+from flex_planner.family_starts import heaviest, taken_over
 from flex_planner.incremental import PayloadTrial, raised_payload
 from flex_planner.ladder import LADDER, planned, STATUSES, STOPPED
 from flex_planner.limit_search import collected, is_near, middle, plan_near, way_to, width
@@ -100,6 +100,8 @@ class MaxPayload:
         Payloads tried; empty if not searched by the incremental method.
     stops : tuple of Stop
         The motions of the front.
+    warm : bool
+        Whether it went on from the motion that it was given to start from.
     iterations : int
         Newton iterations.
     planning_time : float
@@ -119,6 +121,7 @@ class MaxPayload:
     front: PayloadFront = field(default_factory=PayloadFront)
     trials: tuple[PayloadTrial, ...] = ()
     stops: tuple[Stop, ...] = field(default=(), repr=False)
+    warm: bool = False
     iterations: int = 0
     planning_time: float = 0.0
 
@@ -136,7 +139,8 @@ class MaxPayload:
 def find_max_payload(task: Task, *, model: ArmModel | None = None,
                      settings: Settings | None = None, monitor: Monitor | None = None,
                      method: PayloadMethod = PayloadMethod.DIRECT, accuracy: float = 1e-3,
-                     step: float | None = None, start_from: MaxPayload | None = None,
+                     step: float | None = None,
+                     start_from: MaxPayload | Start | None = None,
                      before: MaxPayload | None = None, ratio: float = 1.0) -> MaxPayload:
     """
     Find the largest payload that the arm can carry from start to goal in the task's duration.
@@ -159,10 +163,10 @@ def find_max_payload(task: Task, *, model: ArmModel | None = None,
     step : float, optional
         First step of the incremental method, `accuracy` to 1e6; 1 or `accuracy` if that is more
         [kg].
-    start_from : MaxPayload, optional
-        A search of a similar task by the direct method, tried first.
+    start_from : MaxPayload or Start, optional
+        A search of a similar task by the direct method, or a motion of one, tried first.
     before : MaxPayload, optional
-        The one before `start_from` on a line of tasks: the motion is continued along that line,
+        The search before `start_from` on a line of tasks: the motion is continued along that line,
         which takes a fraction of the time where motors switch alike.
     ratio : float
         Of the step from `start_from` to this task to the step before, within +-100.
@@ -228,20 +232,21 @@ class _Search:
         self._problem, self._settings, self._monitor = problem, settings, monitor
         self._accuracy = accuracy
         self._stops: list[Stop] = []
+        self._warm = False
 
     def failed(self, method: PayloadMethod, status: PlanStatus, message: str,
                trials: Iterable[PayloadTrial] = ()) -> MaxPayload:
         """Return the outcome of a search that found no plan."""
         return MaxPayload(task=self._problem.task, method=method, status=status, message=message,
                           front=_front(self._stops), stops=_priced(self._stops),
-                          trials=tuple(trials))
+                          trials=tuple(trials), warm=self._warm)
 
-    def direct(self, start: MaxPayload | None, before: MaxPayload | None,
+    def direct(self, start: MaxPayload | Start | None, before: MaxPayload | None,
                ratio: float) -> MaxPayload:
         """Follow the price to the limit, then plan there."""
-        exact = self._continued(start, before, ratio)
+        exact = isinstance(start, MaxPayload) and self._continued(start, before, ratio)
         if not exact:
-            failure = self._follow_price(start.middle if start else None)
+            failure = self._follow_price(_start(start))
             if failure is not None:
                 return failure
         last = self._stops[-1]
@@ -253,7 +258,8 @@ class _Search:
         found = MaxPayload(task=self._problem.task, method=PayloadMethod.DIRECT,
                            status=plan.status, message=plan.message,
                            front=_front(self._stops), stops=_priced(self._stops),
-                           payload=last.value, upper=last.value + last.room, plan=plan)
+                           payload=last.value, upper=last.value + last.room, plan=plan,
+                           warm=exact or self._warm)
         if not near:
             found = self._held(last, found)
         if not plan.solved or found.status in STOPPED.values():
@@ -263,22 +269,22 @@ class _Search:
                 f'{found.payload:.6g} kg can be carried, but it was not shown that no more can'))
         return _described(found)
 
-    def _continued(self, start: MaxPayload | None, before: MaxPayload | None,
-                   ratio: float) -> bool:
+    def _continued(self, start: MaxPayload, before: MaxPayload | None, ratio: float) -> bool:
         """Collect the stops that two searches lead to; False without success."""
         self._monitor.phase = 'payload at a rising price'
         self._stops = continued_stops(
-            without_weights(self._problem), before.stops if before else (),
-            start.stops if start else (), ratio, self._accuracy, self._settings, self._monitor,
-            payload=True)
+            without_weights(self._problem), before.stops if before else (), start.stops, ratio,
+            self._accuracy, self._settings, self._monitor, payload=True)
         return bool(self._stops)
 
-    def _follow_price(self, start: Stop | None) -> MaxPayload | None:
+    def _follow_price(self, start: Start | None) -> MaxPayload | None:
         """Collect stops up to the limit; return the failure if there is no first motion."""
         bare, monitor = without_weights(self._problem), self._monitor
         way = way_to(self._accuracy, self._settings)
         monitor.phase = 'payload at a rising price'
-        self._stops = collected(heaviest(bare, way, monitor, start=start, enough=self._enough),
+        known = None if start is None else taken_over(bare, start, way, monitor, payload=True)
+        self._warm = known is not None
+        self._stops = collected(heaviest(bare, way, monitor, first=known, enough=self._enough),
                                 self._accuracy)
         if self._stops[-1].result.converged or self._stops[-1].stopped:
             return None
@@ -339,6 +345,13 @@ class _Search:
                            message=plan.message, payload=best[0] if plan.solved else 0.0,
                            upper=upper, plan=plan, trials=tuple(trials))
         return _described(found) if plan.solved else found
+
+
+def _start(given: MaxPayload | Start | None) -> Start | None:
+    """Return the motion that a search starts from, if there is one."""
+    if not isinstance(given, MaxPayload):
+        return given
+    return None if given.middle is None else Start.of(given.middle)
 
 
 def _priced(stops: list[Stop]) -> tuple[Stop, ...]:

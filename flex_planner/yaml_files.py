@@ -118,6 +118,13 @@ class Section:
             raise InvalidValueError(self.name(key), value, 'text')
         return value
 
+    def flag(self, key: str, default: bool) -> bool:
+        """Return a field that is true or false."""
+        value = self._left.pop(key, default)
+        if not isinstance(value, bool):
+            raise InvalidValueError(self.name(key), value, 'true or false')
+        return value
+
     def section(self, key: str, default: object = None) -> Section:
         """Return a mapping inside this one."""
         return Section(self.name(key), self.take(key, default))

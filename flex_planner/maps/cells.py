@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 import math
 
+from flex_planner.maps.motions import KeptMotion
 from flex_planner.plan import PlanStatus
 
 
@@ -83,6 +84,8 @@ class CellResult:
         That it took.
     warm : bool
         Whether it started from a neighbour.
+    motion : KeptMotion or None
+        For others to start from; None unless solved.
 
     """
 
@@ -96,3 +99,4 @@ class CellResult:
     iterations: int = 0
     seconds: float = 0.0
     warm: bool = False
+    motion: KeptMotion | None = field(default=None, compare=False, repr=False)

@@ -12,6 +12,9 @@ from typing import Any, TYPE_CHECKING
 from dask import array
 from flex_planner import __version__
 from flex_planner.maps.cells import CellCode
+from flex_planner.maps.motions import signature_fields
+from flex_planner.task import Task
+from numcodecs import Blosc, VLenArray
 import numpy as np
 import xarray as xr
 import yaml
@@ -23,6 +26,7 @@ if TYPE_CHECKING:
 _CONVENTIONS = 'CF-1.11'
 _LIBRARIES = ('casadi', 'numpy', 'scipy', 'xarray', 'zarr')
 _TEXT = np.dtype('O', metadata={'element_type': str})  # how xarray marks text of any length
+MOTIONS = 'motions'  # a group of its own, which xarray leaves alone
 # type, what stands where nothing is written, metadata; the quantity itself comes first
 BESIDE: dict[str, tuple[Any, float | None, dict[str, str]]] = {
     'bound': (float, np.nan, {'long_name': 'bound of the true value'}),
@@ -59,7 +63,26 @@ def write_empty(path: Path, study: Study) -> None:
     dataset.to_zarr(path, mode='w-', compute=False, consolidated=True, zarr_format=2,
                     safe_chunks=False,
                     encoding={**encoding, **{name: {'_FillValue': None} for name in names}})
-    zarr.open_group(str(path), mode='r+')['code'][...] = CellCode.PENDING
+    group = zarr.open_group(str(path), mode='r+')
+    group['code'][...] = CellCode.PENDING
+    if study.keeps_motions:
+        _add_motions(group, study)
+
+
+def _add_motions(group: Any, study: Study) -> None:
+    """Make room for what other motions may start from."""
+    arm = study.arm
+    names = signature_fields(Task(arm=arm, start_positions=np.zeros(arm.n_joints),
+                                  goal_positions=np.zeros(arm.n_joints), duration=1.0))
+    motions = group.create_group(MOTIONS)
+    motions.attrs.update({'signature': names, 'comment': (
+        'motion: payload [kg], price dJ/dm_p [1/kg], number of nodes, their times [s], and '
+        'z = (q, dq/dt, psi_1, psi_2) at each of them; signature: what it solves')})
+    motions.create_dataset('signature', shape=(*study.shape, len(names)), dtype='f8',
+                           chunks=(*study.block_shape, len(names)), fill_value=np.nan)
+    motions.create_dataset('motion', shape=study.shape, chunks=study.block_shape, dtype=object,
+                           object_codec=VLenArray('<f4'), compressor=Blosc('zstd', 5, 0),
+                           fill_value=None)
 
 
 def _flags() -> dict[str, Any]:

@@ -6,15 +6,19 @@ from dataclasses import dataclass
 import math
 from typing import Any, TypeAlias
 
+from flex_planner.collocation import Settings
 from flex_planner.comparison import finely_sampled
 from flex_planner.duration import find_min_duration, MinDuration
 from flex_planner.execution import carried_out, Setting, Way
+from flex_planner.families import on_the_way
 from flex_planner.joint_control import Gains
 from flex_planner.kinematics import tip_position
 from flex_planner.maps.cells import CellCode, CellResult
+from flex_planner.maps.motions import KeptMotion
 from flex_planner.maps.quantities import Quantity
 from flex_planner.maps.study import Study
 from flex_planner.model import ArmModel
+from flex_planner.neighbours import thinned
 from flex_planner.path import plan_path
 from flex_planner.payload import find_max_payload, MaxPayload
 from flex_planner.plan import Plan
@@ -132,7 +136,17 @@ class Solver:
         value, bound = _value(found)
         return CellResult(index=index, code=code, message=solution.message, value=value,
                           bound=bound, cost=plan.cost, tip_error=plan.certificate.tip_error,
-                          iterations=solution.iterations)
+                          iterations=solution.iterations,
+                          motion=_kept(found, plan) if self._study.keeps_motions else None)
+
+
+def _kept(found: Found, plan: Plan) -> KeptMotion | None:
+    """Return what others may start from: near a limit, the last motion but one on the way."""
+    if isinstance(found, MaxPayload) and found.stops:
+        stop = found.stops[-2:][0]
+        motion = thinned(stop, on_the_way(Settings()))
+        return KeptMotion.of(stop.problem, motion.solution, stop.price)
+    return None if plan.solution is None else KeptMotion.of(plan.problem, plan.solution)
 
 
 def _may_be_none(task: Task, near: MaxPayload | None, far: MaxPayload | None,

@@ -20,7 +20,7 @@ from typing import Any, NoReturn, TYPE_CHECKING
 
 from flex_planner.errors import FlexPlannerError
 from flex_planner.maps.cells import CellCode, CellResult
-from flex_planner.maps.layout import BESIDE, differences, metadata, write_empty
+from flex_planner.maps.layout import BESIDE, differences, metadata, MOTIONS, write_empty
 import numpy as np
 from numpy.typing import NDArray
 import xarray as xr
@@ -54,7 +54,7 @@ class MapStore:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._group = _opened(path, 'r+')
+        self._group = opened_group(path, 'r+')
         self._key: str = self._group.attrs['quantity']
         self._lock = _locked(path)
         self.codes = _readable_codes(self._group['code'])
@@ -155,6 +155,7 @@ class MapStore:
         shape = tuple(part.stop - part.start for part in block)
         ordered = sorted(results, key=lambda result: result.index)
         try:
+            self._write_motions(block, ordered, shape)
             for name in (self._key, *BESIDE):
                 target = self._group[name]
                 values = np.empty(len(ordered), dtype=target.dtype)
@@ -164,6 +165,22 @@ class MapStore:
         except OSError as error:
             _tell(error, self.path, 'finished blocks are kept')
         self.codes[block] = values.reshape(shape)
+
+    def _write_motions(self, block: Block, ordered: Sequence[CellResult],
+                       shape: tuple[int, ...]) -> None:
+        """Write what other motions may start from."""
+        if MOTIONS not in self._group:
+            return
+        kept = self._group[MOTIONS]
+        signatures = np.full((len(ordered), kept['signature'].shape[-1]), np.nan)
+        motions = np.empty(len(ordered), dtype=object)
+        for k, result in enumerate(ordered):
+            motion = result.motion
+            motions[k] = np.zeros(0, np.float32) if motion is None else motion.packed()
+            if motion is not None:
+                signatures[k] = motion.signature
+        kept['signature'][block] = signatures.reshape(*shape, -1)
+        kept['motion'][block] = motions.reshape(shape)
 
     def dataset(self) -> xr.Dataset:
         """Return what is there, opened; read it before the next block is written."""
@@ -193,18 +210,21 @@ def open_map(path: Path) -> xr.Dataset:
         If there is none.
 
     """
-    _opened(path, 'r')
+    opened_group(path, 'r')
     opened: xr.Dataset = xr.open_zarr(str(path), chunks=None)
     return opened
 
 
-def cells(block: Block) -> list[tuple[int, ...]]:
-    """Return the indices of a block in the order of the grid."""
-    return list(itertools.product(*(range(part.start, part.stop) for part in block)))
+def opened_group(path: Path, mode: str) -> Any:
+    """
+    Return the Zarr group of a map.
 
+    Raises
+    ------
+    MapStoreError
+        If there is none.
 
-def _opened(path: Path, mode: str) -> Any:
-    """Return the group of a store; MapStoreError unless it is a map."""
+    """
     if not path.exists():
         raise MapStoreError(f'there is no map {path}')
     try:
@@ -214,6 +234,11 @@ def _opened(path: Path, mode: str) -> Any:
     except (ValueError, KeyError, FileNotFoundError, NotADirectoryError):
         pass  # what zarr says of a folder that is none of its own
     raise MapStoreError(f'{path} is there, but is no map')
+
+
+def cells(block: Block) -> list[tuple[int, ...]]:
+    """Return the indices of a block in the order of the grid."""
+    return list(itertools.product(*(range(part.start, part.stop) for part in block)))
 
 
 def _locked(path: Path) -> int:

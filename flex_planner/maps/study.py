@@ -73,6 +73,9 @@ class Study:
         Of its joint controller; None for the planned torques alone.
     settling : float
         How long it is watched after its arrival, > 0 and at most 1000 [s].
+    keep_motions : bool
+        Whether the motions are kept with the numbers, as starts for others; those of
+        MIN_DURATION never are.
     text : str
         The study file as read.
 
@@ -102,6 +105,7 @@ class Study:
     plant_payload: float = math.nan
     gains: Gains | None = None
     settling: float = 1.0
+    keep_motions: bool = True
     text: str = ''
     _start: Array | None = field(init=False, default=None, repr=False)
     _near: Array | None = field(init=False, default=None, repr=False)
@@ -165,6 +169,11 @@ class Study:
     def shape(self) -> tuple[int, ...]:
         """Return the number of cells along each axis."""
         return tuple(axis.values.size for axis in self.axes)
+
+    @property
+    def keeps_motions(self) -> bool:
+        """Return whether motions are kept: nothing is asked that a shortest one would start."""
+        return self.keep_motions and self.quantity is not Quantity.MIN_DURATION
 
     def values(self, index: tuple[int, ...]) -> dict[str, float]:
         """Return the values of the axes at a cell, by name."""

@@ -48,6 +48,7 @@ def read_fields(top: Section, folder: Path) -> dict[str, Any]:
     return {'name': name, 'arm': arm, 'quantity': quantity, 'axes': axes, **ends, **numbers,
             'accuracy': top.take('accuracy', _ACCURACIES.get(quantity, math.nan)),
             'block_shape': _block_shape(top, axes),
+            'keep_motions': top.flag('keep_motions', True),
             **_simulated(top, quantity, arm.n_joints)}
 
 

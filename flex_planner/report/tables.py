@@ -114,6 +114,8 @@ def _outcome(request: RecordedRequest) -> Table:
         rows.append(('error', report.error_msg))
     rows += [('planned in', f'{seconds:.3f} s'), ('strategy', report.strategy or '–'),
              ('iterations', str(report.iterations)), ('intervals', str(report.mesh_intervals))]
+    if getattr(report, 'map_cell', ''):  # older recordings do not have it
+        rows.append(('started from', report.map_cell))
     if request.motion is not None:
         rows += [('payload', f'{request.motion.payload_mass:.6g} kg'),
                  ('cost J', f'{report.cost:.6g}'), ('effort', f'{report.effort:.6g} N²m²s'),

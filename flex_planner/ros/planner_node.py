@@ -16,6 +16,7 @@ from flex_planner.ros.planning import Outcome, Planning, unknown_failure
 from flex_planner.ros.recorder import OutcomeRecorder
 from flex_planner.ros.running import run_node
 from flex_planner.ros.settings import PlannerSettings
+from flex_planner.ros.starts import Starts
 from flex_planner.ros.streamer import Streamer
 from flex_planner_interfaces import action
 from flex_planner_interfaces.msg import FlexibleTrajectory, MotionTask
@@ -66,8 +67,12 @@ class PlannerNode(Node):  # type: ignore[misc]
         self.add_on_set_parameters_callback(self._judge_parameters)
         self.add_post_set_parameters_callback(self._apply_parameters)
         self.get_logger().info(f'preparing the dynamics of {arm.name}')
-        self._planning = Planning(ArmModel(arm),
-                                  OutcomeRecorder(arm, self.get_fully_qualified_name()))
+        starts = Starts(self._settings.map_store, arm)
+        if self._settings.map_store:
+            self.get_logger().info(f'{len(starts)} motions of {self._settings.map_store} are '
+                                   'there to start from')
+        self._planning = Planning(
+            ArmModel(arm), OutcomeRecorder(arm, self.get_fully_qualified_name()), starts)
         self._desk = Desk(self._settings.queue_length)
         self._joints = self.create_publisher(JointTrajectory, '~/joint_trajectory', LATCHED)
         self._flexible = self.create_publisher(

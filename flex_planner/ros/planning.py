@@ -10,7 +10,7 @@ import shutil
 
 from flex_planner.errors import FlexPlannerError, InvalidTaskError
 from flex_planner.model import ArmModel
-from flex_planner.path import plan_path
+from flex_planner.path import plan_path, WARM_START
 from flex_planner.payload import find_max_payload
 from flex_planner.plan import Plan
 from flex_planner.progress import Monitor, StoppedError, StopReason
@@ -34,6 +34,7 @@ from flex_planner.ros.payload_messages import (
 )
 from flex_planner.ros.recorder import OutcomeRecorder
 from flex_planner.ros.settings import PlannerSettings
+from flex_planner.ros.starts import Starts
 from flex_planner.ros.ticket import Ticket
 from flex_planner.task import Task
 from flex_planner.trajectory_rules import trajectory_violations
@@ -88,11 +89,15 @@ class Planning:
         The arm.
     recorder : OutcomeRecorder
         Where outcomes are kept.
+    starts : Starts, optional
+        Motions that requests near them start from.
 
     """
 
-    def __init__(self, model: ArmModel, recorder: OutcomeRecorder) -> None:
+    def __init__(self, model: ArmModel, recorder: OutcomeRecorder,
+                 starts: Starts | None = None) -> None:
         self._model, self._recorder = model, recorder
+        self._starts = Starts('', model.arm) if starts is None else starts
         self._recorded_now: PlanReport | None = None
 
     def plan(self, message: MotionTask, ticket: Ticket) -> Outcome:
@@ -111,9 +116,14 @@ class Planning:
 
         def planned(task: Task, monitor: Monitor) -> Outcome:
             monitor.payload = task.payload_mass
+            cell = self._starts.near(task, searched=False)
             plan = plan_path(task, model=self._model, settings=settings.solver(),
-                             monitor=monitor, objectives=objectives_from_message(message))
-            return _outcome(report_from_plan(plan), plan, settings, monitor)
+                             monitor=monitor, objectives=objectives_from_message(message),
+                             start_from=cell.motion.solution() if cell else None)
+            report = report_from_plan(plan)
+            if cell and plan.strategy == WARM_START:
+                report.map_cell = cell.place
+            return _outcome(report, plan, settings, monitor)
 
         return self._concluded(planned, message, ticket)
 
@@ -136,10 +146,15 @@ class Planning:
                 raise InvalidTaskError('objectives such as max_joint_speeds do not go with a '
                                        'search for the maximum payload')
             options = search_options(request, settings)
+            cell = self._starts.near(task, searched=True)
             found = find_max_payload(
                 task, model=self._model, settings=settings.solver(), monitor=monitor,
-                method=options.method, accuracy=options.accuracy, step=options.step)
-            outcome = _outcome(report_from_search(found), found.plan, settings, monitor)
+                method=options.method, accuracy=options.accuracy, step=options.step,
+                start_from=cell.motion.start() if cell else None)
+            report = report_from_search(found)
+            if cell and found.warm:
+                report.map_cell = cell.place
+            outcome = _outcome(report, found.plan, settings, monitor)
             return replace(outcome, search=search_message(found, options))
 
         return self._concluded(searched, request.task, ticket, search_without_result(request))

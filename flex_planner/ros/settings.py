@@ -71,6 +71,9 @@ class PlannerSettings:
     reference_rate: float = described(
         100.0, 'States a second that are streamed along a published plan [Hz].', lowest=1.0,
         highest=1000.0)
+    map_store: str = described(
+        '', 'Store of a map of this arm that flex-planner map has made: requests near one of its '
+        'cells start from the motion there. Empty for none.', read_only=True)
     queue_length: int = described(
         8, 'Requests that may wait; more are answered BUSY.', lowest=1, highest=1000,
         read_only=True)
