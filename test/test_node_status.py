@@ -10,12 +10,13 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from flex_planner.arm_files import load_arm
 from flex_planner.kinematics import link_points
 from flex_planner.reference import sample_reference, SamplingSettings
-from flex_planner.ros.diagnostics import Record
+from flex_planner.ros.diagnostics import Record, SUBSCRIBERS
 from flex_planner.ros.markers import motion_markers
 from flex_planner_interfaces.msg import PlanReport
 import numpy as np
 import pytest
 from ros_support import Planner
+from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import Marker, MarkerArray
 
 OK, WARN = DiagnosticStatus.OK, DiagnosticStatus.WARN
@@ -60,6 +61,16 @@ def test_status_comes_once_a_second_with_uptime_and_memory(planner: Planner,
     uptimes = [float(each['uptime [s]']) for each in told]
     assert np.diff(uptimes) == pytest.approx(1.0, abs=0.3)
     assert all(30 < float(each['memory [MB]']) < 1000 for each in told)
+
+
+def test_status_tells_how_many_wait_for_trajectories(planner: Planner,
+                                                     heard: list[DiagnosticArray]) -> None:
+    assert values(next_status(planner, heard))[SUBSCRIBERS] == '0'
+    topic = '/flex_planner/joint_trajectory'
+    one = planner.node.create_subscription(JointTrajectory, topic, lambda message: None, 1)
+    planner.wait('its count', lambda: values(next_status(planner, heard))[SUBSCRIBERS] == '1')
+    planner.node.destroy_subscription(one)
+    planner.wait('its end', lambda: values(next_status(planner, heard))[SUBSCRIBERS] == '0')
 
 
 def test_status_counts_the_requests_and_warns_of_the_last_that_failed(

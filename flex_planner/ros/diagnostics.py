@@ -13,7 +13,9 @@ from flex_planner.ros.streamer import Streamer
 from flex_planner_interfaces.msg import PlanReport
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 
+SUBSCRIBERS = 'trajectory subscribers'
 _PERIOD = 1.0  # [s]
 _MEGABYTE = 2**20
 _BROKEN = (PlanReport.RECORDING_FAILED, PlanReport.UNKNOWN)
@@ -70,15 +72,17 @@ class Diagnostics:
         How they ended.
     streamer : Streamer
         Streams the reference states.
+    trajectories : Publisher
+        Of the trajectories, whose subscribers are counted.
     arm : str
         Name of the arm.
 
     """
 
     def __init__(self, node: Node, desk: Desk, record: Record, streamer: Streamer,
-                 arm: str) -> None:
+                 trajectories: Publisher, arm: str) -> None:
         self._node, self._desk, self._record, self._arm = node, desk, record, arm
-        self._streamer = streamer
+        self._streamer, self._trajectories = streamer, trajectories
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 1)
         node.create_timer(_PERIOD, self._publish, callback_group=ReentrantCallbackGroup())
 
@@ -124,6 +128,7 @@ class Diagnostics:
             'requests canceled': record.canceled, 'last error code': record.error_code,
             'iteration': active.progress.iteration if active else 0,
             'residual': active.progress.residual if active else 0.0,
+            SUBSCRIBERS: self._trajectories.get_subscription_count(),
             'uptime [s]': round(time.monotonic() - record.started, 1),
             'memory [MB]': round(memory() / _MEGABYTE, 1)}
 

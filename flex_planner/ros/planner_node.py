@@ -79,7 +79,8 @@ class PlannerNode(Node):  # type: ignore[misc]
             FlexibleTrajectory, '~/flexible_trajectory', LATCHED)
         self._markers = self.create_publisher(MarkerArray, '~/markers', LATCHED)
         self._record = Record()
-        self._diagnostics = Diagnostics(self, self._desk, self._record, self._streamer, arm.name)
+        self._diagnostics = Diagnostics(self, self._desk, self._record, self._streamer,
+                                        self._joints, arm.name)
         self._endpoints = self._create_endpoints()
         self._streamer.wait_until_ready()
         self.get_logger().info(f'ready to plan for {arm.name}')
