@@ -15,7 +15,7 @@ from flex_planner.errors import InvalidTaskError
 from flex_planner.families import changed, durations, Start, Stop
 from flex_planner.family_starts import quickest, taken_over
 from flex_planner.ladder import LADDER, planned, STATUSES, STOPPED
-from flex_planner.limit_search import collected, is_near, middle, plan_near, way_to, width
+from flex_planner.limit_search import collected, is_near, middle, plan_at, way_to, width
 from flex_planner.model import ArmModel
 from flex_planner.motion import MotionProblem, task_parameters
 from flex_planner.neighbours import check_ratio, continued_stops, step_ratio
@@ -158,8 +158,8 @@ def _found(task: Task, problem: MotionProblem, settings: Settings, monitor: Moni
             return MinDuration(task=task, status=first.status, message=first.message)
         stops = _stops_from(first.problem, first.solution, settings, monitor, accuracy)
         last = stops[-1]
-    plan = plan_near(changed(problem, duration=last.value), last.result.solution, settings,
-                     monitor, last if exact else None)
+    plan = plan_at(stops, problem, settings, monitor, payload=False, exact=bool(exact))
+    last = stops[-1]
     lower = max(0.0, last.value - last.room)
     found = MinDuration(task=task, status=plan.status, message=plan.message, plan=plan,
                         duration=last.value if plan.solved else np.inf, lower=lower,

@@ -225,7 +225,8 @@ def _heavier(here: Stop, factor: float, settings: Settings, monitor: Monitor) ->
         return None
     price = _payload_price(heavier, there.solution)
     stop = Stop(value=here.value + more, result=there, problem=heavier, price=price)
-    return stop if price > here.price else None
+    # far from the limit the price may fall for a while: J of light payloads need not be convex
+    return stop if price > here.price or here.room > here.value + more else None
 
 
 def worth(problem: MotionProblem, guess: CollocationSolution, price: float, settings: Settings,

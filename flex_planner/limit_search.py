@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 from flex_planner.collocation import CollocationSolution, Settings
-from flex_planner.families import on_the_way, Stop
+from flex_planner.errors import FlexPlannerError
+from flex_planner.families import changed, on_the_way, Stop, worth, worth_time
 from flex_planner.ladder import planned
 from flex_planner.limits import steady
 from flex_planner.motion import MotionProblem
-from flex_planner.plan import Plan
+from flex_planner.plan import Plan, PlanStatus
 from flex_planner.progress import Monitor
 from flex_planner.strategies import Attempt, has_weights, QUICK, Strategy, weights_raised
 import numpy as np
@@ -60,15 +62,76 @@ def width(accuracy: float, value: float) -> float:
 
 
 def plan_near(problem: MotionProblem, start: CollocationSolution, settings: Settings,
-              monitor: Monitor, stop: Stop | None = None) -> Plan:
-    """Return the plan of a problem from a motion nearly its own; that of a stop may be it."""
+              monitor: Monitor) -> Plan:
+    """Return the plan of a problem from a motion nearly its own."""
+    return planned(problem, (_found(start), *QUICK), settings, monitor)
+
+
+def plan_at(stops: list[Stop], problem: MotionProblem, settings: Settings, monitor: Monitor, *,
+            payload: bool, exact: bool) -> Plan:
+    """
+    Return the plan with the value of the last stop of a search.
+
+    Where the value leaves Newton's method no way, the price may: the last stop is then replaced
+    by the same motion, solved as exactly as a plan.
+
+    Parameters
+    ----------
+    stops : list of Stop
+        The last one near the limit.
+    problem : MotionProblem
+        That was searched, with its weights.
+    settings, monitor
+        Of the solver.
+    payload : bool
+        Whether the value is a payload, else a duration.
+    exact : bool
+        Whether the last stop was solved to be the plan.
+
+    """
+    stop = stops[-1]
+
+    def there(stop: Stop) -> MotionProblem:
+        return (changed(problem, payload_mass=stop.value) if payload
+                else changed(problem, duration=stop.value))
+
+    first = _found(stop.result.solution, stop if exact else None)
+    plan = planned(there(stop), (first,), settings, monitor)
+    if plan.status is not PlanStatus.NOT_CONVERGED:
+        return plan
+    again = _more_exact(stop, settings, monitor, payload=payload)
+    if again is not None:
+        found = planned(there(again), (_found(again.result.solution, again),), settings, monitor)
+        if found.status is not PlanStatus.NOT_CONVERGED:
+            stops[-1] = again
+            return found
+    found = planned(there(stop), QUICK, settings, monitor)
+    if found.status is PlanStatus.NOT_CONVERGED:
+        return replace(found, message=f'{plan.message}; {found.message}')
+    return found
+
+
+def _found(start: CollocationSolution, stop: Stop | None = None) -> tuple[str, Strategy]:
+    """Return the strategy that starts from a motion; that of a stop may be the solution."""
     def found(problem: MotionProblem, settings: Settings, monitor: Monitor) -> Attempt:
         if stop is not None and _is_solution(stop, problem, settings):
             return Attempt(result=stop.result)
         return Attempt(result=weights_raised(problem, start, settings, monitor))
 
-    rungs: tuple[tuple[str, Strategy], ...] = (('limit found', found), *QUICK)
-    return planned(problem, rungs, settings, monitor)
+    return 'limit found', found
+
+
+def _more_exact(stop: Stop, settings: Settings, monitor: Monitor, *,
+                payload: bool) -> Stop | None:
+    """Return the motion of a stop as exact as a plan has to be, None without success."""
+    if not stop.price:
+        return None
+    try:
+        found = (worth if payload else worth_time)(stop.problem, stop.result.solution,
+                                                   stop.price, settings, monitor)
+    except FlexPlannerError:  # too heavy to hold, or no duration
+        return None
+    return found if found is not None and found.result.converged else None
 
 
 def _is_solution(stop: Stop, problem: MotionProblem, settings: Settings) -> bool:

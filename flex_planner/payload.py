@@ -20,7 +20,7 @@ from flex_planner.families import changed, payloads, Start, Stop
 from flex_planner.family_starts import heaviest, taken_over
 from flex_planner.incremental import PayloadTrial, raised_payload
 from flex_planner.ladder import LADDER, planned, STATUSES, STOPPED
-from flex_planner.limit_search import collected, is_near, middle, plan_near, way_to, width
+from flex_planner.limit_search import collected, is_near, middle, plan_at, plan_near, way_to, width
 from flex_planner.model import ArmModel
 from flex_planner.motion import holding_limit, MotionProblem, task_parameters
 from flex_planner.neighbours import check_ratio, continued_stops
@@ -253,8 +253,9 @@ class _Search:
         if last.stopped:
             return self.failed(PayloadMethod.DIRECT, STOPPED[last.result.status],
                                last.result.message)
-        near = is_near(self._stops, self._accuracy)
-        plan = self._plan(last.value, last.result.solution, last if exact else None)
+        plan = plan_at(self._stops, self._problem, self._settings, self._monitor, payload=True,
+                       exact=exact)
+        last, near = self._stops[-1], is_near(self._stops, self._accuracy)
         found = MaxPayload(task=self._problem.task, method=PayloadMethod.DIRECT,
                            status=plan.status, message=plan.message,
                            front=_front(self._stops), stops=_priced(self._stops),
@@ -315,10 +316,10 @@ class _Search:
         return replace(found, status=plan.status, payload=limit * _HELD, upper=limit, plan=plan,
                        held=True, limiting_joint=joint)
 
-    def _plan(self, payload: float, start: CollocationSolution, stop: Stop | None = None) -> Plan:
+    def _plan(self, payload: float, start: CollocationSolution) -> Plan:
         """Return the plan with a payload, from the motion of one like it."""
         return plan_near(changed(self._problem, payload_mass=payload), start, self._settings,
-                         self._monitor, stop)
+                         self._monitor)
 
     def incremental(self, step: float) -> MaxPayload:
         """Raise the payload of the task step by step."""

@@ -18,7 +18,7 @@ from flex_planner.payload import find_max_payload, MaxPayload, PayloadMethod
 from flex_planner.plan import PlanStatus
 from flex_planner.progress import Monitor, Progress
 from flex_planner.simulation import PiecewisePolynomial, simulate
-from flex_planner.task import Task
+from flex_planner.task import postures_from_points, Task
 from flex_planner.validation import Array
 import numpy as np
 from numpy.polynomial import legendre
@@ -566,6 +566,32 @@ def test_task_without_a_largest_payload_is_refused(
         changes: dict[str, Any], message: str) -> None:
     with pytest.raises(InvalidTaskError, match=message):
         find_max_payload(paper_task(rigid_model.arm, **changes), model=rigid_model, method=method)
+
+
+@pytest.mark.parametrize(('goal', 'payload'), [
+    ((0.077, -0.128), 9.83847), ((0.179, -0.077), 13.16864), ((-0.436, 0.641), 0.32899)])
+def test_limit_that_is_not_met_by_its_payload_is_met_by_its_price(
+        rigid_model: ArmModel, paper_task: TaskFactory, goal: tuple[float, float],
+        payload: float) -> None:
+    start, there = postures_from_points(rigid_model.arm, (0.5, 0.0), goal, elbow=-1)
+    task = paper_task(rigid_model.arm, 0.0, start_positions=start, goal_positions=there)
+    found = find_max_payload(task, model=rigid_model)
+    assert found.solved, found.message
+    assert found.payload == pytest.approx(payload, abs=1e-3)
+    assert found.payload <= found.upper <= found.payload + 1e-3
+    assert found.plan is not None
+    assert found.plan.certificate.tip_error < 1e-5
+
+
+def test_effort_of_light_payloads_that_is_not_convex_does_not_end_the_search(
+        rigid_model: ArmModel, paper_task: TaskFactory) -> None:
+    start, goal = postures_from_points(rigid_model.arm, (0.5, 0.0), (0.9, -0.231), elbow=-1)
+    task = paper_task(rigid_model.arm, 0.0, start_positions=start, goal_positions=goal)
+    found = find_max_payload(task, model=rigid_model)
+    prices = found.front.prices
+    assert prices[1] < prices[0]  # more payload costs less, at first
+    heavy = find_max_payload(replace(task, payload_mass=3.0), model=rigid_model)
+    assert found.payload == pytest.approx(heavy.payload, abs=1e-3)
 
 
 def test_arm_without_motor_limits_is_refused(rigid_arm: Arm, paper_task: TaskFactory) -> None:

@@ -62,8 +62,8 @@ class Tally:
 
     @property
     def elapsed(self) -> float:
-        """Return the time since it began [s]."""
-        return time.monotonic() - self._started
+        """Return the time from the beginning to the cells that were counted last [s]."""
+        return self._history[-1][0] - self._started
 
     @property
     def rate(self) -> float:

@@ -1,0 +1,113 @@
+"""
+Capacity maps: cells a second on one and on two processes, from neighbours and from nothing.
+
+Run by ``tools/run python -m bench.maps``, on an idle machine; takes five minutes.
+
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import ProcessPoolExecutor
+import multiprocessing
+from pathlib import Path
+import resource
+import statistics
+import sys
+import tempfile
+
+from flex_planner.arm_files import load_arm
+from flex_planner.maps.axes import Axis
+from flex_planner.maps.blocks import blocks, solve_block
+from flex_planner.maps.ends import End
+from flex_planner.maps.run import run_map
+from flex_planner.maps.store import MapStore
+from flex_planner.maps.study import Quantity, Study
+from flex_planner.mismatch import Mismatch
+from flex_planner.model import ArmModel
+from flex_planner.motion_report import table
+from flex_planner.payload import find_max_payload
+from flex_planner.plan import PlanStatus
+from flex_planner.processors import one_thread_each
+import numpy as np
+
+BLOCK, REPEATS, COLD_A_BLOCK = 5, 3, 2
+SIDES = {'korayem_rigid': 20, 'korayem_ei50': 10}
+_MEGABYTE = 1024  # in the unit of ru_maxrss
+
+
+def study(arm: str) -> Study:
+    """Return the middle of the workspace, where every cell is solved; one mode a link if any."""
+    side = SIDES[arm]
+    axes = (Axis(name='goal_x', values=np.linspace(0.2, 0.6, side, dtype=np.float64)),
+            Axis(name='goal_y', values=np.linspace(0.3, 0.7, side, dtype=np.float64)))
+    given = load_arm(arm)
+    single = Mismatch(modes=1).applied(given) if given.n_modes else given
+    return Study(name='bench', arm=single, quantity=Quantity.MAX_PAYLOAD, axes=axes,
+                 start=End(name='start', point=np.array([0.5, 0.0])), goal=End(name='goal'),
+                 effort_weights=np.array([0.125, 0.125]), accuracy=1e-3,
+                 block_shape=(BLOCK, BLOCK), text='name: bench\n')
+
+
+def rate(one: Study, workers: int) -> float:
+    """Return the cells that so many processes solve in a second."""
+    with tempfile.TemporaryDirectory() as folder:
+        with MapStore.of(Path(folder, 'bench.zarr'), one) as store:
+            tally = run_map(one, store, workers=workers)
+    return tally.computed / tally.elapsed
+
+
+def costs(one: Study) -> dict[str, float]:
+    """Return what a cell costs in its block and on its own [s], and the memory it takes [MB]."""
+    with one_thread_each(), ProcessPoolExecutor(1, multiprocessing.get_context('spawn')) as pool:
+        return pool.submit(_costs, one).result()
+
+
+def _costs(one: Study) -> dict[str, float]:
+    """Solve blocks, and cells of each without neighbours, in turns."""
+    model, together, alone = ArmModel(one.arm), [], []
+    for block in blocks(one):
+        results = solve_block(one, block)
+        together += results
+        for result in results[:: BLOCK**2 // COLD_A_BLOCK]:
+            found = find_max_payload(one.task(result.index), model=model, accuracy=one.accuracy)
+            if found.status is PlanStatus.SOLVED:
+                alone.append(found.planning_time)
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / _MEGABYTE
+    continued = [result.seconds for result in together if result.warm]
+    return {'whole block': statistics.mean(result.seconds for result in together),
+            'from neighbors': statistics.median(continued),
+            'from nothing': statistics.median(alone), 'mean from nothing': statistics.mean(alone),
+            'memory': memory}
+
+
+def rows(arm: str) -> list[tuple[str, str]]:
+    """Return the figures of an arm, in words."""
+    one, side = study(arm), SIDES[arm]
+    ArmModel(one.arm)  # compiled beforehand
+    rates = [(rate(one, 1), rate(one, 2)) for _ in range(REPEATS)]
+    single, double = (statistics.median(column) for column in zip(*rates, strict=True))
+    gain = statistics.median(two / one for one, two in rates)
+    found = costs(one)
+    return [(f'{one.arm.name}', f'{side} x {side} cells in blocks of {BLOCK} x {BLOCK}'),
+            ('  cells a second, 1 process', f'{single:.1f}'),
+            ('  cells a second, 2 processes', f'{double:.1f}'),
+            ('  gain, median of the runs', f'{gain:.2f}'),
+            ('  a cell in its block, mean', f'{found["whole block"]:.3f} s'),
+            ('  a cell from neighbors, median', f'{found["from neighbors"]:.3f} s'),
+            ('  a cell from nothing, mean', f'{found["mean from nothing"]:.3f} s'),
+            ('  a cell from nothing, median', f'{found["from nothing"]:.3f} s'),
+            ('  from nothing over block, means',
+             f'{found["mean from nothing"] / found["whole block"]:.2f}'),
+            ('  from nothing over neighbors, medians',
+             f'{found["from nothing"] / found["from neighbors"]:.2f}'),
+            ('  memory of a process', f'{found["memory"]:.0f} MB')]
+
+
+def main() -> None:
+    """Measure and print."""
+    for arm in sys.argv[1:] or SIDES:
+        print(table(rows(arm)), flush=True)
+
+
+if __name__ == '__main__':
+    main()
