@@ -178,7 +178,7 @@ def continued(before: Switched, here: Switched, ratio: float,
     first, second = before.lasting(span), here.lasting(span)
     start, now, aim = _in_order(_matched(first, second), ratio, span)
     there, other = _bent(second, now, aim), _bent(first, start, aim)
-    other = other.on_mesh(there.mesh)
+    other = other.on_mesh(there.mesh, there.rule)
     pieces = np.searchsorted(aim, there.mesh[:-1] + there.steps / 2) - 1
     strange = np.concatenate([_strange(first, start), _strange(second, now)])
     share = np.where(np.isin(pieces, strange), 0.0, ratio)

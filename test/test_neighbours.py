@@ -205,6 +205,16 @@ def test_motion_of_another_duration_is_stretched() -> None:
     np.testing.assert_allclose(guess(np.array([0.6, 2.0]))[:, 0], [0.0, 0.7], atol=1e-12)
 
 
+def test_motions_with_other_numbers_of_stages_go_together() -> None:
+    before = switched(0.3, 1.0)
+    finer = before.solution.on_mesh(before.solution.mesh, GaussRule.of(7))
+    guess = continued(Switched(finer, before.times, before.kinds), switched(0.35, 1.1), 1.0, 1.0)
+    same = continued(before, switched(0.35, 1.1), 1.0, 1.0)
+    assert guess.rule.stages == 4
+    t = np.linspace(0, 1, 101)
+    np.testing.assert_allclose(guess(t), same(t), atol=1e-12)
+
+
 def test_kind_of_a_switch_is_the_limit_that_is_met(rigid_arm: Arm,
                                                    paper_task: TaskFactory) -> None:
     found = find_max_payload(paper_task(rigid_arm))

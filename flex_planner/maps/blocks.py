@@ -21,6 +21,7 @@ from flex_planner.maps.cells import CellCode, CellResult
 from flex_planner.maps.ends import close
 from flex_planner.maps.solving import Found, Solver, task_of
 from flex_planner.maps.study import Block, Study
+from flex_planner.memory import return_memory
 from flex_planner.neighbours import step_ratio
 from flex_planner.progress import Monitor, StoppedError
 from flex_planner.task import Task
@@ -100,6 +101,7 @@ class _Block:
         if self._monitor is not None:
             limited.canceled = self._monitor.canceled
         result = self._solved(index, limited)
+        return_memory()
         start = self._starts.get(index, Neighbours())
         return replace(result, message=result.message[:_LONGEST_MESSAGE],
                        warm=start.near is not None, seconds=time.monotonic() - began)

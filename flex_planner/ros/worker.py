@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-import ctypes
 import logging
 import threading
+
+from flex_planner.memory import return_memory
 
 Job = Callable[[], None]
 
 _LOG = logging.getLogger(__name__)
-_LIBC = ctypes.CDLL(None)
 
 
 class Worker:
@@ -81,17 +81,4 @@ class Worker:
                 job()
             except Exception:
                 _LOG.exception('a planning job failed')
-            _return_memory()
-
-
-def _return_memory() -> None:
-    """
-    Give freed memory back to the system.
-
-    glibc keeps what lies between small blocks that are still in use, and a node that plans for
-    days grows by it.
-
-    """
-    trim = getattr(_LIBC, 'malloc_trim', None)
-    if trim is not None:
-        trim(0)
+            return_memory()
