@@ -18,8 +18,9 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
-# [s], how long the result of a goal can be asked for; clients ask when the goal is accepted
-RESULT_TIMEOUT = 30
+# [s], how long the result of a goal can be asked for: clients ask when the goal is accepted, and
+# what is kept of trajectories is most of what the node grows by when goals come fast
+RESULT_TIMEOUT = 5
 # requests and answers on their way: with ROS's depth of 10, more at once would get lost
 _MANY = QoSProfile(depth=1000)
 _FEEDBACK_PERIOD = 0.1  # [s]
