@@ -67,7 +67,7 @@ def _add_recover(commands: Commands) -> None:
     parser = commands.add_parser(
         'recover', help='save what is complete of a recording that broke off',
         description='Make a recording of what is complete of one whose writer was killed (the '
-        'hidden folder .<name>.<number>) or that is damaged. The original stays as it is.')
+        'hidden folder .<name>.<hex>) or that is damaged. The original stays as it is.')
     _add_recording(parser)
     parser.set_defaults(run=_recover)
 

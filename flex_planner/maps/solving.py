@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 from typing import Any, TypeAlias
 
@@ -11,6 +11,7 @@ from flex_planner.comparison import finely_sampled
 from flex_planner.duration import find_min_duration, MinDuration
 from flex_planner.execution import carried_out, Setting, Way
 from flex_planner.families import on_the_way
+from flex_planner.family_starts import first_motion
 from flex_planner.joint_control import Gains
 from flex_planner.kinematics import tip_position
 from flex_planner.maps.cells import CellCode, CellResult
@@ -18,6 +19,7 @@ from flex_planner.maps.motions import KeptMotion
 from flex_planner.maps.quantities import Quantity
 from flex_planner.maps.study import Study
 from flex_planner.model import ArmModel
+from flex_planner.motion import MotionProblem, task_parameters
 from flex_planner.neighbours import thinned
 from flex_planner.path import plan_path
 from flex_planner.payload import find_max_payload, MaxPayload
@@ -30,6 +32,8 @@ import numpy as np
 _RATE = 1000.0  # [Hz]
 # accuracy of a duration that is only to be compared, as a share of what is asked for
 _SHORT = 0.02
+# largest mesh of a cell: what takes more memory is not solved by it either
+_INTERVALS, _LARGEST = 400, 8  # at least, and in units of the coarsest that overlooks nothing
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -70,18 +74,28 @@ class Solver:
             If the monitor stopped a simulation.
 
         """
-        study, model = self._study, self._model
+        study, model, settings = self._study, self._model, self._settings(task)
         if study.quantity is Quantity.MAX_PAYLOAD:
-            return self._payload(task, monitor, near, far, ratio)
+            return self._payload(task, settings, monitor, near, far, ratio)
         if study.quantity is Quantity.MIN_DURATION:
-            return find_min_duration(task, model=model, monitor=monitor, accuracy=study.accuracy,
-                                     start_from=near, before=far, ratio=ratio)
-        plan = plan_path(task, model=model, monitor=monitor, start_from=_plan_of(near))
+            return find_min_duration(task, model=model, settings=settings, monitor=monitor,
+                                     accuracy=study.accuracy, start_from=near, before=far,
+                                     ratio=ratio)
+        plan = plan_path(task, model=model, settings=settings, monitor=monitor,
+                         start_from=_plan_of(near))
         if study.quantity is Quantity.MIN_EFFORT or not plan.solved:
             return plan
         return self._shaken(index, task, plan, monitor)
 
-    def _payload(self, task: Task, monitor: Monitor, near: Any, far: Any,
+    def _settings(self, task: Task) -> Settings:
+        """Return the settings of a cell, so that none takes much more memory than others."""
+        settings = Settings()
+        fewest = MotionProblem(self._model, task, task_parameters(task)).fewest_intervals(
+            settings.stages)
+        most = min(max(_INTERVALS, _LARGEST * fewest), settings.max_intervals)
+        return replace(settings, max_intervals=most)
+
+    def _payload(self, task: Task, settings: Settings, monitor: Monitor, near: Any, far: Any,
                  ratio: float) -> Found:
         """
         Return the largest payload, or the shortest duration where that is too long.
@@ -91,17 +105,28 @@ class Solver:
 
         """
         late = isinstance(near, MinDuration)
-        if self._says_much and (late or _may_be_none(task, near, far, ratio)):
+        if self._says_much and (late or self._may_be_none(task, settings, near, far, ratio,
+                                                          monitor)):
             shortest = find_min_duration(
-                task, model=self._model, monitor=monitor, accuracy=_SHORT * task.duration,
-                start_from=near if late else None, before=far if late else None, ratio=ratio)
+                task, model=self._model, settings=settings, monitor=monitor,
+                accuracy=_SHORT * task.duration, start_from=near if late else None,
+                before=far if late else None, ratio=ratio)
             if shortest.solved and shortest.lower > task.duration:
                 return shortest
         if late:
             near = far = None
-        return find_max_payload(task, model=self._model, monitor=monitor,
+        return find_max_payload(task, model=self._model, settings=settings, monitor=monitor,
                                 accuracy=self._study.accuracy, start_from=near, before=far,
                                 ratio=ratio)
+
+    def _may_be_none(self, task: Task, settings: Settings, near: MaxPayload | None,
+                     far: MaxPayload | None, ratio: float, monitor: Monitor) -> bool:
+        """Return whether neighbours, or a first trial, let expect that nothing can be carried."""
+        if near is None:
+            problem = MotionProblem(self._model, task, task_parameters(task))
+            return not first_motion(problem, on_the_way(settings), monitor).converged
+        slope = near.payload - far.payload if far is not None else -near.payload / 2
+        return near.payload + 2 * ratio * slope < task.payload_mass
 
     @property
     def _says_much(self) -> bool:
@@ -147,15 +172,6 @@ def _kept(found: Found, plan: Plan) -> KeptMotion | None:
         motion = thinned(stop, on_the_way(Settings()))
         return KeptMotion.of(stop.problem, motion.solution, stop.price)
     return None if plan.solution is None else KeptMotion.of(plan.problem, plan.solution)
-
-
-def _may_be_none(task: Task, near: MaxPayload | None, far: MaxPayload | None,
-                 ratio: float) -> bool:
-    """Return whether neighbours let expect that hardly any payload can be carried."""
-    if near is None:
-        return True
-    slope = near.payload - far.payload if far is not None else -near.payload / 2
-    return near.payload + 2 * ratio * slope < task.payload_mass
 
 
 def _too_late(index: tuple[int, ...], found: MinDuration) -> CellResult:

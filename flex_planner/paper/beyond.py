@@ -49,7 +49,7 @@ def front(*, reduced: bool = False) -> Section:
     rows = tuple((f'{duration:.2f}', *(f'{curve.y[k]:.4f}' for curve in limits))
                  for k, duration in enumerate(limits[0].x))
     return Section(
-        key='6.1', title='Payload, effort and duration',
+        key='6.1', title='Beyond the paper: payload, effort and duration',
         text='One search gives the front: the least effort of every payload up to the largest, '
         'where its price dJ/dm_p grows without bound. Searches for other durations start from '
         'their neighbour. Links that bend have one pinned-pinned mode each.',
@@ -97,7 +97,7 @@ def clamped(*, reduced: bool = False) -> Section:
     values = {f'clamped_limit_{rigidity:g}': one.payload for rigidity, one in built_in.items()}
     values['clamped_cost'] = light.cost
     return Section(
-        key='6.2', title='Clamped links',
+        key='6.2', title='Beyond the paper: clamped links',
         text='Pinned-pinned shapes keep the tip on the chord, and leave out the work of the '
         'torque on the slope at the hub. Clamped-free shapes do neither. One mode a link; two '
         'modes are not solved at the limit.',
@@ -123,7 +123,7 @@ def feedforward(*, reduced: bool = False) -> Section:
                   f'{one.residual.tip * 1e3:.3g}') for way, one in outcomes.items())
     flexible, rigid = outcomes[Way.FLEXIBLE_OPEN], outcomes[Way.RIGID_OPEN]
     return Section(
-        key='6.3', title='Rigid and flexible feedforward',
+        key='6.3', title='Beyond the paper: rigid and flexible feedforward',
         text='The motion of section 5.2 with 1 kg, planned with rigid and with flexible links '
         f'(EI = {_SOFT:g} N m^2, two modes), carried out on the flexible arm; controller at '
         '1 kHz, 1 s after the arrival is watched.',
@@ -162,7 +162,7 @@ def modes(*, reduced: bool = False) -> Section:
     rows = tuple((str(count), f'{costs[count]:.9f}', f'{one.payload:.5f} - {one.upper:.5f}')
                  for count, one in limits.items())
     return Section(
-        key='6.4', title='How many modes',
+        key='6.4', title='Beyond the paper: how many modes',
         text=f'Pinned-pinned links of {_SOFT:g} N m^2.',
         tables=(Table(title='Least effort with 1 kg, and largest payload', rows=rows, header=(
             'modes a link', 'J', 'largest payload [kg]')),),

@@ -10,10 +10,16 @@ from flex_planner.paper.evidence import Claim, Section, Table, Verdict
 _HEAD = """# The paper, reproduced
 
 Every simulation of Korayem et al. 2009 (*Trajectory optimization of flexible link manipulators in
-point-to-point motion*, Robotica), computed again with flex_planner. Each section has the paper's
-numbers beside ours and beside those of an independent method, its pictures, and its statements
-turned into numbers. What the sections mean is explained in [theory.md](theory.md); more on maximum
-payloads is in [payload.md](payload.md).
+point-to-point motion*, Robotica), computed again with flex_planner. Sections 5.1 to 5.5 and their
+figures are the paper's; figs. 1 to 3 and 15 are drawings and flow charts and have no counterpart.
+Sections 6.1 to 7 are ours. Numbers that the paper prints stand beside ours. The independent check
+is IPOPT, which transcribes and optimises the same dynamics by other means; the dynamics themselves
+are checked by a second derivation and by finite elements in the tests. What is solved is explained
+in [theory.md](theory.md); more on maximum payloads is in [payload.md](payload.md).
+
+A statement is *confirmed* if it holds for our motions, by the number given, and printed values are
+met to the accuracy to which the paper searches or prints them. It is *corrected* if the number
+says otherwise, and *not reproducible* if what is printed does not suffice to decide.
 
 This page is written by `make paper` (`flex-planner paper`): do not edit it.
 """

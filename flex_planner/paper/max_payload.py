@@ -128,7 +128,7 @@ def _limit_claims(found: MaxPayload, raised: MaxPayload) -> tuple[Claim, ...]:
         Claim(said='The rigid arm carries 5.85 kg.',
               found=f'{found.payload:.5f} kg is carried by a certified motion, '
               f'{found.upper:.5f} kg is too much; the algorithm of fig. 2 ends at '
-              f'{raised.payload:.3f} kg.',
+              f'{raised.payload:.3f} kg, to its accuracy of {ACCURACY:g} kg.',
               verdict=confirmed_if(abs(found.payload - LIMITS[0.0]) <= ACCURACY)),
         Claim(said='At the largest payload both torques lie on their limits completely.',
               found='On the limit for ' + ' and '.join(
@@ -169,28 +169,31 @@ def _weight_claims(weighted: dict[float, Plan],
 def _stiffness_claims(found: dict[float, MaxPayload],
                       samples: dict[str, Samples]) -> tuple[Claim, ...]:
     limits = [one.payload for one in found.values()]
-    rough = [_roughness(one) for one in samples.values()]
+    rough = np.array([_roughness(one) for one in samples.values()])
     return (
         Claim(said="The largest payload of flexible arms is close to the rigid one's, and falls "
               'with the stiffness: 5.85, 5.8, 5.75 kg.',
-              found=', '.join(f'{limit:.4f}' for limit in limits) + ' kg. It is close because '
+              found=', '.join(f'{limit:.4f}' for limit in limits) + ' kg, within the '
+              f'{ACCURACY:g} kg to which the paper searches; from rigid links to 50 N m^2 it '
+              f'falls by {limits[0] - limits[1]:.4f} kg only, not by 0.05. It is close because '
               'pinned-pinned shapes do not move the tip; with clamped ones it is not, see '
               'section 6.2.', verdict=confirmed_if(
                   limits == sorted(limits, reverse=True) and all(
                       abs(limit - printed) <= ACCURACY + 1e-3 for limit, printed in zip(
                           limits, STIFFNESS_LIMITS.values(), strict=True)))),
         Claim(said='The torques oscillate more the softer the links are.',
-              found='Up and down of the torque of motor 1 in all: ' + ', '.join(
-                  f'{value:.0f}' for value in rough) + ' N m (rigid, 50, 5 N m^2), with '
+              found='Up and down of the torques of motors 1; 2 in all: ' + '; '.join(
+                  ', '.join(f'{value:.1f}' for value in rough[:, joint]) for joint in range(2))
+              + ' N m (rigid, 50, 5 N m^2), with '
               + ', '.join(str(_plan_of(one).switching_times.size) for one in found.values())
               + ' switching times.',
-              verdict=confirmed_if(sorted(rough) == rough)))
+              verdict=confirmed_if(bool((np.diff(rough.sum(axis=1)) > 0).all()))))
 
 
-def _roughness(samples: Samples) -> float:
-    """Return how much the first torque goes up and down in all [N m]."""
-    torque: Array = samples.torques[:, 0]
-    return float(np.abs(np.diff(torque)).sum())
+def _roughness(samples: Samples) -> Array:
+    """Return how much each torque goes up and down in all, shape (n,) [N m]."""
+    change: Array = np.abs(np.diff(samples.torques, axis=0)).sum(axis=0)
+    return change
 
 
 def _pictures(payloads: dict[str, Samples], printed: dict[str, Samples],

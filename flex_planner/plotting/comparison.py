@@ -18,6 +18,7 @@ _STYLES = {Way.FLEXIBLE_OPEN: ('C0', '--'), Way.RIGID_OPEN: ('C3', '--'),
 # of the tip's distance from the goal: less is rounding and sampling
 _FLOOR = 1e-6  # [mm]
 _MARGIN = 0.15
+_POINTS = 201
 
 
 def draw_comparison(path: Path, comparison: Comparison) -> None:
@@ -42,7 +43,7 @@ def draw_comparison(path: Path, comparison: Comparison) -> None:
     _draw_distance(distance, comparison)
     _draw_paths(path_axes, comparison)
     for joint, axes in enumerate(torques):
-        _draw_torques(axes, outcomes, joint)
+        _draw_torques(axes, comparison, joint)
     if outcomes:
         handles, labels = distance.get_legend_handles_labels()
         figure.legend(handles, labels, loc='outside lower center', ncols=len(outcomes))
@@ -86,14 +87,22 @@ def _draw_paths(axes: Axes, comparison: Comparison) -> None:
     finish(axes, 'path of the tip after arrival, from the goal', 'y [mm]', 'x [mm]')
 
 
-def _draw_torques(axes: Axes, outcomes: tuple[Outcome, ...], joint: int) -> None:
-    """Draw what the motor of a joint did."""
+def _draw_torques(axes: Axes, comparison: Comparison, joint: int) -> None:
+    """Draw what the motor of a joint did, and what it may do at the speeds of the plan."""
+    outcomes = comparison.outcomes
     for outcome in outcomes:
         color, style = _STYLES[outcome.way]
         execution = outcome.execution
         axes.plot(execution.times, execution.torques[:, joint], style, color=color, linewidth=1)
     for arrival in sorted({outcome.arrival for outcome in outcomes}):
         axes.axvline(arrival, color='gray', linestyle=':', label='planned arrival')
+    if comparison.flexible.solved:
+        planned = comparison.flexible.uniform_samples(_POINTS)
+        for label, bound in (('bounds at the planned speeds', planned.lower_bounds[:, joint]),
+                             ('', planned.upper_bounds[:, joint])):
+            if np.isfinite(bound).all():
+                axes.plot(planned.times, bound, ':', color='black', linewidth=0.9,
+                          label=label or None)
     finish(axes, f'torque of joint {joint + 1}', 'torque [N m]')
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from flex_planner.paper.evidence import Panel, Picture
 from flex_planner.plotting.figures import save
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 import numpy as np
@@ -44,11 +45,10 @@ def _draw(axes: Axes, panel: Panel) -> None:
 
 
 def _add_legends(figure: Figure, axes: Sequence[Axes], columns: int) -> None:
-    """Say what the lines are: once below where the first diagram has them all, else in each."""
-    handles, labels = axes[0].get_legend_handles_labels()
-    if all(set(one.get_legend_handles_labels()[1]) <= set(labels) for one in axes):
-        figure.legend(handles, labels, loc='outside lower center', ncols=columns,
-                      fontsize='small')
-    else:
-        for one in axes:
-            one.legend(fontsize='small')
+    """Say what the lines are, once for all diagrams: a name is the same line in each."""
+    named: dict[str, Artist] = {}
+    for one in axes:
+        for handle, label in zip(*one.get_legend_handles_labels(), strict=True):
+            named.setdefault(label, handle)
+    figure.legend(named.values(), named.keys(), loc='outside lower center', ncols=columns,
+                  fontsize='small')
