@@ -171,7 +171,7 @@ def test_full_disk_ends_the_run_and_keeps_finished_blocks(
 
     def to_file(values: Any, name: str) -> None:
         files.append(name)
-        if len(files) > 20:  # two blocks of nine files, and a part of the third
+        if len(files) > 24:  # two blocks of eleven files, and a part of the third
             raise OSError(errno.ENOSPC, 'No space left on device')
         written(values, name)
 

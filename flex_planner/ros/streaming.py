@@ -130,6 +130,7 @@ class Stream:
         self._changed = threading.Condition()
         self._next: StreamedPlan | None = None
         self._closed = False
+        self._last_ns = 0  # when the last state was due, by the monotonic clock
         self._thread = threading.Thread(target=self._run, name='reference states', daemon=True)
         self._thread.start()
 
@@ -163,11 +164,21 @@ class Stream:
                 _LOG.exception('streaming the reference states failed')
 
     def _play(self, states: ReferenceStates) -> None:
-        """Publish states at their times until the last, or another plan."""
+        """
+        Publish states at their times until the last, or another plan.
+
+        A plan takes a moment to get here, in which the one before may go on: what was due by then
+        is left out, so that time never runs backwards.
+
+        """
         for time_ns, message in zip(states.times_ns, states.messages(), strict=True):
-            if self._wait(states.plan.began_ns + int(time_ns)):
+            due_ns = states.plan.began_ns + int(time_ns)
+            if due_ns <= self._last_ns:
+                continue
+            if self._wait(due_ns):
                 return
             self._publish(message)
+            self._last_ns = due_ns
 
     def _wait(self, due_ns: int) -> bool:
         """Wait until a time of the monotonic clock [ns]; return whether to stop instead."""
