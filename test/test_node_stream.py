@@ -65,8 +65,13 @@ def heard(planner: Planner) -> list[Heard]:
         states.append(Heard(info['source_timestamp'], message))
 
     planner.node.create_subscription(JointState, f'{planner.name}/reference_states', note, 1000)
-    planner.wait('match', lambda: planner.node.count_publishers(
+    planner.wait('publisher', lambda: planner.node.count_publishers(
         f'{planner.name}/reference_states') == 1)
+    for _ in range(5):  # that the publisher knows of this subscriber shows in what comes
+        planner.report(publish=True)
+        planner.spin(1.3)
+        if states:
+            break
     return states
 
 

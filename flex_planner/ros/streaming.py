@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
+import faulthandler
 import logging
 import os
 import pickle
@@ -31,6 +32,7 @@ from sensor_msgs.msg import JointState
 Array = NDArray[np.float64]
 _BLOCK = 100  # states are interpolated that many at a time
 _DEPTH = 10
+_AFTER_YOU, _LAST_RESORT = 0.3, 1.5  # [s], for the planner to leave first; to leave by force
 _LOG = logging.getLogger(__name__)
 
 
@@ -215,6 +217,9 @@ def main() -> None:
             stream.start(pickle.load(sys.stdin.buffer))
     except EOFError:
         stream.close(1.0)
+    # Fast DDS may spin without end where it leaves while another one does (its issue 6513)
+    time.sleep(_AFTER_YOU)
+    faulthandler.dump_traceback_later(_LAST_RESORT, exit=True)
     node.destroy_node()
     rclpy.try_shutdown()
 
