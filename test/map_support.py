@@ -46,7 +46,8 @@ def solve(study: Study, block: Block, monitor: Monitor) -> list[CellResult]:
 
 def solve_slowly(study: Study, block: Block, monitor: Monitor) -> list[CellResult]:
     """Note which block is begun, and by whom, and take a moment."""
-    begun = Path(os.environ[TROUBLE], f'{block[0].start}-{block[1].start}-{os.getpid()}')
+    corner = f'{block[0].start}-{block[1].start}'
+    begun = Path(os.environ[TROUBLE], f'block-{corner}-{os.getpid()}')
     with begun.open('a') as file:
         file.write('begun\n')
     time.sleep(0.3)
