@@ -13,6 +13,7 @@ import sys
 import time
 from types import SimpleNamespace
 from typing import Any
+import warnings
 
 from distributed import Client
 from flex_planner.cli import main
@@ -232,6 +233,13 @@ def test_client_that_is_killed_loses_no_finished_block(client: Client, tmp_path:
         assert set(begun(notes)) == wanted
         assert len(wanted) < 6
         assert_right(store)
+
+
+def test_second_cluster_on_a_machine_is_no_cause_for_warnings(client: Client) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter('error')
+        with local_cluster(1) as other:
+            assert other.submit(abs, -1).result() == 1
 
 
 def test_map_is_computed_on_a_cluster_that_is_there(client: Client, store: MapStore) -> None:

@@ -19,6 +19,7 @@ LOST = 'the scheduler was lost; finished blocks are kept, and are not computed a
 _CONNECTING = 10.0  # [s]
 _CLOSING = 5.0  # [s]
 _SHARE = 0.9  # of the memory, for all workers together
+_ANY_PORT = '127.0.0.1:0'  # of the scheduler's pages; Dask warns if its own is another map's
 _SETTINGS = {
     'distributed.scheduler.allowed-failures': ATTEMPTS - 1,
     # one block at a time in each process: another one is not blamed for the end of it
@@ -61,6 +62,7 @@ def local_cluster(workers: int) -> Iterator[Client]:
         try:
             cluster = LocalCluster(
                 n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None,
+                scheduler_kwargs={'dashboard_address': _ANY_PORT},
                 memory_limit=int(_SHARE * MEMORY_LIMIT / workers), silence_logs=logging.CRITICAL)
         except (OSError, RuntimeError) as error:
             raise ClusterError(f'cannot start {workers} processes: {error}') from error
