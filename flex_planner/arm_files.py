@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import asdict
 import math
 import os
 from pathlib import Path
 import sys
+from typing import Any
 
 from flex_planner.arm import Arm, Joint, Link, Motor, Node
 from flex_planner.errors import FlexPlannerError, InvalidValueError
@@ -108,6 +110,17 @@ def arm_from_mapping(content: object, path: str = '') -> Arm:
         nodes=tuple(_node(section) for section in top.sections('nodes', optional=True)),
         gravity=top.take('gravity', (0.0, 0.0)))
     return arm
+
+
+def plain_arm(arm: Arm) -> dict[str, Any]:
+    """
+    Return all values of an arm as YAML can write them.
+
+    They are the fields of `Arm` and its parts in SI units, which keep an arm in the metadata of
+    recordings and maps; an arm file may say the same in other quantities.
+
+    """
+    return {**asdict(arm), 'gravity': arm.gravity.tolist()}
 
 
 def _link(section: Section) -> Link:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from datetime import datetime, timezone
 from importlib.metadata import version
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any, TYPE_CHECKING
 
 from dask import array
 from flex_planner import __version__
+from flex_planner.arm_files import plain_arm
 from flex_planner.maps.cells import CellCode
 from flex_planner.maps.motions import signature_fields
 from flex_planner.task import Task
@@ -94,10 +94,9 @@ def _flags() -> dict[str, Any]:
 
 def metadata(study: Study) -> dict[str, str]:
     """Return the metadata of a study's store."""
-    arm = asdict(study.arm)
-    arm['gravity'] = study.arm.gravity.tolist()
     return {'title': study.name, 'quantity': study.quantity.key, 'study': study.text,
-            'arm': yaml.safe_dump(arm, sort_keys=False), 'Conventions': _CONVENTIONS,
+            'arm': yaml.safe_dump(plain_arm(study.arm), sort_keys=False),
+            'Conventions': _CONVENTIONS,
             'date_created': datetime.now(timezone.utc).isoformat(timespec='seconds'),
             'flex_planner_version': __version__,
             **{f'{name}_version': version(name) for name in _LIBRARIES}}

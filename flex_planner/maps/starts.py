@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from flex_planner.arm import Arm
+from flex_planner.arm_files import plain_arm
 from flex_planner.maps.cells import CellCode
 from flex_planner.maps.motions import distances, KeptMotion, signature
 from flex_planner.maps.quantities import Quantity
@@ -113,8 +114,7 @@ def _value(axis: Any, k: int) -> str:
 def _check_arm(path: Path, there: str, arm: Arm) -> None:
     """Refuse a map of another arm; its name and source do not matter."""
     found = yaml.safe_load(there)
-    own = {**asdict(arm), 'gravity': arm.gravity.tolist()}
-    own = yaml.safe_load(yaml.safe_dump(own))
+    own = yaml.safe_load(yaml.safe_dump(plain_arm(arm)))
     differing = [name for name in own if name not in ('name', 'source')
                  and own[name] != found.get(name)]
     if differing:

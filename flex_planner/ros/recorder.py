@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict
 from datetime import datetime, timezone
 import itertools
 from pathlib import Path
 
 from flex_planner import __version__
 from flex_planner.arm import Arm
+from flex_planner.arm_files import plain_arm
 from flex_planner.errors import RecordingError
 from flex_planner.plan import Plan
 from flex_planner.recording import (
@@ -135,8 +135,6 @@ class OutcomeRecorder:
 
     def _scenario(self, settings: PlannerSettings) -> str:
         """Return arm and parameters as YAML."""
-        arm = asdict(self._arm)
-        arm['gravity'] = self._arm.gravity.tolist()
-        text: str = yaml.safe_dump({'arm': arm, 'parameters': dict(as_mapping(settings))},
-                                   sort_keys=False)
+        text: str = yaml.safe_dump({'arm': plain_arm(self._arm),
+                                    'parameters': dict(as_mapping(settings))}, sort_keys=False)
         return text
