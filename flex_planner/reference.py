@@ -2,14 +2,15 @@
 A plan as samples that a joint controller follows.
 
 A controller interpolates the torque linearly between samples and holds the last sample for
-ever, so the samples are as close as the torque demands, and the last torque is the one that
-holds the arm still.
+ever, so the samples are as close as the torque demands, one lies where a motor reaches or leaves
+its limit, and the last torque is the one that holds the arm still.
 
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 from flex_planner.errors import InvalidTaskError
 from flex_planner.plan import Plan, Samples
@@ -25,7 +26,9 @@ HOLD_DELAY_NS = 1000
 _SMALLEST_STEP = 2.5e-4
 # a controller's message and a recording should stay below some megabytes
 MAX_SAMPLES = 20_000
-_PROBES = 4
+_PROBES = 8
+# of the steps: if more than these are too long, all are; else an excursion between two switches
+_FEW = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -40,8 +43,8 @@ class Reference:
     samples : Samples
         At these times; at rest, with the holding torque, in the last.
     torque_error : float
-        Largest difference between the planned torque and its linear interpolation found on a
-        grid four times as fine [N m].
+        Largest difference between the planned torque and its linear interpolation, found at
+        eight times as many points [N m].
 
     """
 
@@ -60,8 +63,9 @@ class SamplingSettings:
     longest_step : float
         0.00025 to 1 [s].
     torque_tolerance : float
-        The step is halved until linear interpolation is this exact, the step would fall below
-        0.25 ms, or the samples would be more than 20000; > 0 [N m].
+        Steps are halved until linear interpolation is this exact, they would fall below 0.25 ms,
+        or the samples would be more than 20000: all steps while more than a tenth of them are
+        too long, then those alone; > 0 [N m].
 
     Raises
     ------
@@ -81,7 +85,7 @@ class SamplingSettings:
 def sample_reference(plan: Plan, settings: SamplingSettings,
                      monitor: Monitor | None = None) -> Reference:
     """
-    Return samples of a solved plan, evenly spaced, and one more that holds the arm.
+    Return samples of a solved plan, and one more that holds the arm.
 
     Raises
     ------
@@ -104,27 +108,61 @@ def sample_reference(plan: Plan, settings: SamplingSettings,
             f'a motion of {duration:g} s sampled every {settings.longest_step:g} s has {count} '
             f'samples, but may have {MAX_SAMPLES}; the parameter sampling_step must be >= '
             f'{duration / MAX_SAMPLES:g} s')
-    while True:
-        watch.check()
-        error = _interpolation_error(plan, count)
-        finest = duration / count < 2 * _SMALLEST_STEP or 2 * count > MAX_SAMPLES
-        if error <= settings.torque_tolerance or finest:
-            break
-        count *= 2
-    times = np.linspace(0, duration, count + 1, dtype=np.float64)
+    times, error = _fitting(plan, settings, watch)
     times_ns = np.round(times * 1e9).astype(np.int64)
-    moving = _at_rest_at_the_ends(plan, plan.sample(times))
+    moving = _at_rest_at_the_ends(plan, plan.sample(np.minimum(times_ns * 1e-9, duration)))
     return Reference(times_ns=np.append(times_ns, times_ns[-1] + HOLD_DELAY_NS),
                      samples=_with_hold(plan, moving), torque_error=error)
 
 
-def _interpolation_error(plan: Plan, count: int) -> float:
-    """Return what linear interpolation over `count` steps changes in the torques [N m]."""
-    fine = plan.uniform_samples(_PROBES * count + 1).torques
-    share = np.linspace(0, 1, _PROBES, endpoint=False)[:, None]
-    ends = fine[::_PROBES]
-    lines = ends[:-1, None] * (1 - share) + ends[1:, None] * share  # (count, probes, n)
-    return float(np.abs(lines.reshape(-1, fine.shape[1]) - fine[:-1]).max())
+def _fitting(plan: Plan, settings: SamplingSettings, watch: Monitor) -> tuple[Array, float]:
+    """Return times between which the torques are nearly straight, and the error that is left."""
+    times = _first_times(plan, settings.longest_step)
+    errors = _interpolation_errors(plan, times[:-1], times[1:])
+    while True:
+        watch.check()
+        halved = _too_long(np.diff(times), errors, settings.torque_tolerance)
+        if not halved.any():
+            return times, float(errors.max())
+        middles = (times[:-1] + times[1:])[halved] / 2
+        times = np.insert(times, np.flatnonzero(halved) + 1, middles)
+        new, errors = np.repeat(halved, 1 + halved), np.repeat(errors, 1 + halved)
+        errors[new] = _interpolation_errors(plan, times[:-1][new], times[1:][new])
+
+
+def _too_long(steps: Array, errors: Array, tolerance: float) -> NDArray[np.bool_]:
+    """Return which steps are to be halved."""
+    long: NDArray[np.bool_] = steps >= 2 * _SMALLEST_STEP
+    halved = long & (errors > tolerance)
+    if halved.mean() > _FEW:
+        halved |= long & (steps > steps.max() / 2)
+    room = MAX_SAMPLES - steps.size
+    if np.count_nonzero(halved) > room:
+        worst = np.argsort(-np.where(halved, errors, 0.0))[:room]
+        halved &= np.isin(np.arange(steps.size), worst)
+    return halved
+
+
+def _first_times(plan: Plan, longest: float) -> Array:
+    """Return times that are evenly spaced between the switches of the motors."""
+    duration, breaks = plan.task.duration, [0.0]
+    if np.ceil(duration / longest) + plan.switching_times.size <= MAX_SAMPLES:
+        for time in plan.switching_times.tolist():
+            if breaks[-1] + _SMALLEST_STEP <= time <= duration - _SMALLEST_STEP:
+                breaks.append(time)
+    pieces = [np.linspace(first, last, int(np.ceil((last - first) / longest)), endpoint=False)
+              for first, last in pairwise([*breaks, duration])]
+    return np.concatenate([*pieces, [duration]])
+
+
+def _interpolation_errors(plan: Plan, first: Array, last: Array) -> Array:
+    """Return what linear interpolation from time to time changes in the torques [N m]."""
+    share = np.linspace(0, 1, _PROBES + 1)
+    times = first[:, None] + (last - first)[:, None] * share
+    torques = plan.sample(times.ravel()).torques.reshape(*times.shape, -1)
+    lines = np.stack([1 - share, share], axis=1) @ torques[:, [0, -1]]
+    errors: Array = np.abs(lines - torques).max(axis=(1, 2))
+    return errors
 
 
 def _at_rest_at_the_ends(plan: Plan, samples: Samples) -> Samples:

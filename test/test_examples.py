@@ -17,7 +17,7 @@ from ros_support import Planner
 FOLDER = Path(__file__).resolve().parents[1] / 'examples'
 SCRIPTS = {path.name: path for path in sorted(FOLDER.glob('*.py'))}
 WITH_ROS = {name for name, path in SCRIPTS.items() if 'import rclpy' in path.read_text()}
-LIMIT = 60.0  # [s], of a script on a machine that is busy
+LIMIT = 120.0  # [s], of a script on a machine that is busy
 LONGEST = 80  # lines
 
 # what must be among the lines of a script; a new one needs no entry
@@ -26,6 +26,7 @@ EXPECTED = {
     'controller.py': ('followed: at most 0.',),
     'find_the_payload.py': ('between 5.85', 'dJ/dm_p'),
     'keep_a_speed.py': ('w_2 = 4.2', 'an objective cannot be met'),
+    'map_the_payload.py': ('49 solved', '5.85    6.18', 'from the map: '),
     'minimum_time.py': ('shortest time with 1 kg: 0.642', 'in 1.00 s: 5.85'),
     'minimum_vibration.py': ('minimum vibration: ',),
     'plan_a_path.py': ('solved and certified by a cold start', 'J = 0.647'),

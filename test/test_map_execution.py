@@ -15,6 +15,7 @@ from types import SimpleNamespace
 from typing import Any
 import warnings
 
+import dask
 from distributed import Client
 from flex_planner.cli import main
 from flex_planner.cli.map_progress import progress_line
@@ -233,6 +234,11 @@ def test_client_that_is_killed_loses_no_finished_block(client: Client, tmp_path:
         assert set(begun(notes)) == wanted
         assert len(wanted) < 6
         assert_right(store)
+
+
+def test_processes_keep_no_profile_which_would_grow(client: Client) -> None:
+    setting = 'distributed.worker.profile.enabled'
+    assert set(client.run(dask.config.get, setting).values()) == {False}
 
 
 def test_second_cluster_on_a_machine_is_no_cause_for_warnings(client: Client) -> None:

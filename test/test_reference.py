@@ -9,6 +9,7 @@ from flex_planner.arm import Arm
 from flex_planner.errors import InvalidTaskError, InvalidValueError, NotFiniteError
 from flex_planner.model import ArmModel, Parameters
 from flex_planner.path import plan_path
+from flex_planner.payload import find_max_payload
 from flex_planner.plan import Plan
 from flex_planner.progress import Monitor, StoppedError
 from flex_planner.reference import (
@@ -35,7 +36,15 @@ def hanging(workshop_model: ArmModel, workshop_arm: Arm) -> Plan:
     return plan_path(task, model=workshop_model)
 
 
-@pytest.fixture(params=['flexible', 'hanging'])
+@pytest.fixture(scope='module')
+def saturated(rigid_model: ArmModel, rigid_arm: Arm, paper_task: Any) -> Plan:
+    """Return the plan with the largest payload: motors change from limit to limit in 4 ms."""
+    plan = find_max_payload(paper_task(rigid_arm), model=rigid_model).plan
+    assert plan is not None
+    return plan
+
+
+@pytest.fixture(params=['flexible', 'hanging', 'saturated'])
 def plan(request: pytest.FixtureRequest) -> Plan:
     plan: Plan = request.getfixturevalue(request.param)
     assert plan.solved, plan.message
@@ -45,7 +54,8 @@ def plan(request: pytest.FixtureRequest) -> Plan:
 def interpolation_error(plan: Plan, reference: Reference) -> float:
     """Return the error of linear interpolation on a grid 32 times as fine as the samples."""
     moving = reference.samples
-    times = np.linspace(0, plan.task.duration, 32 * (moving.times.size - 2) + 1)
+    shares = np.linspace(0, 1, 32, endpoint=False)
+    times = (moving.times[:-2, None] + np.diff(moving.times[:-1])[:, None] * shares).ravel()
     exact = plan.sample(times).torques
     lines = np.stack([np.interp(times, moving.times[:-1], column[:-1])
                       for column in moving.torques.T], axis=1)
@@ -109,13 +119,47 @@ def test_tighter_tolerance_gives_more_samples(plan: Plan) -> None:
     counts = [sample_reference(plan, SamplingSettings(torque_tolerance=tolerance)).times_ns.size
               for tolerance in (0.5, 0.02, 0.001)]
     assert counts[0] < counts[1] < counts[2]
-    assert counts[0] == 102  # steps of 10 ms, and the sample that holds
+    # steps of 10 ms, and the sample that holds; a switch adds one
+    assert 102 <= counts[0] <= 102 + plan.switching_times.size
+
+
+def test_samples_lie_on_switches_and_are_dense_only_where_torques_bend(saturated: Plan) -> None:
+    reference = sample_reference(saturated, SamplingSettings())
+    switches = np.round(saturated.switching_times * 1e9).astype(np.int64)
+    assert switches.size == 6
+    assert np.isin(switches, reference.times_ns).all()
+    steps = np.diff(reference.times_ns)[:-1]
+    assert reference.torque_error <= 0.02
+    assert reference.times_ns.size <= 110
+    assert steps.min() < 2_000_000 < 9_000_000 < steps.max() <= 10_000_000
+    at_limits = reference.samples.torques[np.isin(reference.times_ns, switches)]
+    bounds = saturated.arm.torque_bounds(
+        reference.samples.rates[np.isin(reference.times_ns, switches), :2])
+    nearest = np.abs(np.stack(bounds) - at_limits).min(axis=(0, 2))
+    assert (nearest < 1e-3).all()
+
+
+def test_switches_nearer_than_the_shortest_step_are_one(flexible: Plan) -> None:
+    switches = np.array([1e-4, 0.5, 0.5001, 0.70017, 0.9999])
+    plan = replace(flexible, switching_times=switches)
+    reference = sample_reference(plan, SamplingSettings(torque_tolerance=1e3))
+    assert np.isin([500_000_000, 700_170_000], reference.times_ns).all()
+    assert np.diff(reference.times_ns)[:-1].min() >= 250_000
+
+
+def test_samples_that_are_too_many_are_spent_where_they_matter_most(
+        flexible: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('flex_planner.reference.MAX_SAMPLES', 130)
+    errors = [sample_reference(flexible, SamplingSettings(torque_tolerance=tolerance))
+              for tolerance in (1e3, 1e-6)]
+    assert [len(reference.times_ns) for reference in errors] == [102, 132]
+    assert errors[1].torque_error < 0.8 * errors[0].torque_error
 
 
 def test_longest_step_is_kept(plan: Plan) -> None:
     reference = sample_reference(plan, SamplingSettings(longest_step=0.03, torque_tolerance=1e3))
     assert np.diff(reference.times_ns).max() <= 30_000_000
-    assert reference.times_ns.size == 36
+    assert 36 <= reference.times_ns.size <= 36 + plan.switching_times.size
 
 
 def test_steps_stay_above_a_quarter_of_a_millisecond(flexible: Plan) -> None:

@@ -29,6 +29,7 @@ from flex_planner.report.check import resimulated_states
 from flex_planner.report.frequencies import NaturalFrequencies
 from flex_planner.report.spectra import spectrum
 from flex_planner.simulation import simulate
+from flex_planner.validation import Array
 import numpy as np
 import pytest
 
@@ -362,10 +363,23 @@ def test_spectrum_has_the_amplitude_of_a_sine(length: int) -> None:
     assert amplitudes.max() == pytest.approx(0.25, rel=1e-6)
 
 
-def test_spectrum_of_uneven_times_or_no_signals_is_empty() -> None:
-    times = np.array([0, 0.1, 0.3, 0.4])
-    assert spectrum(times, np.ones((4, 1)))[0].size == 0
-    assert spectrum(times, np.ones((4, 0)))[1].shape == (0, 0)
+def test_spectrum_of_uneven_times_is_that_of_even_ones() -> None:
+    def signal(times: Array) -> Array:
+        return np.stack([np.sin(2 * np.pi * 9 * times), 0.1 * np.cos(2 * np.pi * 24 * times)], 1)
+
+    even = np.linspace(0, 2, 401)
+    uneven = np.sort(np.concatenate([even[::2], np.linspace(0.503, 0.508, 20)]))
+    wanted, found = (dict(zip(frequencies.round(2).tolist(), amplitudes, strict=True))
+                     for frequencies, amplitudes in (
+                         spectrum(times, signal(times)) for times in (even, uneven)))
+    for frequency in set(wanted) & set(found):
+        np.testing.assert_allclose(found[frequency], wanted[frequency], atol=2e-3)
+    assert max(found, key=lambda frequency: found[frequency][1]) == pytest.approx(24, abs=0.3)
+
+
+def test_spectrum_of_no_signals_or_a_single_time_is_empty() -> None:
+    assert spectrum(np.array([0, 0.1, 0.3, 0.4]), np.ones((4, 0)))[1].shape == (0, 0)
+    assert spectrum(np.zeros(1), np.ones((1, 2)))[1].shape == (0, 2)
 
 
 # Natural frequencies

@@ -1,0 +1,72 @@
+"""
+Map what an arm carries to every place, and start a search from the nearest cell.
+
+A study says what is asked; its cells are computed on all processors and kept in a store that
+xarray reads. The motions behind the numbers are kept, too: a search near a cell goes on from one.
+
+    tools/run python examples/map_the_payload.py
+
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from flex_planner.maps.cells import CellCode
+from flex_planner.maps.run import run_map
+from flex_planner.maps.starts import MapStarts
+from flex_planner.maps.store import MapStore, open_map
+from flex_planner.maps.study import load_study
+from flex_planner.model import ArmModel
+from flex_planner.payload import find_max_payload
+from flex_planner.plotting.maps import draw_map
+from flex_planner.task import postures_from_points, Task
+import numpy as np
+
+STUDY = """\
+name: Payload in 1 s
+arm: korayem_rigid
+quantity: max_payload
+start: [0.5, 0.0]              # tip [m]
+duration: 1.0                  # [s]
+effort_weights: [0.125, 0.125]
+axes:
+  goal_x: {from: 0.1, to: 0.9, count: 9}    # [m]
+  goal_y: {from: 0.2, to: 0.7, count: 6}
+"""
+FOLDER = Path('output') / 'map_the_payload'
+
+
+def main() -> None:
+    """Compute a small map, print it, draw it and start from it."""
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    file, place = FOLDER / 'study.yaml', FOLDER / 'study.zarr'
+    file.write_text(STUDY)
+    study = load_study(file)
+    with MapStore.of(place, study, reset=True) as store:
+        tally = run_map(study, store)
+    print(f'{tally.done} cells in {tally.elapsed:.1f} s, {tally.of(CellCode.SOLVED)} solved')
+
+    found = open_map(place).load()
+    print('\npayload [kg] to y \\ x [m]' + ''.join(f'{x:8.2f}' for x in found.goal_x.values))
+    for y in found.goal_y.values[::-1]:
+        row = found.sel(goal_y=y)
+        print(f'{y:24.2f}' + ''.join(
+            f'{value:8.2f}' if code == CellCode.SOLVED else f'{CellCode(code).name[:7]:>8}'
+            for value, code in zip(row.max_payload.values, row.code.values, strict=True)))
+
+    arm = study.arm
+    start, goal = postures_from_points(arm, (0.5, 0.0), (0.53, 0.47), elbow=-1)
+    task = Task(arm=arm, start_positions=start, goal_positions=goal, duration=1.0,
+                effort_weights=np.full(2, 1 / 8))
+    cell, model = MapStarts(place, arm).near(task, searched=True), ArmModel(arm)
+    print()
+    for name, motion in (('from nothing', None), ('from the map', cell and cell.motion.start())):
+        search = find_max_payload(task, model=model, start_from=motion)
+        print(f'{name}: {search.payload:.3f} kg after {search.iterations} iterations')
+    for picture in draw_map(place, FOLDER):
+        print(f'picture: {picture}')
+
+
+if __name__ == '__main__':
+    main()
