@@ -26,7 +26,7 @@ _SETTINGS = {
     'distributed.scheduler.worker-saturation': 1.0,
     # else a process that happens to be starting again that long after its end is given up
     'distributed.deploy.lost-worker-timeout': '1000 hours',
-    # it keeps an hour of call stacks: 4 MB a minute in every process
+    # it keeps an hour of call stacks: 15 MB a minute in every process
     'distributed.worker.profile.enabled': False,
 }
 _NOISY = ('distributed', 'distributed.client', 'tornado.application')
