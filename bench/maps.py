@@ -1,7 +1,7 @@
 """
 Capacity maps: cells a second on one and on two processes, from neighbours and from nothing.
 
-Run by ``tools/run python -m bench.maps``, on an idle machine; takes five minutes.
+Run by ``tools/run python -m bench.maps``, on an idle machine; takes ten minutes.
 
 """
 
@@ -31,7 +31,7 @@ from flex_planner.processors import one_thread_each
 import numpy as np
 
 BLOCK, REPEATS, COLD_A_BLOCK = 5, 3, 2
-SIDES = {'korayem_rigid': 20, 'korayem_ei50': 10}
+SIDES = {'korayem_rigid': 20, 'korayem_ei50': 15}
 _MEGABYTE = 1024  # in the unit of ru_maxrss
 
 

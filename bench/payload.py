@@ -28,7 +28,8 @@ from flex_planner.transcription import Mesh
 import numpy as np
 
 # of the payload [kg]: errors of the tip [m] that go with it. The first is what a plan must keep.
-ACCURACIES = {1e-3: CertificateLimits().tip_error, 1e-6: 1e-8}
+# The finest bracket is a millionth of the payload wide, 6e-6 kg here.
+ACCURACIES = {1e-3: CertificateLimits().tip_error, 1e-5: 1e-8}
 ARMS = {'korayem_rigid': 'rigid', 'korayem_ei50': 'EI 50, 2 x 2 modes',
         'korayem_ei5': 'EI 5, 2 x 2 modes'}
 SCHEMES = {'IPOPT, Radau 3': ('radau', 3), 'IPOPT, Gauss 8': ('gauss', 8),
@@ -36,8 +37,8 @@ SCHEMES = {'IPOPT, Radau 3': ('radau', 3), 'IPOPT, Gauss 8': ('gauss', 8),
 INTERVALS = (10, 20, 40, 80, 160, 320, 640)
 SEARCH_SECONDS = 60.0
 # of the payload against the cost for IPOPT: so high that the limit is a hundredth of it away
-_PRICES = {1e-3: 1e3, 1e-6: 3e4}
-_LIGHT, _EXACT = 1.0, 1e-7
+_PRICES = {1e-3: 1e3, 1e-5: 3e4}
+_LIGHT, _EXACT = 1.0, 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
