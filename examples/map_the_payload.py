@@ -60,8 +60,9 @@ def main() -> None:
     task = Task(arm=arm, start_positions=start, goal_positions=goal, duration=1.0,
                 effort_weights=np.full(2, 1 / 8))
     cell, model = MapStarts(place, arm).near(task, searched=True), ArmModel(arm)
+    known = cell.motion.start() if cell else None
     print()
-    for name, motion in (('from nothing', None), ('from the map', cell and cell.motion.start())):
+    for name, motion in (('from nothing', None), ('from the map', known)):
         search = find_max_payload(task, model=model, start_from=motion)
         print(f'{name}: {search.payload:.3f} kg after {search.iterations} iterations')
     for picture in draw_map(place, FOLDER):
