@@ -17,7 +17,7 @@ from ros_support import Planner
 FOLDER = Path(__file__).resolve().parents[1] / 'examples'
 SCRIPTS = {path.name: path for path in sorted(FOLDER.glob('*.py'))}
 WITH_ROS = {name for name, path in SCRIPTS.items() if 'import rclpy' in path.read_text()}
-LIMIT = 120.0  # [s], of a script on a machine that is busy
+LIMIT = 60.0  # [s], of a script on a machine that is busy
 LONGEST = 80  # lines
 
 # what must be among the lines of a script; a new one needs no entry

@@ -10,6 +10,8 @@ import os
 from pathlib import Path
 import pickle
 import signal
+import subprocess
+import sys
 import time
 from typing import NamedTuple
 
@@ -230,6 +232,25 @@ def test_new_plan_takes_the_place_of_the_one_before(planner: Planner, heard: lis
     count = len(stamps) - (change + 1)
     assert count in (100, 101)
     assert stamps[-1] - stamps[change + 1] == (count - 1) * 10**7 + 1000  # without a hole
+
+
+# Leaves as the streaming process does, but rclpy spins and holds the interpreter's lock.
+SPINNING = """
+import ctypes
+from flex_planner.ros import streaming
+
+streaming.rclpy.try_shutdown = lambda: ctypes.PyDLL(None).sleep(600)
+streaming.main()
+"""
+
+
+def test_process_that_spins_while_it_leaves_is_ended_by_force() -> None:
+    hung = subprocess.run([sys.executable, '-c', SPINNING, 'hung_states', '/', '/hung'],
+                          stdin=subprocess.DEVNULL, capture_output=True, check=False, text=True,
+                          timeout=60)
+    assert hung.returncode == 1
+    assert hung.stderr.startswith('Timeout (')
+    assert 'in main' in hung.stderr  # where it was
 
 
 def test_states_that_were_due_before_a_plan_came_are_left_out(plan_of: PlanFactory) -> None:

@@ -115,12 +115,20 @@ def test_torque_error_bounds_linear_interpolation(plan: Plan, tolerance: float) 
     assert interpolation_error(plan, reference) <= 1.02 * reference.torque_error
 
 
+def fewest_samples(plan: Plan, longest: float) -> int:
+    """Return the steps between switches, and two samples: where they end, and to hold the arm."""
+    ends = [0.0, *plan.switching_times, 1.0]
+    count = int(np.ceil(np.diff(ends) / longest).sum()) + 2
+    # without switches 102 of 10 ms, 36 of 30 ms
+    assert plan.switching_times.size or count == {0.01: 102, 0.03: 36}[longest]
+    return count
+
+
 def test_tighter_tolerance_gives_more_samples(plan: Plan) -> None:
     counts = [sample_reference(plan, SamplingSettings(torque_tolerance=tolerance)).times_ns.size
               for tolerance in (0.5, 0.02, 0.001)]
     assert counts[0] < counts[1] < counts[2]
-    # steps of 10 ms, and the sample that holds; a switch adds one
-    assert 102 <= counts[0] <= 102 + plan.switching_times.size
+    assert counts[0] == fewest_samples(plan, 0.01)
 
 
 def test_samples_lie_on_switches_and_are_dense_only_where_torques_bend(saturated: Plan) -> None:
@@ -159,7 +167,7 @@ def test_samples_that_are_too_many_are_spent_where_they_matter_most(
 def test_longest_step_is_kept(plan: Plan) -> None:
     reference = sample_reference(plan, SamplingSettings(longest_step=0.03, torque_tolerance=1e3))
     assert np.diff(reference.times_ns).max() <= 30_000_000
-    assert 36 <= reference.times_ns.size <= 36 + plan.switching_times.size
+    assert reference.times_ns.size == fewest_samples(plan, 0.03)
 
 
 def test_steps_stay_above_a_quarter_of_a_millisecond(flexible: Plan) -> None:

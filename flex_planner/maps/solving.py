@@ -74,9 +74,11 @@ class Solver:
             If the monitor stopped a simulation.
 
         """
-        study, model, settings = self._study, self._model, self._settings(task)
+        study, model = self._study, self._model
+        problem = MotionProblem(model, task, task_parameters(task))
+        settings = _settings(problem)
         if study.quantity is Quantity.MAX_PAYLOAD:
-            return self._payload(task, settings, monitor, near, far, ratio)
+            return self._payload(problem, settings, monitor, near, far, ratio)
         if study.quantity is Quantity.MIN_DURATION:
             return find_min_duration(task, model=model, settings=settings, monitor=monitor,
                                      accuracy=study.accuracy, start_from=near, before=far,
@@ -87,16 +89,8 @@ class Solver:
             return plan
         return self._shaken(index, task, plan, monitor)
 
-    def _settings(self, task: Task) -> Settings:
-        """Return the settings of a cell, so that none takes much more memory than others."""
-        settings = Settings()
-        fewest = MotionProblem(self._model, task, task_parameters(task)).fewest_intervals(
-            settings.stages)
-        most = min(max(_INTERVALS, _LARGEST * fewest), settings.max_intervals)
-        return replace(settings, max_intervals=most)
-
-    def _payload(self, task: Task, settings: Settings, monitor: Monitor, near: Any, far: Any,
-                 ratio: float) -> Found:
+    def _payload(self, problem: MotionProblem, settings: Settings, monitor: Monitor, near: Any,
+                 far: Any, ratio: float) -> Found:
         """
         Return the largest payload, or the shortest duration where that is too long.
 
@@ -104,9 +98,9 @@ class Solver:
         of such cells that costs a few iterations.
 
         """
-        late = isinstance(near, MinDuration)
-        if self._says_much and (late or self._may_be_none(task, settings, near, far, ratio,
-                                                          monitor)):
+        task, late = problem.task, isinstance(near, MinDuration)
+        if self._says_much and (late or _may_be_none(problem, settings, near, far, ratio,
+                                                     monitor)):
             shortest = find_min_duration(
                 task, model=self._model, settings=settings, monitor=monitor,
                 accuracy=_SHORT * task.duration, start_from=near if late else None,
@@ -118,15 +112,6 @@ class Solver:
         return find_max_payload(task, model=self._model, settings=settings, monitor=monitor,
                                 accuracy=self._study.accuracy, start_from=near, before=far,
                                 ratio=ratio)
-
-    def _may_be_none(self, task: Task, settings: Settings, near: MaxPayload | None,
-                     far: MaxPayload | None, ratio: float, monitor: Monitor) -> bool:
-        """Return whether neighbours, or a first trial, let expect that nothing can be carried."""
-        if near is None:
-            problem = MotionProblem(self._model, task, task_parameters(task))
-            return not first_motion(problem, on_the_way(settings), monitor).converged
-        slope = near.payload - far.payload if far is not None else -near.payload / 2
-        return near.payload + 2 * ratio * slope < task.payload_mass
 
     @property
     def _says_much(self) -> bool:
@@ -163,6 +148,23 @@ class Solver:
                           bound=bound, cost=plan.cost, tip_error=plan.certificate.tip_error,
                           iterations=solution.iterations,
                           motion=_kept(found, plan) if self._study.keeps_motions else None)
+
+
+def _settings(problem: MotionProblem) -> Settings:
+    """Return the settings of a cell, so that none takes much more memory than others."""
+    settings = Settings()
+    fewest = problem.fewest_intervals(settings.stages)
+    most = min(max(_INTERVALS, _LARGEST * fewest), settings.max_intervals)
+    return replace(settings, max_intervals=most)
+
+
+def _may_be_none(problem: MotionProblem, settings: Settings, near: MaxPayload | None,
+                 far: MaxPayload | None, ratio: float, monitor: Monitor) -> bool:
+    """Return whether neighbours, or a first trial, let expect that nothing can be carried."""
+    if near is None:
+        return not first_motion(problem, on_the_way(settings), monitor).converged
+    slope = near.payload - far.payload if far is not None else -near.payload / 2
+    return near.payload + 2 * ratio * slope < problem.task.payload_mass
 
 
 def _kept(found: Found, plan: Plan) -> KeptMotion | None:
