@@ -25,7 +25,7 @@ setup:
 	@$(PYTHON) tools/setup_environment.py $(SETUP_FLAGS)
 
 demo: setup
-	@tools/run python -m flex_planner.demo
+	@tools/run python -m flex_planner.cli.demo
 
 paper: setup
 	@tools/run flex-planner paper --output docs

@@ -14,7 +14,7 @@ setup(
     python_requires='>=3.10',
     packages=find_packages(include=['flex_planner', 'flex_planner.*']),
     package_data={'flex_planner': ['py.typed'],
-                  'flex_planner.report': ['page.html', 'plots.js']},
+                  'flex_planner.reports.recording': ['page.html', 'plots.js']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),
@@ -41,7 +41,7 @@ setup(
     zip_safe=False,
     entry_points={
         'console_scripts': [
-            'planner = flex_planner.ros.planner_node:main',
+            'planner = flex_planner.ros.planner.node:main',
             'arm_simulator = flex_planner.ros.arm_simulator:main',
             'replay = flex_planner.ros.replay:main',
             'flex-planner = flex_planner.cli:main',

@@ -12,9 +12,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from flex_planner.arm import Arm
-from flex_planner.model import Parameters
-from flex_planner.validation import Array
+from flex_planner.arms.arm import Arm
+from flex_planner.base.validation import Array
+from flex_planner.optimal_control.arm_model import Parameters
 import numpy as np
 import sympy
 

@@ -12,18 +12,18 @@ import time
 
 from bench.model import uniform_arm
 from bench.solver import paper_problem
-from flex_planner.arm import Arm, Motor
-from flex_planner.certify import certify
+from flex_planner.arms.arm import Arm, Motor
+from flex_planner.base.progress import Monitor
 from flex_planner.collocation import Settings
 from flex_planner.collocation.equations import collocation_residual, factorised, linearised
 from flex_planner.collocation.estimate import estimated
 from flex_planner.collocation.mesh import defects
-from flex_planner.model import ArmModel
-from flex_planner.path import plan_path
-from flex_planner.plan import Plan
-from flex_planner.progress import Monitor
-from flex_planner.strategies import cold_start
-from flex_planner.task import Task
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.task import Task
+from flex_planner.planning.certificate import certify
+from flex_planner.planning.plan import Plan
+from flex_planner.planning.plan_path import plan_path
+from flex_planner.planning.strategies.initial_guesses import cold_start
 import numpy as np
 
 SIZES = [(n, m) for n in range(1, 5) for m in range(5) if n * m <= 8]

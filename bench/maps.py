@@ -15,19 +15,19 @@ import statistics
 import sys
 import tempfile
 
-from flex_planner.arm_files import load_arm
+from flex_planner.arms.arm_files import load_arm
+from flex_planner.base.processes import one_thread_each
+from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.maps.axes import Axis
-from flex_planner.maps.blocks import blocks, solve_block
-from flex_planner.maps.ends import End
-from flex_planner.maps.run import run_map
+from flex_planner.maps.block_solver import blocks, solve_block
+from flex_planner.maps.end_points import End
+from flex_planner.maps.run_map import run_map
 from flex_planner.maps.store import MapStore
 from flex_planner.maps.study import Quantity, Study
-from flex_planner.mismatch import Mismatch
-from flex_planner.model import ArmModel
-from flex_planner.motion_report import table
-from flex_planner.payload import find_max_payload
-from flex_planner.plan import PlanStatus
-from flex_planner.processors import one_thread_each
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.planning.plan import PlanStatus
+from flex_planner.reports.motion import table
+from flex_planner.simulation.mismatch import Mismatch
 import numpy as np
 
 BLOCK, REPEATS, COLD_A_BLOCK = 5, 3, 2

@@ -19,10 +19,10 @@ import time
 from typing import Any
 
 from bench.brute_force import brute_force_rate
-from flex_planner.arm import Arm
-from flex_planner.arm_files import load_arm
-from flex_planner.model import ArmModel, Parameters
-from flex_planner.validation import Array
+from flex_planner.arms.arm import Arm
+from flex_planner.arms.arm_files import load_arm
+from flex_planner.base.validation import Array
+from flex_planner.optimal_control.arm_model import ArmModel, Parameters
 import numpy as np
 
 POINTS = 300
@@ -79,7 +79,7 @@ def start_seconds(arm: Arm, cache: str) -> float:
     code = (
         'import sys, time, pickle\n'
         'began = time.perf_counter()\n'
-        'from flex_planner.model import ArmModel\n'
+        'from flex_planner.optimal_control.arm_model import ArmModel\n'
         'ArmModel(pickle.loads(bytes.fromhex(sys.argv[1])))\n'
         'print(time.perf_counter() - began)\n')
     result = subprocess.run([sys.executable, '-c', code, pickle.dumps(arm).hex()], check=True,
@@ -90,7 +90,7 @@ def start_seconds(arm: Arm, cache: str) -> float:
 
 def interpreted_seconds(arm: Arm, z: Array, p: Array) -> float:
     """Return the time of CasADi's virtual machine for all points, called once."""
-    from flex_planner.pontryagin import build_functions
+    from flex_planner.optimal_control.pontryagin import build_functions
 
     function, _ = build_functions(arm)['optimality_jacobian']
     mapped = function.map(len(z))
@@ -100,7 +100,7 @@ def interpreted_seconds(arm: Arm, z: Array, p: Array) -> float:
 
 def measure(links: int, modes: int) -> Row:
     """Return the figures of one arm."""
-    from flex_planner.pontryagin import build_functions
+    from flex_planner.optimal_control.pontryagin import build_functions
 
     arm = uniform_arm(links, modes)
     built = build_functions(arm)

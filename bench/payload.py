@@ -16,15 +16,15 @@ import statistics
 import time
 
 from bench.solver import paper_problem
-from flex_planner.certify import CertificateLimits
-from flex_planner.direct import DirectProblem, DirectResult, DirectSettings
-from flex_planner.duration import find_min_duration
-from flex_planner.kinematics import tip_position
-from flex_planner.motion import MotionProblem
-from flex_planner.payload import find_max_payload, PayloadMethod
-from flex_planner.progress import Monitor
-from flex_planner.simulation import PiecewisePolynomial, simulate
-from flex_planner.transcription import Mesh
+from flex_planner.arms.kinematics import tip_position
+from flex_planner.base.progress import Monitor
+from flex_planner.capacity.max_payload import find_max_payload, PayloadMethod
+from flex_planner.capacity.min_duration import find_min_duration
+from flex_planner.dynamics.integration import PiecewisePolynomial, simulate
+from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectResult, DirectSettings
+from flex_planner.optimal_control.direct.programme import Mesh
+from flex_planner.optimal_control.motion_problem import MotionProblem
+from flex_planner.planning.certificate import CertificateLimits
 import numpy as np
 
 # of the payload [kg]: errors of the tip [m] that go with it. The first is what a plan must keep.

@@ -4,7 +4,7 @@ Other ways to the same motions: SciPy's solve_bvp, and direct collocation with I
 Each rival runs at a level: a tolerance of solve_bvp, a number of intervals for IPOPT. `matched`
 looks for the level that reaches an accuracy, so that times of equally good results are compared.
 solve_bvp evaluates the planner's own compiled functions, IPOPT the programme of
-`flex_planner.transcription`.
+`flex_planner.optimal_control.direct.programme`.
 
 """
 
@@ -15,12 +15,12 @@ from dataclasses import dataclass, replace
 import time
 from typing import Any
 
+from flex_planner.base.progress import Monitor, StoppedError
+from flex_planner.base.validation import Array
 from flex_planner.collocation import GaussRule
-from flex_planner.direct import DirectProblem, DirectResult, DirectSettings
-from flex_planner.motion import MotionProblem, task_parameters
-from flex_planner.plan import Plan
-from flex_planner.progress import Monitor, StoppedError
-from flex_planner.validation import Array
+from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectResult, DirectSettings
+from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
+from flex_planner.planning.plan import Plan
 import numpy as np
 from scipy.integrate import solve_bvp
 

@@ -22,15 +22,15 @@ from bench.rivals import (
     warm_boundary_value_run,
     warm_direct_run,
 )
-from flex_planner.arm_files import load_arm
-from flex_planner.certify import totals
+from flex_planner.arms.arm_files import load_arm
+from flex_planner.base.progress import Monitor
 from flex_planner.collocation import CollocationResult, Settings, solve
-from flex_planner.model import ArmModel
-from flex_planner.motion import MotionProblem, task_parameters
-from flex_planner.path import plan_path
-from flex_planner.progress import Monitor
-from flex_planner.strategies import cold_start
-from flex_planner.task import postures_from_points, Task
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
+from flex_planner.optimal_control.task import postures_from_points, Task
+from flex_planner.planning.certificate import totals
+from flex_planner.planning.plan_path import plan_path
+from flex_planner.planning.strategies.initial_guesses import cold_start
 import numpy as np
 
 ACCURACIES = (1e-3, 1e-6)

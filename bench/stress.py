@@ -14,7 +14,7 @@ import tempfile
 import time
 from typing import Any
 
-from flex_planner.ros.processes import NodeProcess
+from flex_planner.ros.runtime.processes import NodeProcess
 from flex_planner_interfaces import action
 from flex_planner_interfaces.msg import MotionTask
 from geometry_msgs.msg import Point
@@ -102,7 +102,7 @@ def main() -> int:
     rclpy.init()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        with NodeProcess('flex_planner.ros.planner_node',
+        with NodeProcess('flex_planner.ros.planner.node',
                          {'arm': 'korayem_ei50', 'recording_folder': folder / 'recordings'},
                          log=folder / 'planner.log') as node:
             client = Client()

@@ -15,13 +15,13 @@ from dataclasses import replace
 from pathlib import Path
 import sys
 
-from flex_planner.arm_files import load_arm
-from flex_planner.extended_motion import payload_price
-from flex_planner.model import ArmModel
-from flex_planner.path import plan_path
-from flex_planner.payload import find_max_payload
+from flex_planner.arms.arm_files import load_arm
+from flex_planner.capacity.max_payload import find_max_payload
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.free_payload import payload_price
+from flex_planner.optimal_control.task import postures_from_points, Task
+from flex_planner.planning.plan_path import plan_path
 from flex_planner.plotting import draw_max_payload, Motion
-from flex_planner.task import postures_from_points, Task
 import numpy as np
 
 PICTURE = Path('output') / 'find_the_payload.png'

@@ -13,13 +13,13 @@ from __future__ import annotations
 
 import sys
 
-from flex_planner.arm_files import load_arm
-from flex_planner.model import ArmModel
-from flex_planner.motion_report import weights_table
-from flex_planner.objectives import Objectives
-from flex_planner.path import plan_path
-from flex_planner.plan import peaks
-from flex_planner.task import postures_from_points, Task
+from flex_planner.arms.arm_files import load_arm
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.task import postures_from_points, Task
+from flex_planner.planning.objectives import Objectives
+from flex_planner.planning.plan import peaks
+from flex_planner.planning.plan_path import plan_path
+from flex_planner.reports.motion import weights_table
 import numpy as np
 
 LIMIT = 0.8  # [rad/s]

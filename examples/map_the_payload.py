@@ -12,15 +12,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from flex_planner.maps.cells import CellCode
-from flex_planner.maps.run import run_map
-from flex_planner.maps.starts import MapStarts
+from flex_planner.capacity.max_payload import find_max_payload
+from flex_planner.maps.cell_results import CellCode
+from flex_planner.maps.draw_map import draw_map
+from flex_planner.maps.map_starts import MapStarts
+from flex_planner.maps.run_map import run_map
 from flex_planner.maps.store import MapStore, open_map
 from flex_planner.maps.study import load_study
-from flex_planner.model import ArmModel
-from flex_planner.payload import find_max_payload
-from flex_planner.plotting.maps import draw_map
-from flex_planner.task import postures_from_points, Task
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.task import postures_from_points, Task
 import numpy as np
 
 STUDY = """\

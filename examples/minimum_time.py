@@ -10,12 +10,12 @@ from __future__ import annotations
 from pathlib import Path
 import sys
 
-from flex_planner.arm_files import load_arm
-from flex_planner.duration import find_min_duration, payload_against_duration
-from flex_planner.model import ArmModel
-from flex_planner.objectives import minimum_time
-from flex_planner.path import plan_path
-from flex_planner.task import postures_from_points, Task
+from flex_planner.arms.arm_files import load_arm
+from flex_planner.capacity.min_duration import find_min_duration, payload_against_duration
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.task import postures_from_points, Task
+from flex_planner.planning.objectives import minimum_time
+from flex_planner.planning.plan_path import plan_path
 from matplotlib.figure import Figure
 import numpy as np
 

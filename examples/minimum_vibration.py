@@ -13,11 +13,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from flex_planner.arm_files import load_arm
-from flex_planner.model import ArmModel
-from flex_planner.objectives import minimum_effort, minimum_vibration
-from flex_planner.path import plan_path
-from flex_planner.task import postures_from_points, Task
+from flex_planner.arms.arm_files import load_arm
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.task import postures_from_points, Task
+from flex_planner.planning.objectives import minimum_effort, minimum_vibration
+from flex_planner.planning.plan_path import plan_path
 from matplotlib.figure import Figure
 import numpy as np
 

@@ -14,11 +14,11 @@ from __future__ import annotations
 from pathlib import Path
 import sys
 
-from flex_planner.arm_files import load_arm
-from flex_planner.path import plan_path
-from flex_planner.plan import Samples
+from flex_planner.arms.arm_files import load_arm
+from flex_planner.optimal_control.task import postures_from_points, Task
+from flex_planner.planning.plan import Samples
+from flex_planner.planning.plan_path import plan_path
 from flex_planner.plotting import draw_motion, Motion
-from flex_planner.task import postures_from_points, Task
 import numpy as np
 
 PICTURE = Path('output') / 'plan_a_path.png'

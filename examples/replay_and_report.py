@@ -15,14 +15,14 @@ from collections import Counter
 from pathlib import Path
 import sys
 
-from flex_planner.arm_files import load_arm
-from flex_planner.cli.recording import RequestRecorder
+from flex_planner.arms.arm_files import load_arm
+from flex_planner.cli.recorder import RequestRecorder
 from flex_planner.cli.request import Request
-from flex_planner.path import plan_path
+from flex_planner.optimal_control.task import postures_from_points, Task
+from flex_planner.planning.plan_path import plan_path
+from flex_planner.planning.sampling import sample_reference
 from flex_planner.recording import definition_folder, MessageTypes, read_recording
-from flex_planner.reference import sample_reference
-from flex_planner.report import check_motion, RecordedRequest, verdict, write_report
-from flex_planner.task import postures_from_points, Task
+from flex_planner.reports.recording import check_motion, RecordedRequest, verdict, write_report
 import numpy as np
 
 FOLDER = Path('output')

@@ -13,12 +13,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from flex_planner.arm_files import ArmFileError, load_arm
-from flex_planner.arm_report import describe_arm
-from flex_planner.model import ArmModel
-from flex_planner.path import plan_path
+from flex_planner.arms.arm_files import ArmFileError, load_arm
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.task import Task
+from flex_planner.planning.plan_path import plan_path
 from flex_planner.plotting import draw_mode_shapes
-from flex_planner.task import Task
+from flex_planner.reports.arm import describe_arm
 import numpy as np
 
 FOLDER = Path('output')

@@ -8,19 +8,21 @@ the compiled functions stay in the user's cache folder.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 import os
+from pathlib import Path
 from typing import Any
 
-from flex_planner.arm import Arm, Joint, Link, Motor, Node
-from flex_planner.arm_files import load_arm
-from flex_planner.model import ArmModel
-from flex_planner.path import plan_path
-from flex_planner.plan import Plan
-from flex_planner.task import postures_from_points, Task
+from factories import PlanFactory, TaskFactory
+from flex_planner.arms.arm import Arm, Joint, Link, Motor, Node
+from flex_planner.arms.arm_files import load_arm
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.task import postures_from_points, Task
+from flex_planner.planning.plan import Plan
+from flex_planner.planning.plan_path import plan_path
 from hypothesis import settings
 import pytest
 
+FOLDER = Path(__file__).parent
 # read when a message class is imported: assignments of a wrong type fail at once
 os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
 
@@ -28,18 +30,15 @@ os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
 settings.register_profile('repository', deadline=None, derandomize=True)
 settings.load_profile('repository')
 
-TaskFactory = Callable[..., Task]
-PlanFactory = Callable[..., Plan]
 
-
-# nodes, simulators and clusters have processes of their own, and some of them are timed
-ALONE = ('test_demo', 'test_examples', 'test_map_execution', 'test_node', 'test_simulator')
+# tests in these folders have other processes, and some of them are timed
+ALONE = {'ros', 'system'}
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark the tests that do not run beside others."""
     for item in items:
-        if item.path.name.startswith(ALONE):
+        if item.path.relative_to(FOLDER).parts[0] in ALONE:
             item.add_marker(pytest.mark.alone)
 
 

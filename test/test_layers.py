@@ -1,4 +1,4 @@
-"""Imports go one way: the numerical core knows nothing of ROS, recordings, plots or files."""
+"""Imports go one way, floor by floor: the numerical core knows nothing of what stands above it."""
 
 from __future__ import annotations
 
@@ -12,9 +12,22 @@ import flex_planner
 import pytest
 
 ROOT = Path(flex_planner.__file__).parent
-# beside the core, never imported by it
-BESIDE = {'arm_report', 'cli', 'comparison_report', 'demo', 'maps', 'motion_report', 'paper',
-          'plotting', 'recording', 'report', 'ros'}
+# a package imports from lower floors and from itself, never from its own floor or above
+FLOORS = {
+    'base': 0,
+    'arms': 1, 'collocation': 1, 'recording': 1,
+    'dynamics': 2,
+    'optimal_control': 3,
+    'planning': 4,
+    'capacity': 5, 'simulation': 5,
+    'plotting': 6, 'reports': 6,
+    'maps': 7, 'paper': 7,
+    'ros': 8,
+    'cli': 9,
+}
+CORE = ('base', 'arms', 'collocation', 'dynamics', 'optimal_control', 'planning', 'capacity',
+        'simulation')
+# what the core must do without
 BLOCKED = ['rclpy', 'flex_planner_interfaces', 'matplotlib', 'mcap', 'mcap_ros2', 'rosbags',
            'geometry_msgs', 'sensor_msgs', 'trajectory_msgs', 'builtin_interfaces']
 
@@ -24,8 +37,13 @@ def module_name(path: Path) -> str:
     return '.'.join(part for part in parts if part != '__init__')
 
 
+def package(name: str) -> str:
+    """Return the top folder of a module of ours; empty for the face itself."""
+    return (name.split('.') + [''])[1]
+
+
 PATHS = {module_name(path): path for path in sorted(ROOT.rglob('*.py'))}
-CORE = [name for name in PATHS if name.split('.')[1:2] != [] and name.split('.')[1] not in BESIDE]
+IN_CORE = [name for name in PATHS if package(name) in CORE]
 
 
 def imports(name: str) -> set[str]:
@@ -49,9 +67,10 @@ def test_core_works_without_ros_plotting_and_recording() -> None:
     result = run(
         'import importlib, sys\n'
         f'sys.modules.update(dict.fromkeys({BLOCKED}))\n'
-        f'for name in {CORE}: importlib.import_module(name)\n'
-        'from flex_planner.arm_files import load_arm\n'
-        'from flex_planner.path import plan_path; from flex_planner.task import Task\n'
+        f'for name in {IN_CORE}: importlib.import_module(name)\n'
+        'from flex_planner.arms.arm_files import load_arm\n'
+        'from flex_planner.planning.plan_path import plan_path\n'
+        'from flex_planner.optimal_control.task import Task\n'
         "task = Task(arm=load_arm('korayem_rigid'), start_positions=[0, 1],\n"
         '            goal_positions=[1, 1], duration=1.0)\n'
         'print(plan_path(task).solved)')
@@ -63,35 +82,47 @@ def test_blocker_of_the_test_above_does_block() -> None:
     assert 'ModuleNotFoundError' in result.stderr
 
 
-@pytest.mark.parametrize('name', CORE)
-def test_core_module_imports_nothing_from_beside_the_core(name: str) -> None:
-    inner = {entry.split('.')[1] for entry in imports(name) if entry.startswith('flex_planner.')}
-    assert not inner & BESIDE
-    assert not imports(name) & set(BLOCKED)
+def test_every_package_has_a_floor() -> None:
+    folders = {path.name for path in ROOT.iterdir() if (path / '__init__.py').is_file()}
+    assert folders == set(FLOORS)
 
 
-def test_core_modules_do_not_import_one_another_in_circles() -> None:
+@pytest.mark.parametrize('name', [name for name in PATHS if package(name)])
+def test_module_imports_only_from_lower_floors(name: str) -> None:
+    own = package(name)
+    ours = {package(entry) for entry in imports(name) if entry.startswith('flex_planner.')}
+    assert not {other for other in ours - {own} if FLOORS[other] >= FLOORS[own]}
+    if own in CORE:
+        assert not imports(name) & set(BLOCKED)
+
+
+@pytest.mark.parametrize('folder', FLOORS)
+def test_modules_of_a_package_do_not_import_one_another_in_circles(folder: str) -> None:
     # a package's __init__ stands for its modules and is not a part of their order
-    left = {name: imports(name) & set(CORE) for name in CORE if PATHS[name].stem != '__init__'}
-    imported = set(CORE) - set(left)
+    own = {name for name in PATHS if package(name) == folder and PATHS[name].stem != '__init__'}
+    left = {name: imports(name) & own for name in own}
+    imported: set[str] = set()
     while ready := {name for name, needed in left.items() if needed <= imported}:
         imported |= ready
         left = {name: needed for name, needed in left.items() if name not in ready}
     assert not left
 
 
-@pytest.mark.parametrize('name', [name for name in CORE if '.collocation' in name])
-def test_collocation_knows_nothing_of_arms(name: str) -> None:
-    allowed = {'flex_planner.progress', 'flex_planner.validation', 'flex_planner.errors'}
-    ours = {entry for entry in imports(name) if entry.startswith('flex_planner')}
-    assert all(entry in allowed or '.collocation' in entry for entry in ours)
+def test_private_names_stay_in_their_module() -> None:
+    for name, path in PATHS.items():
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom) and str(node.module).startswith('flex_planner'):
+                assert not [a.name for a in node.names if a.name.startswith('_')
+                            and a.name != '__version__'], name
 
 
 def test_casadi_is_imported_only_to_derive_and_to_compile() -> None:
     users = {name.removeprefix('flex_planner.') for name in PATHS if 'casadi' in imports(name)}
-    assert users == {'compiled', 'dynamics', 'pontryagin', 'transcription'}
+    assert users == {'dynamics.compiled_functions', 'dynamics.planar_chain',
+                     'optimal_control.direct.programme', 'optimal_control.pontryagin'}
 
 
 def test_kinematics_and_dynamics_can_check_each_other() -> None:
-    assert 'flex_planner.dynamics' not in imports('flex_planner.kinematics')
-    assert 'flex_planner.kinematics' not in imports('flex_planner.dynamics')
+    assert not any(entry.startswith('flex_planner.dynamics')
+                   for entry in imports('flex_planner.arms.kinematics'))
+    assert 'flex_planner.arms.kinematics' not in imports('flex_planner.dynamics.planar_chain')

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 import sys
 
 from flex_planner import __version__
-from flex_planner.cli import arm, compare, maps, motion, paper, recordings
+from flex_planner.base.errors import FlexPlannerError
+from flex_planner.base.progress import StoppedError, StopReason
+from flex_planner.cli.commands import arm, compare, paper, plan, recordings
+from flex_planner.cli.commands import map as maps
 from flex_planner.cli.options import with_joined_lists
-from flex_planner.cli.watching import CanceledError
-from flex_planner.errors import FlexPlannerError
-from flex_planner.progress import StoppedError, StopReason
+from flex_planner.cli.progress_line import CanceledError
 
 _CANCELED = 130  # what a shell makes of a process that SIGINT ended
 
@@ -48,7 +49,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument('--version', action='version', version=__version__)
     commands = parser.add_subparsers(required=True, metavar='COMMAND')
     arm.add_command(commands)
-    motion.add_commands(commands)
+    plan.add_commands(commands)
     compare.add_command(commands)
     maps.add_command(commands)
     paper.add_command(commands)

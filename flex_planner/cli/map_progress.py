@@ -6,9 +6,9 @@ from datetime import timedelta
 import math
 from typing import TYPE_CHECKING
 
-from flex_planner.cli.watching import Display
-from flex_planner.maps.cells import CellCode
-from flex_planner.motion_report import Row
+from flex_planner.cli.progress_line import Display
+from flex_planner.maps.cell_results import CellCode
+from flex_planner.reports.motion import Row
 import numpy as np
 
 if TYPE_CHECKING:

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import re
 from typing import TypeAlias
 
-from flex_planner.arm_files import preset_files
-from flex_planner.errors import InvalidValueError
-from flex_planner.task import MAX_JOINT_ANGLE
-from flex_planner.validation import Array, vector
+from flex_planner.arms.arm_files import preset_files
+from flex_planner.base.errors import InvalidValueError
+from flex_planner.base.validation import Array, vector
+from flex_planner.optimal_control.task import MAX_JOINT_ANGLE
 import numpy as np
 
 Commands: TypeAlias = 'argparse._SubParsersAction[argparse.ArgumentParser]'

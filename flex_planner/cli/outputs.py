@@ -11,15 +11,15 @@ import sys
 import tempfile
 from typing import TYPE_CHECKING
 
+from flex_planner.base.errors import InvalidValueError, RecordingError
+from flex_planner.capacity.max_payload import MaxPayload
 from flex_planner.cli.request import Request
-from flex_planner.errors import InvalidValueError, RecordingError
-from flex_planner.motion_report import Row
-from flex_planner.payload import MaxPayload
-from flex_planner.plan import Plan
-from flex_planner.reference import Reference
+from flex_planner.planning.plan import Plan
+from flex_planner.planning.sampling import Reference
+from flex_planner.reports.motion import Row
 
 if TYPE_CHECKING:
-    from flex_planner.cli.recording import RequestRecorder
+    from flex_planner.cli.recorder import RequestRecorder
     from flex_planner.plotting import Motion
 
 _DRAWN_SAMPLES = 2001
@@ -121,7 +121,7 @@ def check_folder(folder: Path) -> None:
 def _recorder(request: Request, folder: Path) -> RequestRecorder | None:
     """Return what records the outcome, or None where ROS 2 is missing, which is told."""
     try:
-        from flex_planner.cli.recording import RequestRecorder
+        from flex_planner.cli.recorder import RequestRecorder
 
         return RequestRecorder(request, folder / 'recordings')
     except (ImportError, RecordingError) as error:

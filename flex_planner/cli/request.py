@@ -8,19 +8,19 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
-from flex_planner.arm import Arm
-from flex_planner.arm_files import load_arm
-from flex_planner.cli.options import add_arm, angles, numbers
-from flex_planner.errors import (
+from flex_planner.arms.arm import Arm
+from flex_planner.arms.arm_files import load_arm
+from flex_planner.base.errors import (
     InvalidTaskError,
     InvalidValueError,
     SingularError,
     UnreachableError,
 )
-from flex_planner.objectives import Objectives
-from flex_planner.reference import MAX_SAMPLES, SamplingSettings
-from flex_planner.task import postures_from_points, Task
-from flex_planner.validation import Array, number
+from flex_planner.base.validation import Array, number
+from flex_planner.cli.options import add_arm, angles, numbers
+from flex_planner.optimal_control.task import postures_from_points, Task
+from flex_planner.planning.objectives import Objectives
+from flex_planner.planning.sampling import MAX_SAMPLES, SamplingSettings
 import numpy as np
 
 MAX_TIME_LIMIT = 3600.0

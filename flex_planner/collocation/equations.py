@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from flex_planner.base.progress import Monitor
 from flex_planner.collocation.linear import NewtonSystem, Residual, SingularSystemError
 from flex_planner.collocation.problem import BoundaryValueProblem
 from flex_planner.collocation.solution import CollocationSolution
-from flex_planner.progress import Monitor
 import numpy as np
 from numpy.typing import NDArray
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from flex_planner.base.progress import Monitor, StoppedError, StopReason
 from flex_planner.collocation.equations import (
     collocation_residual,
     factorised,
@@ -22,7 +23,6 @@ from flex_planner.collocation.equations import (
 from flex_planner.collocation.linear import NewtonSystem, Residual, SingularSystemError
 from flex_planner.collocation.problem import BoundaryValueProblem
 from flex_planner.collocation.solution import CollocationSolution
-from flex_planner.progress import Monitor, StoppedError, StopReason
 import numpy as np
 from numpy.typing import NDArray
 

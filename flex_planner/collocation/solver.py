@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+from flex_planner.base.progress import Monitor, StopReason
+from flex_planner.base.validation import integer, number
 from flex_planner.collocation.estimate import Estimate, estimated
 from flex_planner.collocation.gauss import FEWEST_STAGES, GaussRule, MOST_STAGES
 from flex_planner.collocation.mesh import defects, levelled, switching_times
 from flex_planner.collocation.newton import newton, NewtonOutcome
 from flex_planner.collocation.problem import BoundaryValueProblem
 from flex_planner.collocation.solution import CollocationSolution
-from flex_planner.progress import Monitor, StopReason
-from flex_planner.validation import integer, number
 import numpy as np
 from numpy.typing import NDArray
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import math
 from types import MappingProxyType
 
-from flex_planner.errors import InvalidValueError
-from flex_planner.task import MAX_DURATION, MAX_PAYLOAD
-from flex_planner.validation import Array, integer, number
-from flex_planner.yaml_files import Section
+from flex_planner.base.errors import InvalidValueError
+from flex_planner.base.validation import Array, integer, number
+from flex_planner.base.yaml_files import Section
+from flex_planner.optimal_control.task import MAX_DURATION, MAX_PAYLOAD
 import numpy as np
 
 MAX_AXES = 4

@@ -11,8 +11,8 @@ import dask
 from dask.system import CPU_COUNT
 from distributed import Client, LocalCluster, Worker, WorkerPlugin
 from distributed.system import MEMORY_LIMIT
-from flex_planner.errors import FlexPlannerError
-from flex_planner.processors import one_thread_each
+from flex_planner.base.errors import FlexPlannerError
+from flex_planner.base.processes import one_thread_each
 
 ATTEMPTS = 3  # at a block that ends its process, or raises
 LOST = 'the scheduler was lost; finished blocks are kept, and are not computed again'

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from enum import Enum
 import math
 
-from flex_planner.arm import Arm
-from flex_planner.errors import InvalidValueError
+from flex_planner.arms.arm import Arm
+from flex_planner.base.errors import InvalidValueError
+from flex_planner.base.validation import number
 from flex_planner.maps.axes import Axis, check_cells
-from flex_planner.validation import number
 
 
 class Quantity(Enum):

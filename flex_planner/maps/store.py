@@ -18,9 +18,9 @@ import tempfile
 from types import TracebackType
 from typing import Any, NoReturn, TYPE_CHECKING
 
-from flex_planner.errors import FlexPlannerError
-from flex_planner.maps.cells import CellCode, CellResult
-from flex_planner.maps.layout import BESIDE, differences, metadata, MOTIONS, write_empty
+from flex_planner.base.errors import FlexPlannerError
+from flex_planner.maps.cell_results import CellCode, CellResult
+from flex_planner.maps.store_layout import BESIDE, differences, metadata, MOTIONS, write_empty
 import numpy as np
 from numpy.typing import NDArray
 import xarray as xr

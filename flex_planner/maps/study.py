@@ -10,23 +10,23 @@ import math
 import os
 from pathlib import Path
 
-from flex_planner.arm import Arm, Joint
-from flex_planner.errors import (
+from flex_planner.arms.arm import Arm, Joint
+from flex_planner.base.errors import (
     FlexPlannerError,
     InvalidValueError,
     SingularError,
     UnreachableError,
 )
-from flex_planner.joint_control import Gains
+from flex_planner.base.validation import Array, integer, number, vector
+from flex_planner.base.yaml_files import read_yaml, Section, YamlFileError
 from flex_planner.maps.axes import Axis, tiles
-from flex_planner.maps.cells import CellCode, CellResult
-from flex_planner.maps.ends import End, middle_posture
+from flex_planner.maps.cell_results import CellCode, CellResult
+from flex_planner.maps.end_points import End, middle_posture
 from flex_planner.maps.quantities import check_axes, check_motors, Quantity
 from flex_planner.maps.study_files import read_fields
-from flex_planner.mismatch import Mismatch
-from flex_planner.task import MAX_PAYLOAD, Task
-from flex_planner.validation import Array, integer, number, vector
-from flex_planner.yaml_files import read_yaml, Section, YamlFileError
+from flex_planner.optimal_control.task import MAX_PAYLOAD, Task
+from flex_planner.simulation.joint_control import Gains
+from flex_planner.simulation.mismatch import Mismatch
 import numpy as np
 
 __all__ = ['Block', 'load_study', 'Quantity', 'Study', 'StudyError']

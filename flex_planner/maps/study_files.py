@@ -7,16 +7,16 @@ import os
 from pathlib import Path
 from typing import Any
 
-from flex_planner.arm import Arm, MAX_MODES
-from flex_planner.arm_files import arm_from_mapping, ArmFileError, load_arm
-from flex_planner.errors import InvalidValueError
-from flex_planner.joint_control import Gains
+from flex_planner.arms.arm import Arm, MAX_MODES
+from flex_planner.arms.arm_files import arm_from_mapping, ArmFileError, load_arm
+from flex_planner.base.errors import InvalidValueError
+from flex_planner.base.validation import Array, integer, number, vector
+from flex_planner.base.yaml_files import Section
 from flex_planner.maps.axes import Axis, read_axes
-from flex_planner.maps.ends import End
+from flex_planner.maps.end_points import End
 from flex_planner.maps.quantities import Quantity
-from flex_planner.mismatch import AS_GIVEN, Mismatch
-from flex_planner.validation import Array, integer, number, vector
-from flex_planner.yaml_files import Section
+from flex_planner.simulation.joint_control import Gains
+from flex_planner.simulation.mismatch import AS_GIVEN, Mismatch
 import numpy as np
 
 # of searches, as find_max_payload and find_min_duration have them

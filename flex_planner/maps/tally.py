@@ -6,7 +6,7 @@ from collections import deque
 import math
 import time
 
-from flex_planner.maps.cells import CellCode
+from flex_planner.maps.cell_results import CellCode
 import numpy as np
 from numpy.typing import NDArray
 

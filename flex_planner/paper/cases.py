@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 import math
 
-from flex_planner.arm import Arm, Joint, Link, Motor, Node
-from flex_planner.arm_files import load_arm
-from flex_planner.errors import FlexPlannerError
-from flex_planner.path import plan_path
-from flex_planner.payload import find_max_payload, MaxPayload
-from flex_planner.plan import Plan
-from flex_planner.task import postures_from_points, Task
+from flex_planner.arms.arm import Arm, Joint, Link, Motor, Node
+from flex_planner.arms.arm_files import load_arm
+from flex_planner.base.errors import FlexPlannerError
+from flex_planner.capacity.max_payload import find_max_payload, MaxPayload
+from flex_planner.optimal_control.task import postures_from_points, Task
+from flex_planner.planning.plan import Plan
+from flex_planner.planning.plan_path import plan_path
 import numpy as np
 
 # sections 5.1 to 5.3

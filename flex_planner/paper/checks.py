@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from flex_planner.direct import DirectProblem, DirectResult, DirectSettings
-from flex_planner.motion import MotionProblem, task_parameters
-from flex_planner.plan import Plan, Samples
-from flex_planner.task import Task
-from flex_planner.validation import Array
+from flex_planner.base.validation import Array
+from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectResult, DirectSettings
+from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
+from flex_planner.optimal_control.task import Task
+from flex_planner.planning.plan import Plan, Samples
 import numpy as np
 
 _DEGREE = 6

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
+from flex_planner.base.validation import Array
 from flex_planner.paper.evidence import Curve, Panel
-from flex_planner.plan import Samples
-from flex_planner.validation import Array
+from flex_planner.planning.plan import Samples
 import numpy as np
 
 Cases = Mapping[str, Samples]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
-from flex_planner.validation import Array
+from flex_planner.base.validation import Array
 
 
 class Verdict(Enum):

@@ -10,7 +10,10 @@ import signal
 import time
 from typing import Protocol
 
-from flex_planner.paper import (
+from flex_planner.base.processes import one_thread_each
+from flex_planner.base.progress import StoppedError, StopReason
+from flex_planner.paper.evidence import Section
+from flex_planner.paper.sections import (
     beyond,
     effort_speed,
     hanging,
@@ -19,9 +22,6 @@ from flex_planner.paper import (
     minimum_vibration,
     slips,
 )
-from flex_planner.paper.evidence import Section
-from flex_planner.processors import one_thread_each
-from flex_planner.progress import StoppedError, StopReason
 
 
 class Study(Protocol):

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from flex_planner.comparison import Comparison
-from flex_planner.execution import Outcome, Way
+from flex_planner.base.validation import Array
 from flex_planner.plotting.figures import finish, save, say
-from flex_planner.validation import Array
+from flex_planner.simulation.comparison import Comparison
+from flex_planner.simulation.execution import Outcome, Way
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 import numpy as np

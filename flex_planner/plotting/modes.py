@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from flex_planner.arm import Arm
-from flex_planner.kinematics import link_points
-from flex_planner.model import ArmModel, Parameters
+from flex_planner.arms.arm import Arm
+from flex_planner.arms.kinematics import link_points
+from flex_planner.base.validation import Array
+from flex_planner.dynamics.statics import equilibrium, natural_modes
+from flex_planner.optimal_control.arm_model import ArmModel, Parameters
 from flex_planner.plotting.figures import finish, save
-from flex_planner.statics import equilibrium, natural_modes
-from flex_planner.validation import Array
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 import numpy as np

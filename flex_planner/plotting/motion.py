@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from flex_planner.arm import Arm
-from flex_planner.kinematics import link_points
-from flex_planner.plan import Samples
+from flex_planner.arms.arm import Arm
+from flex_planner.arms.kinematics import link_points
+from flex_planner.base.validation import Array
+from flex_planner.planning.plan import Samples
 from flex_planner.plotting.figures import finish, save, say
-from flex_planner.validation import Array
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 import numpy as np

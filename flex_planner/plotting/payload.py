@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from flex_planner.payload import MaxPayload, PayloadMethod
+from flex_planner.base.validation import Array
+from flex_planner.capacity.max_payload import MaxPayload, PayloadMethod
 from flex_planner.plotting.figures import finish, save, say
 from flex_planner.plotting.motion import draw_tip, draw_torques, Motion
-from flex_planner.validation import Array
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator

@@ -13,7 +13,7 @@ from array import array
 from collections.abc import Iterable, Sized
 from typing import Any, cast, Final, TypeVar
 
-from flex_planner.errors import InvalidValueError
+from flex_planner.base.errors import InvalidValueError
 import numpy as np
 from numpy.typing import NDArray
 from rosbags.interfaces import Nodetype

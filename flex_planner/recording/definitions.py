@@ -15,7 +15,7 @@ import struct
 import sys
 from typing import Any, cast, Final
 
-from flex_planner.errors import RecordingError
+from flex_planner.base.errors import RecordingError
 from flex_planner.recording.conversion import convert_message
 from rosbags.interfaces import Nodetype
 from rosbags.interfaces.typing import FieldDesc, Typesdict

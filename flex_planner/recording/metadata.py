@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Final
 
-from flex_planner.errors import InvalidValueError
+from flex_planner.base.errors import InvalidValueError
 from flex_planner.recording.topics import Topic
 import yaml
 

@@ -16,7 +16,7 @@ import struct
 from typing import Any, BinaryIO, Final, NamedTuple
 import zlib
 
-from flex_planner.errors import RecordingError
+from flex_planner.base.errors import RecordingError
 from flex_planner.recording.definitions import MessageTypes
 from flex_planner.recording.metadata import FileSummary, RecordingMetadata, TopicSummary
 from flex_planner.recording.topics import QosProfile, Topic

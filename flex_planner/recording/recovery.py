@@ -15,7 +15,7 @@ from pathlib import Path
 import re
 from typing import Final
 
-from flex_planner.errors import RecordingError
+from flex_planner.base.errors import RecordingError
 from flex_planner.recording.definitions import MessageTypes
 from flex_planner.recording.reader import (
     check_definition,

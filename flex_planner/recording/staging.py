@@ -19,7 +19,7 @@ import secrets
 import shutil
 from typing import BinaryIO
 
-from flex_planner.errors import RecordingError
+from flex_planner.base.errors import RecordingError
 
 _logger = logging.getLogger(__name__)
 

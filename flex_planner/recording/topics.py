@@ -13,7 +13,7 @@ from enum import Enum
 import re
 from typing import Any, Final, TypeVar
 
-from flex_planner.errors import InvalidValueError
+from flex_planner.base.errors import InvalidValueError
 import yaml
 
 TOPIC_NAME: Final = re.compile(r'(/[A-Za-z_][A-Za-z0-9_]*)+')

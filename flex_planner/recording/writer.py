@@ -9,7 +9,7 @@ from pathlib import Path
 import re
 from typing import Final
 
-from flex_planner.errors import InvalidValueError, RecordingError
+from flex_planner.base.errors import InvalidValueError, RecordingError
 from flex_planner.recording.definitions import MessageTypes
 from flex_planner.recording.mcap_file import RecordingFile
 from flex_planner.recording.metadata import checked_custom_data, RecordingMetadata

@@ -6,17 +6,17 @@ from collections.abc import Sequence
 import time
 
 from builtin_interfaces.msg import Time
-from flex_planner.joint_control import JointReference
-from flex_planner.kinematics import tip_position
-from flex_planner.plant import Plant
-from flex_planner.plant_model import PlantModel
-from flex_planner.ros.conversions import duration_seconds
-from flex_planner.ros.parameters import declare, declare_arm
-from flex_planner.ros.running import run_node
-from flex_planner.ros.simulator_settings import SimulatorSettings
-from flex_planner.trajectory_rules import trajectory_violations
-from flex_planner.validation import Array
-from flex_planner.vibration import ArrivalWatch, Residual
+from flex_planner.arms.kinematics import tip_position
+from flex_planner.base.validation import Array
+from flex_planner.dynamics.arm_dynamics import PlantModel
+from flex_planner.ros.messages.plans import duration_seconds
+from flex_planner.ros.messages.trajectory_rules import trajectory_violations
+from flex_planner.ros.runtime.parameters import declare, declare_arm
+from flex_planner.ros.runtime.running import run_node
+from flex_planner.ros.settings.simulator import SimulatorSettings
+from flex_planner.simulation.joint_control import JointReference
+from flex_planner.simulation.plant import Plant
+from flex_planner.simulation.settling import ArrivalWatch, Residual
 from geometry_msgs.msg import PointStamped
 import numpy as np
 from rclpy.node import Node

@@ -10,7 +10,7 @@ from pathlib import Path
 import time
 from typing import Any
 
-from flex_planner.errors import FlexPlannerError, InvalidValueError, RecordingError
+from flex_planner.base.errors import FlexPlannerError, InvalidValueError, RecordingError
 from flex_planner.recording import (
     check_definition,
     definition_folder,
@@ -23,8 +23,8 @@ from flex_planner.recording import (
     Reliability,
     TopicSummary,
 )
-from flex_planner.ros.parameters import declare, described
-from flex_planner.ros.running import CannotGoOnError, run_node
+from flex_planner.ros.runtime.parameters import declare, described
+from flex_planner.ros.runtime.running import CannotGoOnError, run_node
 import rclpy
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration

@@ -1,0 +1,119 @@
+"""
+Where the arm is and how fast it moves: frames, bent links, tip.
+
+Written with array operations and apart from :mod:`flex_planner.dynamics.planar_chain`, so that
+each can check the other.
+
+"""
+
+from __future__ import annotations
+
+from flex_planner.arms.arm import Arm
+from flex_planner.base.validation import Array
+import numpy as np
+
+
+def frame_angles(arm: Arm, coordinates: Array) -> Array:
+    """
+    Return the angle of each link's frame to the x axis, shape (..., n) [rad].
+
+    Parameters
+    ----------
+    arm : Arm
+        n joints, n_t coordinates.
+    coordinates : numpy.ndarray, shape (..., n_t)
+        q.
+
+    """
+    turns = np.array(coordinates[..., :arm.n_joints])
+    for i, (link, modal) in enumerate(zip(arm.links[:-1], arm.modal_slices, strict=False)):
+        turns[..., i + 1] += coordinates[..., modal] @ link.mode_shapes().tip_slope
+    angles: Array = np.cumsum(turns, axis=-1)
+    return angles
+
+
+def link_points(arm: Arm, coordinates: Array, stations: int = 2) -> Array:
+    """
+    Return points along the bent links, from base to tip.
+
+    Parameters
+    ----------
+    arm : Arm
+        n joints, n_t coordinates.
+    coordinates : numpy.ndarray, shape (..., n_t)
+        q.
+    stations : int
+        Points a link, at least 2: both ends are included.
+
+    Returns
+    -------
+    numpy.ndarray, shape (..., n, stations, 2)
+        In the base frame [m]; a link ends where the next begins.
+
+    """
+    angles = frame_angles(arm, coordinates)
+    base = np.zeros((*coordinates.shape[:-1], 2))
+    points = []
+    for i, (link, modal) in enumerate(zip(arm.links, arm.modal_slices, strict=True)):
+        x = np.linspace(0, link.length, stations, dtype=np.float64)
+        shapes = link.mode_shapes()
+        bend = coordinates[..., modal] @ shapes.shape(x).T  # (..., stations)
+        c, s = np.cos(angles[..., i, None]), np.sin(angles[..., i, None])
+        points.append(base[..., None, :] + np.stack([c * x - s * bend, s * x + c * bend], -1))
+        tip_bend = coordinates[..., modal] @ shapes.tip_deflection
+        c, s = c[..., 0], s[..., 0]
+        base = base + np.stack([c * link.length - s * tip_bend,
+                                s * link.length + c * tip_bend], -1)
+    return np.stack(points, axis=-3)
+
+
+def tip_position(arm: Arm, coordinates: Array) -> Array:
+    """Return the position of the tip, shape (..., 2) [m], eq. (18)."""
+    position: Array = link_points(arm, coordinates)[..., -1, -1, :]
+    return position
+
+
+def jacobian(arm: Arm, positions: Array) -> Array:
+    """
+    Return the Jacobian of the tip of the unbent arm, shape (2, n) [m/rad].
+
+    Parameters
+    ----------
+    arm : Arm
+        n joints.
+    positions : numpy.ndarray, shape (n,)
+        Joint angles [rad].
+
+    """
+    angles = np.cumsum(positions)
+    lengths = np.array([link.length for link in arm.links])
+    parts = lengths * np.stack([-np.sin(angles), np.cos(angles)])  # (2, n)
+    return np.cumsum(parts[:, ::-1], axis=1)[:, ::-1]
+
+
+def tip_velocity(arm: Arm, coordinates: Array, rates: Array) -> Array:
+    """
+    Return the velocity of the tip of the bent arm, eq. (22).
+
+    Parameters
+    ----------
+    arm : Arm
+        n_t coordinates.
+    coordinates, rates : numpy.ndarray, shape (..., n_t)
+        q and q'.
+
+    Returns
+    -------
+    numpy.ndarray, shape (..., 2)
+        [m/s].
+
+    """
+    angles, turning = frame_angles(arm, coordinates), frame_angles(arm, rates)
+    velocity = np.zeros((*coordinates.shape[:-1], 2))
+    for i, (link, modal) in enumerate(zip(arm.links, arm.modal_slices, strict=True)):
+        deflection = link.mode_shapes().tip_deflection
+        along = -turning[..., i] * (coordinates[..., modal] @ deflection)
+        across = turning[..., i] * link.length + rates[..., modal] @ deflection
+        c, s = np.cos(angles[..., i]), np.sin(angles[..., i])
+        velocity += np.stack([c * along - s * across, s * along + c * across], -1)
+    return velocity

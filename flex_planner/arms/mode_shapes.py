@@ -1,0 +1,182 @@
+"""
+Assumed mode shapes of one link and the integrals that the dynamics need of them.
+
+Korayem et al. 2009, eqs. (1), (19), (20) and (23). A mode family is a function of a length, a
+number of modes and a tip load that returns :class:`LinkModes`; `FAMILIES` lists them by name.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+
+from flex_planner.arms.beam_eigenmodes import ClampedMode, TipLoad
+from flex_planner.base.validation import Array
+import numpy as np
+
+_QUADRATURE_POINTS = 64
+_ROUNDING = 1e-13
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LinkModes:
+    """
+    Mode shapes phi_j of a link of length L, with their integrals over ``[0, L]``.
+
+    Attributes
+    ----------
+    shape : callable
+        Stations ``(k,)`` [m] to deflections ``(k, n_modes)`` [m/m].
+    curvature : callable
+        Stations ``(k,)`` [m] to second derivatives ``(k, n_modes)`` [1/m^2].
+    area : numpy.ndarray, shape (n_modes,)
+        Integral of phi [m].
+    moment : numpy.ndarray, shape (n_modes,)
+        Integral of x phi [m^2].
+    gram : numpy.ndarray, shape (n_modes, n_modes)
+        Integral of phi phi^T [m].
+    stiffness : numpy.ndarray, shape (n_modes, n_modes)
+        Integral of phi'' phi''^T [1/m^3]; the flexural rigidity multiplies it.
+    tip_deflection, tip_slope : numpy.ndarray, shape (n_modes,)
+        What a unit of each mode displaces and turns the frame of the next link by,
+        [m/m] and [rad/m].
+
+    """
+
+    shape: Callable[[Array], Array]
+    curvature: Callable[[Array], Array]
+    area: Array
+    moment: Array
+    gram: Array
+    stiffness: Array
+    tip_deflection: Array
+    tip_slope: Array
+
+    @property
+    def count(self) -> int:
+        """Return the number of modes."""
+        return int(self.area.size)
+
+
+def pinned_pinned(length: float, count: int, load: TipLoad | None = None) -> LinkModes:
+    """
+    Return the sine modes of a simply supported link, eq. (20).
+
+    The frame of the link is its chord: both ends stay on it, and the next joint angle is
+    measured from it, so neither tip deflection nor tip slope is carried to the next link.
+
+    Parameters
+    ----------
+    length : float
+        [m].
+    count : int
+        Number of modes, 0 for a rigid link.
+    load : TipLoad, optional
+        Has no effect: a supported tip does not move.
+
+    """
+    order = np.arange(1, count + 1)
+    wave = order * np.pi / length  # (count,) [1/m]
+    sign = np.where(order % 2, -1.0, 1.0)  # cos(j pi)
+    return LinkModes(
+        shape=lambda x: np.sin(np.multiply.outer(x, wave)),
+        curvature=lambda x: -np.sin(np.multiply.outer(x, wave)) * wave**2,
+        area=(1 - sign) / wave,
+        moment=-sign * length / wave,
+        gram=np.diag(np.full(count, length / 2)),
+        stiffness=np.diag(wave**4 * length / 2),
+        tip_deflection=np.zeros(count),
+        tip_slope=np.zeros(count),
+    )
+
+
+def clamped_free(length: float, count: int, load: TipLoad | None = None) -> LinkModes:
+    """
+    Return the modes of a cantilever.
+
+    The frame of the link is tangent to it at its base; deflection and slope of the tip carry
+    the next link along.
+
+    Parameters
+    ----------
+    length : float
+        [m].
+    count : int
+        Number of modes, 0 for a rigid link.
+    load : TipLoad, optional
+        Has no effect: see :func:`clamped_mass`.
+
+    """
+    return clamped_mass(length, count, TipLoad())
+
+
+def clamped_mass(length: float, count: int, load: TipLoad | None = None) -> LinkModes:
+    """
+    Return the modes of a cantilever that carries a mass and an inertia at its tip.
+
+    Shapes that know what the link carries need fewer modes; frame and coupling to the next link
+    are those of :func:`clamped_free`. The shapes are scaled to a mean square of 1.
+
+    Parameters
+    ----------
+    length : float
+        [m].
+    count : int
+        Number of modes, 0 for a rigid link.
+    load : TipLoad, optional
+        At the tip; none makes it a plain cantilever.
+
+    """
+    modes = [ClampedMode.of(order, load or TipLoad()) for order in range(1, count + 1)]
+    points, weights = _gauss_legendre()
+
+    def stacked(x: Array, derivative: int = 0) -> Array:
+        columns = [mode(np.asarray(x) / length, derivative) for mode in modes]
+        return np.stack(columns, axis=-1) if modes else np.zeros((*np.shape(x), 0))
+
+    sizes = np.sqrt(weights @ stacked(points * length) ** 2)
+
+    def evaluate(x: Array, derivative: int) -> Array:
+        values: Array = stacked(x, derivative) / sizes / length**derivative
+        return values
+
+    stations = points * length
+    phi, bend, rule = evaluate(stations, 0), evaluate(stations, 2), weights * length
+    tip = np.array([length])
+    return LinkModes(
+        shape=lambda x: evaluate(x, 0), curvature=lambda x: evaluate(x, 2),
+        area=rule @ phi, moment=rule @ (stations[:, None] * phi),
+        gram=_clean((phi.T * rule) @ phi), stiffness=_clean((bend.T * rule) @ bend),
+        tip_deflection=evaluate(tip, 0)[0], tip_slope=evaluate(tip, 1)[0])
+
+
+@cache
+def _gauss_legendre() -> tuple[Array, Array]:
+    """Return nodes and weights on [0, 1] that integrate products of 8 modes to rounding."""
+    points, weights = np.polynomial.legendre.leggauss(_QUADRATURE_POINTS)
+    return (points + 1) / 2, weights / 2
+
+
+def _clean(matrix: Array) -> Array:
+    """Return a symmetric matrix with entries that are only rounding set to 0."""
+    symmetric = (matrix + matrix.T) / 2
+    size = np.sqrt(np.outer(np.diag(symmetric), np.diag(symmetric)))
+    cleaned: Array = np.where(np.abs(symmetric) < _ROUNDING * size, 0.0, symmetric)
+    return cleaned
+
+
+Family = Callable[[float, int, TipLoad | None], LinkModes]
+
+FAMILIES: dict[str, Family] = {
+    'pinned_pinned': pinned_pinned,
+    'clamped_free': clamped_free,
+    'clamped_mass': clamped_mass,
+}
+
+
+@cache
+def mode_shapes(family: str, length: float, count: int, load: TipLoad) -> LinkModes:
+    """Return the modes of a family; they are computed once."""
+    return FAMILIES[family](length, count, load)

@@ -1,0 +1,133 @@
+"""Checks that turn a bad value into one sentence: field, value and bound."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import math
+
+from flex_planner.base.errors import InvalidSizeError, InvalidValueError, NotFiniteError
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+def number(
+    field: str,
+    value: object,
+    *,
+    above: float = -math.inf,
+    at_least: float = -math.inf,
+    at_most: float = math.inf,
+    infinite: bool = False,
+    unit: str = '',
+) -> float:
+    """
+    Return ``value`` as a float within its bounds.
+
+    Parameters
+    ----------
+    field, unit : str
+        For the message.
+    value : object
+        Any real number but a bool.
+    above, at_least, at_most : float
+        Open lower, closed lower and closed upper bound.
+    infinite : bool
+        Whether infinity is a value.
+
+    Raises
+    ------
+    NotFiniteError
+        If it is NaN, or infinite where that is no value.
+    InvalidValueError
+        If it is no number or out of bounds.
+
+    """
+    bound = _bound(above, at_least, at_most, unit)
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.floating, np.integer)):
+        raise InvalidValueError(field, value, f'a number {bound}'.rstrip())
+    try:
+        result = float(value)
+    except OverflowError:  # an integer beyond every float
+        result = math.inf
+    if math.isnan(result) or (math.isinf(result) and not infinite):
+        raise NotFiniteError(field, result, f'a finite number {bound}'.rstrip())
+    if result <= above > -math.inf or not at_least <= result <= at_most:
+        raise InvalidValueError(field, result, f'a number {bound}'.rstrip())
+    return result
+
+
+def _bound(above: float, at_least: float, at_most: float, unit: str) -> str:
+    """Say a range in words."""
+    parts = []
+    if above > -math.inf:
+        parts.append(f'> {above:g}')
+    if at_least > -math.inf:
+        parts.append(f'>= {at_least:g}')
+    if at_most < math.inf:
+        parts.append(f'<= {at_most:g}')
+    return (' and '.join(parts) + (f' {unit}' if unit else '')).strip()
+
+
+def integer(field: str, value: object, *, at_least: int, at_most: int) -> int:
+    """Return ``value`` as an int within ``[at_least, at_most]``, or raise InvalidValueError."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
+        raise InvalidValueError(field, value, f'an integer from {at_least} to {at_most}')
+    if not at_least <= value <= at_most:
+        raise InvalidValueError(field, int(value), f'an integer from {at_least} to {at_most}')
+    return int(value)
+
+
+def vector(
+    field: str,
+    values: ArrayLike,
+    size: int | Sequence[int],
+    *,
+    at_least: float = -math.inf,
+    above: float = -math.inf,
+    at_most: float = math.inf,
+    unit: str = '',
+) -> Array:
+    """
+    Return ``values`` as a read-only float array of a given size, every entry within bounds.
+
+    Parameters
+    ----------
+    field, unit : str
+        For the message.
+    values : array_like
+        One-dimensional.
+    size : int or sequence of int
+        Allowed number of entries.
+    above, at_least, at_most : float
+        Open lower, closed lower and closed upper bound of each entry.
+
+    Returns
+    -------
+    numpy.ndarray, shape (size,)
+        A copy.
+
+    Raises
+    ------
+    InvalidSizeError
+        If the number of entries is wrong.
+    NotFiniteError, InvalidValueError
+        Naming the entry that is wrong.
+
+    """
+    sizes = (size,) if isinstance(size, int) else tuple(size)
+    wanted = ' or '.join(str(entry) for entry in sizes)
+    try:
+        array = np.array(values, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        raise InvalidValueError(field, values, f'a list of {wanted} numbers') from None
+    if array.ndim != 1:
+        raise InvalidSizeError(field, f'shape {array.shape}', f'a list of {wanted} numbers')
+    if array.size not in sizes:
+        raise InvalidSizeError(field, f'{array.size} numbers', f'a list of {wanted} numbers')
+    for index, entry in enumerate(array):
+        number(f'{field}[{index}]', entry, above=above, at_least=at_least, at_most=at_most,
+               unit=unit)
+    array.setflags(write=False)
+    return array

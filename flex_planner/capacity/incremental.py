@@ -1,0 +1,123 @@
+"""
+The paper's search for the maximum payload: Korayem et al. 2009, section 4.2 and fig. 2.
+
+The payload is raised by a step while the boundary-value problem can be solved; where it cannot,
+the step is halved, until it is as small as the accuracy.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from flex_planner.base.errors import FlexPlannerError
+from flex_planner.base.progress import Monitor
+from flex_planner.collocation import CollocationResult, CollocationSolution, Settings
+from flex_planner.collocation.homotopy import STOPPED
+from flex_planner.optimal_control.motion_problem import MotionProblem
+from flex_planner.planning.certificate import final_state
+from flex_planner.planning.strategies.initial_guesses import QUICK, warm_start
+from flex_planner.planning.strategies.price_continuation import changed, on_the_way
+import numpy as np
+
+_RTOL = 1e-8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PayloadTrial:
+    """
+    A payload that was tried.
+
+    Attributes
+    ----------
+    payload : float
+        [kg].
+    step : float
+        That led to it [kg].
+    solved : bool
+        Whether the motion was found and meets the task's tolerance.
+    boundary_error : float
+        Left side of eq. (17) with W_p = W_v = 1, where the torque found leads; also of a motion
+        that is no solution.
+
+    """
+
+    payload: float
+    step: float
+    solved: bool
+    boundary_error: float
+    result: CollocationResult = field(repr=False)
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the monitor ended the search here."""
+        return self.result.status in STOPPED
+
+
+def raised_payload(problem: MotionProblem, first: CollocationSolution, *, step: float,
+                   accuracy: float, settings: Settings,
+                   monitor: Monitor) -> Iterator[PayloadTrial]:
+    """
+    Yield the payloads tried, loop (i) raising them and loop (k) halving the step.
+
+    Parameters
+    ----------
+    problem : MotionProblem
+        With the least payload.
+    first : CollocationSolution
+        Its solution.
+    step : float
+        First step [kg].
+    accuracy : float
+        Ends when what failed is no further from what succeeded [kg].
+    settings, monitor
+        Of the solver.
+
+    Raises
+    ------
+    StoppedError
+        If the monitor ended the search while a motion was re-simulated.
+
+    """
+    payload, here, failed = problem.task.payload_mass, first, np.inf
+    while True:
+        while payload + step >= failed:  # known to be too much
+            if failed - payload <= accuracy:
+                return
+            step /= 2
+        trial = _trial(problem, here, payload + step, step, settings, monitor)
+        if trial is None:
+            failed = payload + step
+            continue
+        yield trial
+        if trial.stopped:
+            return
+        if trial.solved:
+            payload, here = trial.payload, trial.result.solution
+        else:
+            failed = trial.payload
+
+
+def _trial(problem: MotionProblem, start: CollocationSolution, payload: float, step: float,
+           settings: Settings, monitor: Monitor) -> PayloadTrial | None:
+    """Try a payload from the motion of a lighter one, then from nothing; None if absurd."""
+    monitor.payload = payload
+    try:
+        heavier = changed(problem, payload_mass=payload)
+    except FlexPlannerError:  # too heavy to hold
+        return None
+    result: CollocationResult | None = None
+    for _, strategy in (('', warm_start(start)), *QUICK):
+        attempt = strategy(heavier, on_the_way(settings), monitor)
+        if attempt is not None:
+            result = attempt.result
+            if result.converged or result.status in STOPPED:
+                break
+    assert result is not None
+    error = np.inf
+    if result.status not in STOPPED:
+        final, goal = final_state(heavier, result.solution, monitor, _RTOL)
+        error = float(np.nan_to_num((final - goal) @ (final - goal) / 2, nan=np.inf))
+    return PayloadTrial(payload=payload, step=step, boundary_error=error, result=result,
+                        solved=result.converged and error <= problem.task.tolerance)

@@ -1,0 +1,47 @@
+"""The command that describes an arm."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from flex_planner.arms.arm_files import load_arm
+from flex_planner.base.validation import number
+from flex_planner.cli.options import add_arm, angles, Commands
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.reports.arm import describe_arm, standard_postures
+
+
+def add_command(commands: Commands) -> None:
+    """Add ``flex-planner arm``."""
+    parser = commands.add_parser('arm',
+                                 help='print the properties of an arm, draw its mode shapes')
+    add_arm(parser)
+    parser.add_argument('--payload', type=float, default=0.0, metavar='KG',
+                        help='mass at the tip (default: 0)')
+    parser.add_argument('--posture', action='append', metavar='DEG,DEG,...',
+                        help='joint angles for frequencies and deflections; may be repeated '
+                        '(default: stretched, and bent by 90 degrees)')
+    parser.add_argument('--plot', type=Path, metavar='PNG',
+                        help='picture of the mode shapes (default: <arm>_modes.png)')
+    parser.add_argument('--no-plot', action='store_true', help='draw nothing')
+    parser.set_defaults(run=_run)
+
+
+def _run(options: argparse.Namespace) -> int:
+    """Print an arm's properties and draw its mode shapes."""
+    arm = load_arm(options.arm)
+    payload = number('--payload', options.payload, at_least=0, unit='kg')
+    postures = ([angles('--posture', text, arm.n_joints) for text in options.posture]
+                if options.posture else standard_postures(arm))
+    model = ArmModel(arm)
+    text = describe_arm(model, postures, payload)
+    if options.no_plot or not arm.n_modes:
+        print(text)
+        return 0
+    from flex_planner.plotting import draw_mode_shapes
+
+    path = options.plot or Path(f'{Path(options.arm).stem}_modes.png')
+    draw_mode_shapes(path, model, postures[-1], payload)
+    print(f'{text}\n\nmode shapes: {path}')
+    return 0

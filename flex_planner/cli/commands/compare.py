@@ -1,0 +1,89 @@
+"""The command that carries out a task planned in several ways."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+import sys
+
+from flex_planner.base.progress import Monitor
+from flex_planner.cli.options import Commands, numbers
+from flex_planner.cli.outputs import check_folder
+from flex_planner.cli.progress_line import watched
+from flex_planner.cli.request import add_task, named_as_options, Request
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.reports.comparison import comparison_rows, comparison_table
+from flex_planner.reports.motion import table
+from flex_planner.simulation.comparison import compare, Comparison
+from flex_planner.simulation.joint_control import Gains
+from flex_planner.simulation.mismatch import Mismatch
+import numpy as np
+
+_STIFFNESS, _DAMPING = 100.0, 10.0
+
+
+def add_command(commands: Commands) -> None:
+    """Add ``flex-planner compare``."""
+    parser = commands.add_parser(
+        'compare', help='show what planning for flexible links is worth',
+        description='Plan a motion with flexible and with rigid links, and carry out both on a '
+        'simulated flexible arm, with and without a joint controller.')
+    add_task(parser, payload='mass at the tip (default: 0)')
+    add = parser.add_argument
+    add('--plant-payload', type=float, metavar='KG', help='mass at the tip of the simulated arm '
+        '(default: that of the task)')
+    add('--plant-modes', type=int, default=-1, metavar='N',
+        help='modes of each of its links (default: as planned)')
+    add('--rigidity-scale', type=float, default=1.0, metavar='FACTOR',
+        help='of its links (default: 1)')
+    add('--added-friction', metavar='D,D,...', help='of its joints [N m s/rad] (default: none)')
+    add('--stiffness', type=float, default=_STIFFNESS, metavar='P',
+        help='of the joint controller [N m/rad] (default: %(default)g)')
+    add('--damping', type=float, default=_DAMPING, metavar='D',
+        help='of the joint controller [N m s/rad] (default: %(default)g)')
+    add('--rate', type=float, default=1000.0, metavar='HZ',
+        help='of the joint controller (default: %(default)g)')
+    add('--settling', type=float, default=1.0, metavar='S',
+        help='how long to watch the arm after its arrival (default: %(default)g)')
+    add('--output', type=Path, default=Path('output'), metavar='DIR',
+        help='folder for the picture (default: output)')
+    add('--no-plot', action='store_true', help='draw nothing')
+    parser.set_defaults(run=_compare)
+
+
+def _compare(options: argparse.Namespace) -> int:
+    """Compare the ways, tell of them and draw them."""
+    request = Request.of(options)
+    if not options.no_plot:
+        check_folder(options.output)
+
+    def work(model: ArmModel, monitor: Monitor) -> Comparison:
+        with named_as_options():
+            return compare(
+                request.task, model=model, monitor=monitor, mismatch=_mismatch(options),
+                payload_mass=options.plant_payload, rate=options.rate,
+                settling=options.settling,
+                gains=Gains.of(request.task.arm.n_joints, options.stiffness, options.damping))
+
+    found = watched(request.task.arm, request.time_limit, work)
+    print(table([('motion', f'{request} with {request.task.payload_mass:g} kg'),
+                 *comparison_rows(found)]))
+    print(f'\n{comparison_table(found)}\n')
+    if not options.no_plot and found.outcomes:
+        from flex_planner.plotting import draw_comparison
+
+        path = options.output / f'{Path(options.arm).stem}_comparison.png'
+        draw_comparison(path, found)
+        print(table([('picture', str(path))]))
+    if not found.solved:
+        failed = found.rigid if found.flexible.solved else found.flexible
+        print(f'flex-planner: {failed.arm.name}: {failed.status.value}', file=sys.stderr)
+    return 0 if found.solved else 1
+
+
+def _mismatch(options: argparse.Namespace) -> Mismatch:
+    """Return how the simulated arm differs."""
+    given = options.added_friction
+    friction = np.zeros(0) if given is None else numbers('--added-friction', given, finite=False)
+    return Mismatch(modes=options.plant_modes, rigidity_scale=options.rigidity_scale,
+                    added_friction=friction)

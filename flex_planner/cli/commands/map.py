@@ -1,0 +1,121 @@
+"""The command that computes a map."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+import sys
+from typing import TYPE_CHECKING
+
+from flex_planner.base.errors import InvalidValueError
+from flex_planner.base.validation import integer
+from flex_planner.cli.map_progress import MapDisplay, outcome_rows
+from flex_planner.cli.options import Commands
+from flex_planner.cli.progress_line import CanceledError, interruptible
+from flex_planner.maps.cell_results import CellCode
+from flex_planner.reports.motion import table
+
+if TYPE_CHECKING:
+    from flex_planner.maps.store import MapStore
+    from flex_planner.maps.study import Study
+    from flex_planner.maps.tally import Tally
+
+_SUFFIX = '.zarr'
+_NEEDED = ('dask', 'distributed', 'xarray', 'zarr')
+
+
+def add_command(commands: Commands) -> None:
+    """Add ``flex-planner map``."""
+    parser = commands.add_parser(
+        'map', help='compute a quantity over a grid of motions',
+        description='Compute the maximum payload, or another quantity, for every cell of a grid, '
+        'and draw it. What is there already is not computed again.')
+    add = parser.add_argument
+    add('study', type=Path, metavar='STUDY', help='study file; with --draw also a store')
+    add('--output', type=Path, default=Path('output/maps'), metavar='PATH',
+        help='folder for store and pictures, or a store that ends in .zarr (default: %(default)s)')
+    add('--workers', type=int, metavar='N', help='processes (default: one a processor)')
+    add('--scheduler', default='', metavar='ADDRESS',
+        help='compute on the Dask cluster with this scheduler, such as tcp://host:8786')
+    add('--draw', action='store_true', help='compute nothing, draw what is there')
+    add('--reset', action='store_true', help='remove the map that is there, and start anew')
+    add('--no-plot', action='store_true', help='draw nothing')
+    parser.set_defaults(run=_map)
+
+
+def _map(options: argparse.Namespace) -> int:
+    """Compute and draw a map, or say what is missing to do so."""
+    try:
+        return _drawn(_place(options)) if options.draw else _computed(options)
+    except ImportError as error:
+        if (error.name or '').split('.')[0] not in _NEEDED:
+            raise
+        print(f"flex-planner: maps need {', '.join(_NEEDED)}: pip install 'flex_planner[maps]' "
+              f'({error})', file=sys.stderr)
+        return 1
+
+
+def _place(options: argparse.Namespace) -> Path:
+    """Return the path of the store."""
+    study, output = options.study, options.output
+    if options.draw and study.suffix == _SUFFIX:
+        return Path(study)
+    return Path(output if output.suffix == _SUFFIX else output / f'{study.stem}{_SUFFIX}')
+
+
+def _drawn(path: Path) -> int:
+    """Draw a map in a folder beside its store."""
+    from flex_planner.maps.draw_map import draw_map
+
+    print(table([('picture', str(picture)) for picture in draw_map(path, path.with_suffix(''))]))
+    return 0
+
+
+def _computed(options: argparse.Namespace) -> int:
+    """Compute what is not there, say what came of it and draw it."""
+    from flex_planner.maps.store import MapStore
+    from flex_planner.maps.study import load_study
+
+    _check(options)
+    study, path = load_study(options.study), _place(options)
+    with MapStore.of(path, study, reset=options.reset) as store:
+        tally = _run(options, study, store)
+        print(table([*outcome_rows(tally, store.dataset()), ('store', str(path))]))
+    if not options.no_plot:
+        _drawn(path)
+    failed = tally.of(CellCode.FAILED)
+    if failed:
+        print(f'flex-planner: {failed} cells failed by an error of the program; the variable '
+              '"message" in the store says why', file=sys.stderr)
+    return 1 if failed else 0
+
+
+def _check(options: argparse.Namespace) -> None:
+    """Refuse options that make no sense."""
+    if options.workers is not None:
+        integer('--workers', options.workers, at_least=1, at_most=1024)
+        if options.scheduler:
+            raise InvalidValueError('--workers', options.workers,
+                                    'left out: --scheduler gives the workers')
+
+
+def _run(options: argparse.Namespace, study: Study, store: MapStore) -> Tally:
+    """Compute what is left, showing it; CanceledError after Ctrl-C."""
+    from flex_planner.maps.run_map import run_map
+
+    done = int((store.codes != CellCode.PENDING).sum())
+    display = MapDisplay(sys.stderr)
+    if done:
+        print(f'{store.path}: {done} of {store.codes.size} cells are there already')
+    try:
+        with interruptible() as canceled:
+            tally = run_map(study, store, workers=options.workers or 0,
+                            scheduler=options.scheduler, begin=display.begin,
+                            report=display.show, canceled=canceled)
+    finally:
+        display.close()
+    if canceled() and tally.done < tally.cells:
+        again = ' without --reset' if options.reset else ''
+        raise CanceledError(f'canceled; {tally.done} of {tally.cells} cells are kept in '
+                            f'{store.path}, the same command{again} goes on from there')
+    return tally

@@ -1,0 +1,69 @@
+"""The command that recomputes the paper."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from pathlib import Path
+import platform
+import sys
+
+from flex_planner import __version__
+from flex_planner.base.validation import integer
+from flex_planner.cli.options import Commands
+from flex_planner.cli.outputs import check_folder
+from flex_planner.cli.progress_line import Display, interruptible
+
+_PAGE, _PICTURES = 'paper.md', 'images/paper'
+
+
+def add_command(commands: Commands) -> None:
+    """Add ``flex-planner paper``."""
+    parser = commands.add_parser(
+        'paper', help='recompute every simulation of Korayem et al. 2009',
+        description='Compute every simulation of Korayem et al. 2009, compare it with what the '
+        'paper says, and write a page with tables and pictures.')
+    add = parser.add_argument
+    add('--output', type=Path, default=Path('output/paper'), metavar='DIR',
+        help=f'folder for {_PAGE} and {_PICTURES} (default: %(default)s)')
+    add('--section', action='append', metavar='N.N', help='compute this section only; may be '
+        'repeated')
+    add('--reduced', action='store_true', help='leave out what takes long')
+    add('--processes', type=int, default=os.cpu_count() or 1, metavar='N',
+        help='how many at a time (default: one a processor, %(default)s)')
+    add('--no-plot', action='store_true', help='draw nothing')
+    parser.set_defaults(run=_paper)
+
+
+def _paper(options: argparse.Namespace) -> int:
+    """Compute, write, and say what came of it."""
+    from flex_planner.paper.document import document, summary
+    from flex_planner.paper.run import computed, STUDIES
+
+    processes = integer('--processes', options.processes, at_least=1, at_most=256)
+    keys = options.section or list(STUDIES)
+    unknown = sorted(set(keys) - set(STUDIES))
+    if unknown:
+        print(f'flex-planner: --section is {unknown[0]}, but must be one of '
+              f'{", ".join(STUDIES)}', file=sys.stderr)
+        return 1
+    check_folder(options.output)
+    display = Display(sys.stderr)
+    display.begin(f'{len(keys)} sections in {processes} processes')
+    page, pictures = options.output / _PAGE, options.output / _PICTURES
+    try:
+        with interruptible() as canceled:
+            sections = list(computed(
+                keys, reduced=options.reduced, processes=processes, canceled=canceled,
+                pictures=None if options.no_plot else pictures,
+                report=lambda key, done, count: display.begin(
+                    f'section {key} is done, {done} of {count}')).values())
+    finally:
+        display.close()
+    remark = (f'Computed in {display.elapsed:.0f} s by flex_planner {__version__} on '
+              f'{processes} processors ({platform.machine()}).')
+    page.write_text(document(sections, _PICTURES, remark))
+    print(summary(sections))
+    shown = '' if options.no_plot else f', pictures in {pictures}'
+    print(f'\nwritten: {page}{shown}, in {display.elapsed:.0f} s')
+    return 0

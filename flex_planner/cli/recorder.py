@@ -1,0 +1,108 @@
+"""Recordings like those of the planner node, of requests from the command line; needs ROS 2."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+import time
+
+from flex_planner.capacity.max_payload import MaxPayload
+from flex_planner.cli.request import Request
+from flex_planner.planning.plan import Plan
+from flex_planner.planning.sampling import Reference
+from flex_planner.ros.messages.payload_searches import (
+    report_from_search,
+    search_message,
+    SearchOptions,
+)
+from flex_planner.ros.messages.plans import (
+    duration_message,
+    OBJECTIVE_FIELDS,
+    report_from_plan,
+    reported_trajectory,
+)
+from flex_planner.ros.planner.recorder import OutcomeRecorder
+from flex_planner.ros.settings.planner import PlannerSettings
+from flex_planner_interfaces.msg import (
+    FlexibleTrajectory,
+    MotionTask,
+    PayloadSearch,
+    PlanReport,
+)
+from geometry_msgs.msg import Point
+
+_NODE = '/flex_planner'  # so that the topics are those of the node
+
+
+class RequestRecorder:
+    """
+    Records what came of a request, as the node would.
+
+    Parameters
+    ----------
+    request : Request
+        The request.
+    folder : Path
+        Of the recordings.
+
+    Raises
+    ------
+    RecordingError
+        If the definitions of the messages are not found.
+
+    """
+
+    def __init__(self, request: Request, folder: Path) -> None:
+        task = request.task
+        self._message = task_message(request)
+        self._settings = replace(
+            PlannerSettings.for_arm(task.arm), elbow=request.elbow, tolerance=task.tolerance,
+            allowed_planning_time=request.time_limit, recording_folder=str(folder),
+            effort_weights=task.effort_weights.tolist(),
+            sampling_step=request.sampling.longest_step,
+            torque_tolerance=request.sampling.torque_tolerance)
+        self._recorder = OutcomeRecorder(task.arm, _NODE)
+
+    def record_plan(self, plan: Plan, reference: Reference | None) -> Path:
+        """Record a plan and return the folder; `reference` only if it is solved."""
+        return self._record(report_from_plan(plan), plan, reference, plan.planning_time, None)
+
+    def record_search(self, found: MaxPayload, accuracy: float, step: float,
+                      reference: Reference | None) -> Path:
+        """Record a search for the maximum payload, see `record_plan`."""
+        options = SearchOptions(method=found.method, accuracy=accuracy, step=step)
+        return self._record(report_from_search(found), found.plan, reference,
+                            found.planning_time, search_message(found, options))
+
+    def _record(self, report: PlanReport, plan: Plan | None, reference: Reference | None,
+                seconds: float, search: PayloadSearch | None) -> Path:
+        """Write a recording; the request is said to have come when planning began."""
+        trajectory, took = FlexibleTrajectory(), int(seconds * 1e9)
+        if plan is not None and reference is not None:
+            trajectory = reported_trajectory(report, plan, reference, self._settings)
+        report.planning_time = duration_message(took)
+        return self._recorder.write(
+            self._settings, time.time_ns() - took, self._message, report, trajectory, plan,
+            reference, lambda: False, search=search)
+
+
+def task_message(request: Request) -> MotionTask:
+    """Return a request as the node would have got it."""
+    task = request.task
+    message = MotionTask(
+        space=MotionTask.JOINT, elbow=request.elbow, duration=task.duration,
+        payload_mass=task.payload_mass, payload_inertia=task.payload_inertia,
+        position_weights=task.position_weights.tolist(),
+        velocity_weights=task.velocity_weights.tolist(),
+        effort_weights=task.effort_weights.tolist(), tolerance=task.tolerance,
+        allowed_planning_time=request.time_limit)
+    for name in OBJECTIVE_FIELDS if request.objectives else ():
+        setattr(message, name, getattr(request.objectives, name).tolist())
+    if request.points is None:
+        message.start_positions = task.start_positions.tolist()
+        message.goal_positions = task.goal_positions.tolist()
+        return message
+    message.space = MotionTask.CARTESIAN
+    message.start_point, message.goal_point = (
+        Point(x=float(x), y=float(y)) for x, y in request.points)
+    return message

@@ -1,0 +1,156 @@
+"""
+Equations of motion of a planar flexible chain as CasADi expressions.
+
+Euler-Lagrange with assumed modes, Korayem et al. 2009, eqs. (1)-(5) and (18)-(25), for any
+number of links and modes. Velocities are carried from link to link in link frames, so that
+only one sine and cosine a joint appear; the integrals over a link enter as constants.
+
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+from flex_planner.arms.arm import Arm, Link
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Chain:
+    """
+    Symbolic dynamics ``M(q) a + h(q, q') = B u`` of an arm.
+
+    Attributes
+    ----------
+    coordinates, rates : casadi.SX, shape (n_t, 1)
+        q [rad, m] and q' [rad/s, m/s].
+    payload_mass, payload_inertia : casadi.SX
+        m_p at the tip [kg], and its rotary inertia [kg m^2].
+    rigidity : casadi.SX, shape (n, 1)
+        E I of each link [N m^2].
+    kinetic, potential : casadi.SX
+        Energies [J]; potential includes bending.
+    friction : casadi.SX, shape (n_t, 1)
+        Generalized forces of viscous joint friction [N m] and modal damping [N].
+
+    """
+
+    coordinates: Any
+    rates: Any
+    payload_mass: Any
+    payload_inertia: Any
+    rigidity: Any
+    kinetic: Any
+    potential: Any
+    friction: Any
+
+    def mass_matrix(self) -> Any:
+        """Return M(q), shape (n_t, n_t), eq. (3)."""
+        return ca.jacobian(ca.gradient(self.kinetic, self.rates), self.rates)
+
+    def bias(self) -> Any:
+        """Return h(q, q') = H + G + friction, shape (n_t, 1), eq. (3)."""
+        momentum = ca.gradient(self.kinetic, self.rates)
+        return (ca.jtimes(momentum, self.coordinates, self.rates)
+                - ca.gradient(self.kinetic - self.potential, self.coordinates) + self.friction)
+
+    def inverse_dynamics(self, accelerations: Any) -> Any:
+        """Return M a + h, shape (n_t, 1), without forming M."""
+        momentum = ca.gradient(self.kinetic, self.rates)
+        return ca.jtimes(momentum, self.rates, accelerations) + self.bias()
+
+
+@dataclass(slots=True)
+class _Frame:
+    """Motion of a link's base frame, in its own axes; g is gravity."""
+
+    velocity: Any
+    position: Any
+    gravity: Any
+    rate: Any
+
+    def turned(self, angle: Any, rate: Any) -> _Frame:
+        """Return the frame after a rotation by ``angle``, turning ``rate`` faster."""
+        c, s = ca.cos(angle), ca.sin(angle)
+        inverse = ca.vertcat(ca.horzcat(c, s), ca.horzcat(-s, c))
+        return _Frame(inverse @ self.velocity, inverse @ self.position, inverse @ self.gravity,
+                      self.rate + rate)
+
+    def moved(self, length: float, deflection: Any, rate: Any) -> _Frame:
+        """Return the frame shifted to a point of the link that bends."""
+        v, w = self.velocity, self.rate
+        velocity = ca.vertcat(v[0] - w * deflection, v[1] + w * length + rate)
+        position = self.position + ca.vertcat(length, deflection)
+        return _Frame(velocity, position, self.gravity, w)
+
+
+def build_chain(arm: Arm) -> Chain:
+    """
+    Return the symbolic dynamics of an arm.
+
+    Parameters
+    ----------
+    arm : Arm
+        Its flexural rigidities are left symbolic, all else enters as constants.
+
+    """
+    q, rates = ca.SX.sym('q', arm.n_coordinates), ca.SX.sym('dq', arm.n_coordinates)
+    payload, inertia = ca.SX.sym('m_p'), ca.SX.sym('J_p')
+    rigidity = ca.SX.sym('EI', arm.n_joints)
+    zero = ca.SX(2, 1)
+    frame = _Frame(zero, zero, ca.SX(ca.sparsify(ca.DM(arm.gravity))), ca.SX(1, 1))
+    kinetic, potential, slope, slope_rate = ca.SX(0), ca.SX(0), ca.SX(0), ca.SX(0)
+    for i, (link, modal) in enumerate(zip(arm.links, arm.modal_slices, strict=True)):
+        frame = frame.turned(q[i] + slope, rates[i] + slope_rate)
+        bend, bend_rate = q[modal], rates[modal]
+        T, V = _link_energies(link, frame, bend, bend_rate, rigidity[i])
+        shapes = link.mode_shapes()
+        slope, slope_rate = _dot(shapes.tip_slope, bend), _dot(shapes.tip_slope, bend_rate)
+        kinetic += T + arm.nodes[i].inertia * frame.rate**2 / 2
+        frame = frame.moved(link.length, _dot(shapes.tip_deflection, bend),
+                            _dot(shapes.tip_deflection, bend_rate))
+        mass = arm.nodes[i + 1].mass + (payload if i == arm.n_joints - 1 else 0)
+        kinetic += mass * ca.sumsqr(frame.velocity) / 2
+        potential += V - mass * ca.dot(frame.gravity, frame.position)
+    kinetic += (arm.nodes[-1].inertia + inertia) * (frame.rate + slope_rate)**2 / 2
+    return Chain(coordinates=q, rates=rates, payload_mass=payload, payload_inertia=inertia,
+                 rigidity=rigidity, kinetic=kinetic, potential=potential,
+                 friction=_damping(arm, rigidity) * rates)
+
+
+def _damping(arm: Arm, rigidity: Any) -> Any:
+    """Return the damping coefficient of each coordinate: joints, then modes."""
+    coefficients = [ca.SX(ca.sparsify(ca.DM(joint.viscous_friction))) for joint in arm.joints]
+    for i, link in enumerate(arm.links):
+        modes, ratio = link.mode_shapes(), link.damping_ratio
+        for j in range(link.modes if ratio else 0):
+            mass = link.linear_density * modes.gram[j, j]
+            coefficients.append(2 * ratio * ca.sqrt(rigidity[i] * modes.stiffness[j, j] * mass))
+        coefficients += [ca.SX(1, 1)] * (0 if ratio else link.modes)
+    return ca.vertcat(*coefficients)
+
+
+def _dot(weights: Any, values: Any) -> Any:
+    """Return the scalar product of constants and symbols; 0 for none of them."""
+    return sum((float(w) * values[j] for j, w in enumerate(weights) if w), ca.SX(0))
+
+
+def _link_energies(link: Link, frame: _Frame, q: Any, dq: Any, rigidity: Any) -> tuple[Any, Any]:
+    """
+    Return kinetic and potential energy of one link, eqs. (21) and (23).
+
+    The square of the curvature that eq. (23) lacks is there.
+
+    """
+    rho, L, modes = link.linear_density, link.length, link.mode_shapes()
+    v, w, g = frame.velocity, frame.rate, frame.gravity
+    mass, first, second = rho * L, rho * L**2 / 2, rho * L**3 / 3
+    b_q, b_dq = _dot(rho * modes.area, q), _dot(rho * modes.area, dq)
+    gram = ca.sparsify(ca.DM(rho * modes.gram))
+    kinetic = (mass * ca.sumsqr(v) / 2 - v[0] * w * b_q + v[1] * (w * first + b_dq)
+               + w**2 * (second + ca.bilin(gram, q, q)) / 2
+               + w * _dot(rho * modes.moment, dq) + ca.bilin(gram, dq, dq) / 2)
+    weight = mass * ca.dot(g, frame.position) + g[0] * first + g[1] * b_q
+    bending = rigidity * ca.bilin(ca.sparsify(ca.DM(modes.stiffness)), q, q) / 2
+    return kinetic, bending - weight

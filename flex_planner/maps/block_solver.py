@@ -1,0 +1,152 @@
+"""
+Blocks of neighbouring cells, solved one after the other.
+
+A cell starts from its neighbours in the block: where two of them lead towards it, their motions
+are continued along that line; else from one of them; else from nothing. Blocks know nothing of one
+another, so that their order does not matter.
+
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+import time
+from typing import NamedTuple
+
+from flex_planner.base.errors import FlexPlannerError, SingularError, UnreachableError
+from flex_planner.base.processes import return_memory
+from flex_planner.base.progress import Monitor, StoppedError
+from flex_planner.capacity.extrapolation import step_ratio
+from flex_planner.capacity.min_duration import MinDuration
+from flex_planner.maps.cell_results import CellCode, CellResult
+from flex_planner.maps.cell_solver import Found, Solver, task_of
+from flex_planner.maps.end_points import close
+from flex_planner.maps.study import Block, Study
+from flex_planner.optimal_control.task import Task
+from flex_planner.planning.plan_problem import STATUSES
+
+Index = tuple[int, ...]
+_LONGEST_MESSAGE = 300
+
+
+class Neighbours(NamedTuple):
+    """What a cell starts from: two cells on a line with it, the nearer one first; or fewer."""
+
+    near: Found | None = None
+    far: Found | None = None
+    ratio: float = 1.0
+
+
+def blocks(study: Study) -> list[Block]:
+    """Return the blocks of the grid in its order."""
+    sides = [[slice(first, min(first + side, size)) for first in range(0, size, side)]
+             for size, side in zip(study.shape, study.block_shape, strict=True)]
+    return list(product(*sides))
+
+
+def solve_block(study: Study, block: Block, monitor: Monitor | None = None) -> list[CellResult]:
+    """
+    Return what became of every cell of a block, in the order of their indices.
+
+    A cell that fails is a result with a code, whatever happened.
+
+    Parameters
+    ----------
+    study : Study
+        What is asked.
+    block : tuple of slice
+        One of `blocks`.
+    monitor : Monitor, optional
+        May cancel, which leaves cells pending.
+
+    """
+    return _Block(study, block, monitor).results()
+
+
+class _Block:
+    """A block on its way: what was found so far, and what each cell started from."""
+
+    def __init__(self, study: Study, block: Block, monitor: Monitor | None) -> None:
+        self._study, self._monitor, self._solver = study, monitor, Solver(study)
+        self._cells = list(product(*(range(part.start, part.stop) for part in block)))
+        self._results = {result.index: result for result in study.known_failures(block)}
+        self._done: dict[Index, Found] = {}
+        self._starts: dict[Index, Neighbours] = {}
+
+    def results(self) -> list[CellResult]:
+        """Return what became of the cells."""
+        for index in self._cells:
+            if index not in self._results:
+                self._results[index] = self._added(index)
+        # what did not converge may do so from the neighbours on the other sides
+        for index in reversed(self._cells):
+            if self._results[index].code is CellCode.NOT_CONVERGED:
+                self._try_again(index)
+        return [self._results[index] for index in self._cells]
+
+    def _try_again(self, index: Index) -> None:
+        """Solve a cell once more, unless it would start as it did."""
+        first = self._results[index]
+        start = _neighbours(self._study, index, self._study.task(index), self._done)
+        if start == self._starts[index]:
+            return
+        second = self._added(index)
+        self._results[index] = replace(second, iterations=first.iterations + second.iterations,
+                                       seconds=first.seconds + second.seconds)
+
+    def _added(self, index: Index) -> CellResult:
+        """Return what became of a cell, and keep its motion for the neighbours."""
+        began, limited = time.monotonic(), Monitor(time_limit=self._study.cell_time_limit)
+        if self._monitor is not None:
+            limited.canceled = self._monitor.canceled
+        result = self._solved(index, limited)
+        return_memory()
+        start = self._starts.get(index, Neighbours())
+        return replace(result, message=result.message[:_LONGEST_MESSAGE],
+                       warm=start.near is not None, seconds=time.monotonic() - began)
+
+    def _solved(self, index: Index, monitor: Monitor) -> CellResult:
+        """Solve a cell; whatever happens is a result."""
+        try:
+            task = self._study.task(index)
+            start = self._starts[index] = _neighbours(self._study, index, task, self._done)
+            found = self._solver.solve(index, task, monitor, *start)
+            result = self._solver.result(index, found)
+            if result.code is CellCode.SOLVED or isinstance(found, MinDuration):
+                self._done[index] = found
+            return result
+        except StoppedError as stop:
+            return CellResult(index=index, code=CellCode.of(STATUSES[stop.reason]),
+                              message=str(stop))
+        except (UnreachableError, SingularError) as error:
+            return CellResult(index=index, code=CellCode.UNREACHABLE, message=str(error))
+        except FlexPlannerError as error:
+            return CellResult(index=index, code=CellCode.INVALID, message=str(error))
+        except Exception as error:  # one cell must not cost the others
+            return CellResult(index=index, code=CellCode.FAILED,
+                              message=f'{type(error).__name__}: {error}')
+
+
+def _neighbours(study: Study, index: Index, task: Task,
+                done: dict[Index, Found]) -> Neighbours:
+    """Return the cells that a cell starts from."""
+    best = Neighbours()
+    for axis in reversed(range(len(index))):  # along a line of the block where there is one
+        for back in (1, -1):
+            near, far = (_there(index, axis, steps * back, task, done) for steps in (1, 2))
+            if near is None:
+                continue
+            if far is not None and type(far) is type(near):
+                here, values = index[axis], study.axes[axis].values
+                return Neighbours(near, far, step_ratio(
+                    values[here - 2 * back], values[here - back], values[here]))
+            best = best if best.near is not None else Neighbours(near)
+    return best
+
+
+def _there(index: Index, axis: int, back: int, task: Task,
+           done: dict[Index, Found]) -> Found | None:
+    """Return what was found so many cells before one, unless the arm turns the other way."""
+    found = done.get((*index[:axis], index[axis] - back, *index[axis + 1:]))
+    return found if found is not None and close(task_of(found), task) else None

@@ -1,0 +1,207 @@
+"""The quantities of a map, cell by cell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+import math
+from typing import Any, TypeAlias
+
+from flex_planner.arms.kinematics import tip_position
+from flex_planner.base.progress import Monitor
+from flex_planner.capacity.extrapolation import thinned
+from flex_planner.capacity.max_payload import find_max_payload, MaxPayload
+from flex_planner.capacity.min_duration import find_min_duration, MinDuration
+from flex_planner.collocation import Settings
+from flex_planner.dynamics.arm_dynamics import PlantModel
+from flex_planner.maps.cell_results import CellCode, CellResult
+from flex_planner.maps.kept_motions import KeptMotion
+from flex_planner.maps.quantities import Quantity
+from flex_planner.maps.study import Study
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
+from flex_planner.optimal_control.task import Task
+from flex_planner.planning.plan import Plan
+from flex_planner.planning.plan_path import plan_path
+from flex_planner.planning.strategies.first_extremals import first_motion
+from flex_planner.planning.strategies.price_continuation import on_the_way
+from flex_planner.simulation.comparison import finely_sampled
+from flex_planner.simulation.execution import carried_out, Setting, Way
+from flex_planner.simulation.joint_control import Gains
+import numpy as np
+
+_RATE = 1000.0  # [Hz]
+# accuracy of a duration that is only to be compared, as a share of what is asked for
+_SHORT = 0.02
+# largest mesh of a cell: what takes more memory is not solved by it either
+_INTERVALS, _LARGEST = 400, 8  # at least, and in units of the coarsest that overlooks nothing
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Vibration:
+    """A plan, and how far the tip of another arm still moves after it was carried out [m]."""
+
+    plan: Plan
+    peak_to_peak: float
+
+
+Found: TypeAlias = MaxPayload | MinDuration | Plan | Vibration
+
+
+class Solver:
+    """
+    Solves the cells of a study.
+
+    Parameters
+    ----------
+    study : Study
+        What is asked; its arm is compiled here, or read from disk.
+
+    """
+
+    def __init__(self, study: Study) -> None:
+        self._study, self._model = study, ArmModel(study.arm)
+
+    def solve(self, index: tuple[int, ...], task: Task, monitor: Monitor, near: Any, far: Any,
+              ratio: float) -> Found:
+        """
+        Return what was found for the task of a cell, from what was found for neighbours.
+
+        Raises
+        ------
+        FlexPlannerError
+            If the cell makes no sense, naming the value.
+        StoppedError
+            If the monitor stopped a simulation.
+
+        """
+        study, model = self._study, self._model
+        problem = MotionProblem(model, task, task_parameters(task))
+        settings = _settings(problem)
+        if study.quantity is Quantity.MAX_PAYLOAD:
+            return self._payload(problem, settings, monitor, near, far, ratio)
+        if study.quantity is Quantity.MIN_DURATION:
+            return find_min_duration(task, model=model, settings=settings, monitor=monitor,
+                                     accuracy=study.accuracy, start_from=near, before=far,
+                                     ratio=ratio)
+        plan = plan_path(task, model=model, settings=settings, monitor=monitor,
+                         start_from=_plan_of(near))
+        if study.quantity is Quantity.MIN_EFFORT or not plan.solved:
+            return plan
+        return self._shaken(index, task, plan, monitor)
+
+    def _payload(self, problem: MotionProblem, settings: Settings, monitor: Monitor, near: Any,
+                 far: Any, ratio: float) -> Found:
+        """
+        Return the largest payload, or the shortest duration where that is too long.
+
+        What cannot be done in the time is soonest shown by the time that it takes: along a line
+        of such cells that costs a few iterations.
+
+        """
+        task, late = problem.task, isinstance(near, MinDuration)
+        if self._says_much and (late or _may_be_none(problem, settings, near, far, ratio,
+                                                     monitor)):
+            shortest = find_min_duration(
+                task, model=self._model, settings=settings, monitor=monitor,
+                accuracy=_SHORT * task.duration, start_from=near if late else None,
+                before=far if late else None, ratio=ratio)
+            if shortest.solved and shortest.lower > task.duration:
+                return shortest
+        if late:
+            near = far = None
+        return find_max_payload(task, model=self._model, settings=settings, monitor=monitor,
+                                accuracy=self._study.accuracy, start_from=near, before=far,
+                                ratio=ratio)
+
+    @property
+    def _says_much(self) -> bool:
+        """Whether a shortest duration holds for all motions: not where they may swing first."""
+        arm = self._study.arm
+        limited = [np.isfinite(joint.motor.stall_torque) for joint in arm.joints]
+        return all(limited) and not arm.gravity.any()
+
+    def _shaken(self, index: tuple[int, ...], task: Task, plan: Plan,
+                monitor: Monitor) -> Vibration:
+        """Carry a plan out on the arm that is simulated."""
+        study = self._study
+        arm, carried = study.plant(index)
+        gains = study.gains or Gains.of(arm.n_joints, 0.0, 0.0)
+        goal = tip_position(task.arm, plan.problem.goal[:task.arm.n_coordinates])
+        setting = Setting(model=PlantModel(arm), gains=gains, rate=_RATE, payload_mass=carried,
+                          goal=goal, settling=study.settling, monitor=monitor)
+        way = Way.FLEXIBLE if study.gains else Way.FLEXIBLE_OPEN
+        outcome = carried_out(way, plan, finely_sampled(plan, monitor), setting)
+        return Vibration(plan=plan, peak_to_peak=outcome.residual.tip)
+
+    def result(self, index: tuple[int, ...], found: Found) -> CellResult:
+        """Return what was found as a result."""
+        if isinstance(found, MinDuration) and self._study.quantity is Quantity.MAX_PAYLOAD:
+            return _too_late(index, found)
+        plan = _plan_of(found)
+        solution = found.plan if isinstance(found, Vibration) else found
+        code = CellCode.of(solution.status)
+        if code is not CellCode.SOLVED or plan is None:
+            return CellResult(index=index, code=code, message=solution.message,
+                              iterations=solution.iterations)
+        value, bound = _value(found)
+        return CellResult(index=index, code=code, message=solution.message, value=value,
+                          bound=bound, cost=plan.cost, tip_error=plan.certificate.tip_error,
+                          iterations=solution.iterations,
+                          motion=_kept(found, plan) if self._study.keeps_motions else None)
+
+
+def _settings(problem: MotionProblem) -> Settings:
+    """Return the settings of a cell, so that none takes much more memory than others."""
+    settings = Settings()
+    fewest = problem.fewest_intervals(settings.stages)
+    most = min(max(_INTERVALS, _LARGEST * fewest), settings.max_intervals)
+    return replace(settings, max_intervals=most)
+
+
+def _may_be_none(problem: MotionProblem, settings: Settings, near: MaxPayload | None,
+                 far: MaxPayload | None, ratio: float, monitor: Monitor) -> bool:
+    """Return whether neighbours, or a first trial, let expect that nothing can be carried."""
+    if near is None:
+        return not first_motion(problem, on_the_way(settings), monitor).converged
+    slope = near.payload - far.payload if far is not None else -near.payload / 2
+    return near.payload + 2 * ratio * slope < problem.task.payload_mass
+
+
+def _kept(found: Found, plan: Plan) -> KeptMotion | None:
+    """Return what others may start from: near a limit, the last motion but one on the way."""
+    if isinstance(found, MaxPayload) and found.stops:
+        stop = found.stops[-2:][0]
+        motion = thinned(stop, on_the_way(Settings()))
+        return KeptMotion.of(stop.problem, motion.solution, stop.price)
+    return None if plan.solution is None else KeptMotion.of(plan.problem, plan.solution)
+
+
+def _too_late(index: tuple[int, ...], found: MinDuration) -> CellResult:
+    """Return that a motion takes longer than it may."""
+    task = found.task
+    return CellResult(index=index, code=CellCode.INFEASIBLE, iterations=found.iterations, message=(
+        f'the motion takes at least {found.lower:.4g} s with {task.payload_mass:g} kg, and '
+        f'{task.duration:g} s were asked for'))
+
+
+def task_of(found: Found) -> Task:
+    """Return the task of what was found."""
+    return found.plan.task if isinstance(found, Vibration) else found.task
+
+
+def _plan_of(found: Found | None) -> Plan | None:
+    """Return the plan of what was found."""
+    if found is None or isinstance(found, Plan):
+        return found
+    return found.plan
+
+
+def _value(found: Found) -> tuple[float, float]:
+    """Return the quantity, and how far it is at most."""
+    if isinstance(found, MaxPayload):
+        return found.payload, found.upper
+    if isinstance(found, MinDuration):
+        return found.duration, found.lower
+    if isinstance(found, Vibration):
+        return found.peak_to_peak, math.nan
+    return found.cost, math.nan

@@ -1,0 +1,144 @@
+"""Where the motions of a map start and end: points of the tip, some of them moved by axes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from flex_planner.arms.arm import Arm
+from flex_planner.arms.inverse_kinematics import check_angle_limits, inverse_kinematics, workspace
+from flex_planner.base.errors import InvalidValueError, SingularError, UnreachableError
+from flex_planner.base.validation import Array, number, vector
+from flex_planner.maps.axes import Axis, MAX_COORDINATE
+from flex_planner.optimal_control.task import MAX_JOINT_ANGLE, Task
+import numpy as np
+
+_CANDIDATES = 25
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class End:
+    """
+    The start or the goal of every motion of a map.
+
+    Attributes
+    ----------
+    name : str
+        ``start`` or ``goal``; its axes are called ``start_x`` and so on.
+    point : numpy.ndarray, shape (2,)
+        Of the tip; NaN where an axis gives it [m].
+    angles : numpy.ndarray, shape (n,)
+        Of the joints, instead of the point; empty if there is one [rad].
+
+    """
+
+    name: str
+    point: Array = field(default_factory=lambda: np.full(2, np.nan))
+    angles: Array = field(default_factory=lambda: np.zeros(0))
+
+    def __post_init__(self) -> None:
+        for name in ('point', 'angles'):
+            copy = np.array(getattr(self, name), dtype=np.float64)
+            copy.setflags(write=False)
+            object.__setattr__(self, name, copy)
+
+    @property
+    def axes(self) -> tuple[str, str]:
+        """Return the names of the axes that move it."""
+        return f'{self.name}_x', f'{self.name}_y'
+
+    def check(self, arm: Arm, axes: Sequence[Axis]) -> None:
+        """
+        Refuse what does not fit an arm or the axes.
+
+        Raises
+        ------
+        InvalidValueError
+            Naming the field as in a study file.
+
+        """
+        moved = [axis.name for axis in axes if axis.name in self.axes]
+        if self.angles.size:
+            field = f'{self.name}_angles'
+            vector(field, self.angles, arm.n_joints, at_least=-MAX_JOINT_ANGLE,
+                   at_most=MAX_JOINT_ANGLE, unit='rad')
+            check_angle_limits(arm, field, self.angles)
+            if moved:
+                raise InvalidValueError(f'axes.{moved[0]}', 'given',
+                                        f'left out: {field} gives the {self.name}')
+            return
+        for entry, name in zip(self.point, self.axes, strict=True):
+            if name not in moved:
+                number(self.name, float(entry), at_least=-MAX_COORDINATE, at_most=MAX_COORDINATE,
+                       unit='m')
+
+    def at(self, values: Mapping[str, float]) -> Array:
+        """Return the point (2,) for values of the axes [m]."""
+        x, y = self.point
+        along, across = self.axes
+        return np.array([values.get(along, x), values.get(across, y)])
+
+    def posture(self, arm: Arm, values: Mapping[str, float], elbow: int,
+                near: Array | None) -> Array:
+        """
+        Return the joint angles (n,) for values of the axes, see `inverse_kinematics` [rad].
+
+        Raises
+        ------
+        UnreachableError, SingularError
+            Saying which end it is.
+
+        """
+        if self.angles.size:
+            return self.angles
+        try:
+            return inverse_kinematics(arm, self.at(values), elbow, near)
+        except (UnreachableError, SingularError) as error:
+            raise type(error)(f'{self.name}: {error}') from None
+
+    def is_too_far(self, arm: Arm, values: Mapping[str, float]) -> bool:
+        """Return whether a point is farther from the base, or nearer, than the tip gets."""
+        nearest, farthest = workspace(arm)
+        distance = float(np.hypot(*self.at(values)))
+        return not self.angles.size and not nearest <= distance <= farthest
+
+
+def middle_posture(arm: Arm, end: End, axes: tuple[Axis, ...], elbow: int) -> Array | None:
+    """
+    Return the posture at a reachable point in the middle of an end's axes.
+
+    Postures that are taken close to it jump by a full turn only half a turn away from it. None
+    if no axis moves the end, or if it finds no point that can be reached.
+
+    """
+    given = {axis.name: axis.values for axis in axes if axis.name in end.axes}
+    if not given or end.angles.size:
+        return None
+    middle = {name: float(values.mean()) for name, values in given.items()}
+    grid = np.meshgrid(*(_thinned(values) for values in given.values()))
+    points = np.stack([part.ravel() for part in grid], axis=1)
+    distances = np.linalg.norm(points - np.array(list(middle.values())), axis=1)
+    for place in np.argsort(distances, kind='stable'):
+        try:
+            values = dict(zip(given, points[place].tolist(), strict=True))
+            return inverse_kinematics(arm, end.at(values), elbow)
+        except (UnreachableError, SingularError):
+            continue
+    return None
+
+
+def _thinned(values: Array) -> Array:
+    """Return some of the values, not more than a few dozen."""
+    return values[::max(1, values.size // _CANDIDATES)]
+
+
+def close(first: Task, second: Task) -> bool:
+    """
+    Return whether no joint of two motions is half a turn or more apart at start and goal.
+
+    Between neighbouring cells that are not, the arm turns the other way round: neither motion
+    is a start for the other.
+
+    """
+    return all(bool(np.abs(getattr(first, name) - getattr(second, name)).max() < np.pi)
+               for name in ('start_positions', 'goal_positions'))

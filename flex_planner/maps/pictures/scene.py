@@ -1,0 +1,189 @@
+"""The arm of a map over its workspace."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+import logging
+import math
+from typing import Any
+
+from flex_planner.arms.arm import Arm, Joint, Link, Motor, Node
+from flex_planner.arms.inverse_kinematics import workspace
+from flex_planner.arms.kinematics import link_points
+from flex_planner.base.errors import FlexPlannerError
+from flex_planner.base.validation import Array
+from flex_planner.maps.axes import Axis
+from flex_planner.maps.cell_results import CellCode
+from flex_planner.maps.end_points import End
+from flex_planner.maps.pictures.data import MapAxis, MapData
+from flex_planner.maps.pictures.panels import edges
+from flex_planner.maps.quantities import Quantity
+from flex_planner.maps.study import Study
+from flex_planner.optimal_control.task import Task
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle
+from matplotlib.patheffects import withStroke
+import numpy as np
+from numpy.typing import NDArray
+import xarray as xr
+import yaml
+
+_ARM = '#202020'
+_TIPS = {'o': '#2f9bff', '*': '#ff5a36'}
+_EDGE = 0.05
+# of no consequence for postures, but a study wants them
+_ACCURACY, _PAYLOAD = 1e-3, 1.0
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Scene:
+    """
+    The arm of a map over its workspace.
+
+    Attributes
+    ----------
+    arm : Arm
+        n joints.
+    given, best : numpy.ndarray, shape (n,)
+        The posture at the end of the motion that is given, and at the best of those in the
+        plane, if any [rad].
+    given_name : str
+        ``start`` or ``goal``.
+
+    """
+
+    arm: Arm
+    given: Array
+    best: Array | None
+    given_name: str
+
+    def drawn(self, posture: Array) -> Array:
+        """Return the ends of the unbent links in a posture, shape (n + 1, 2) [m]."""
+        bent = np.concatenate([posture, np.zeros(self.arm.n_modes)])
+        points = link_points(self.arm, bent)
+        return np.concatenate([np.zeros((1, 2)), points[:, -1]])
+
+    @property
+    def lines(self) -> list[Array]:
+        """Return the arm in all postures that are drawn."""
+        return [self.drawn(posture) for posture in (self.given, self.best)
+                if posture is not None]
+
+
+def study_of(dataset: xr.Dataset) -> Study | None:
+    """
+    Return the study of a store as far as postures depend on it, if it can be understood.
+
+    It is made of what the store says alone, not of the file of its arm.
+
+    """
+    try:
+        content = yaml.safe_load(dataset.attrs['study'])
+        quantity = Quantity[str(dataset.attrs['quantity']).upper()]
+        return Study(
+            name=str(dataset.attrs['title']), quantity=quantity, text=dataset.attrs['study'],
+            arm=_arm(yaml.safe_load(dataset.attrs['arm'])),
+            axes=tuple(Axis(name=str(name), values=dataset[name].values)
+                       for name in dataset['code'].dims),
+            start=_end('start', content), goal=_end('goal', content),
+            elbow=content.get('elbow', -1), payload_mass=_PAYLOAD,
+            accuracy=_ACCURACY if quantity.is_searched else math.nan)
+    except (FlexPlannerError, KeyError, TypeError, ValueError, AttributeError,
+            yaml.YAMLError) as error:
+        _log.warning('the arm of this map is not drawn, its study is not understood: %s', error)
+        return None
+
+
+def _arm(fields: dict[str, Any]) -> Arm:
+    """Return the arm of a store."""
+    return Arm(**{**fields, 'links': tuple(Link(**link) for link in fields['links']),
+                  'joints': tuple(Joint(**{**joint, 'motor': Motor(**joint['motor'])})
+                                  for joint in fields['joints']),
+                  'nodes': tuple(Node(**node) for node in fields['nodes'])})
+
+
+def _end(name: str, content: Mapping[str, Any]) -> End:
+    """Return where all motions of a study start or end."""
+    angles = np.array(content.get(f'{name}_angles', []), dtype=float)
+    point = np.array(content.get(name, [np.nan, np.nan]), dtype=float)
+    return End(name=name, point=point, angles=angles)
+
+
+def find_scene(data: MapData, plane: tuple[int, int], fixed: Mapping[int, int],
+               study: Study) -> Scene | None:
+    """Return the arm of a diagram over the workspace, if one of its cells has a task."""
+    values, codes = data.cut(plane, fixed)
+    known = bool(np.isfinite(values).any())
+    best = np.unravel_index(data.best(values), values.shape) if known else None
+    hopeful = np.argwhere(~np.isin(codes, (CellCode.UNREACHABLE, CellCode.INVALID)))
+    task = _first_task(data, plane, fixed, study, hopeful if best is None else np.array([best]))
+    if task is None:
+        return None
+    ends = {'start': task.start_positions, 'goal': task.goal_positions}
+    moved = data.axes[plane[0]].name.removesuffix('_x')
+    given = 'start' if moved == 'goal' else 'goal'
+    return Scene(arm=task.arm, given=ends[given], given_name=given,
+                 best=ends[moved] if known else None)
+
+
+def _first_task(data: MapData, plane: tuple[int, int], fixed: Mapping[int, int], study: Study,
+                cells: NDArray[np.int64]) -> Task | None:
+    """Return the task of the first cell of a diagram that has one."""
+    for cell in cells:
+        place = {**fixed, **dict(zip(plane, cell.tolist(), strict=True))}
+        try:
+            return study.task(tuple(place[axis] for axis in range(len(data.axes))))
+        except FlexPlannerError:
+            continue
+    return None
+
+
+def draw_arm(axes: Axes, scene: Scene) -> list[Artist]:
+    """Draw the arm, and how far it reaches; return entries of a legend."""
+    near, far = workspace(scene.arm)
+    for radius in {near, far} - {0.0}:
+        axes.add_patch(Circle((0, 0), radius, fill=False, color=_ARM, linestyle='--',
+                              linewidth=1))
+    entries: list[Artist] = []
+    if scene.best is not None:
+        other = 'start' if scene.given_name == 'goal' else 'goal'
+        entries.append(_posture(axes, scene, scene.best, '*', f'arm at the best {other}', 0.45))
+    entries.append(_posture(axes, scene, scene.given, 'o', f'arm at the {scene.given_name}', 1))
+    entries.append(Line2D([], [], color=_ARM, linestyle='--', linewidth=1,
+                          label='reach of the arm'))
+    return entries[::-1]
+
+
+def frame(axes: Axes, x: MapAxis, y: MapAxis, scene: Scene | None) -> None:
+    """Show all cells and all of the arm, as wide as high."""
+    low, high = np.stack([edges(x.values)[[0, -1]], edges(y.values)[[0, -1]]], -1)
+    if scene is not None:
+        points = np.concatenate(scene.lines)
+        margin = _EDGE * scene.arm.reach
+        low = np.minimum(low, points.min(0) - margin)
+        high = np.maximum(high, points.max(0) + margin)
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    axes.set_aspect('equal', adjustable='box')
+
+
+def _posture(axes: Axes, scene: Scene, posture: Array, marker: str, label: str,
+             alpha: float) -> Artist:
+    """Draw the arm in a posture, its tip marked; return an entry of a legend."""
+    points, halo = scene.drawn(posture), [withStroke(linewidth=6, foreground='white', alpha=alpha)]
+    color = (*to_rgb(_ARM), alpha)
+    axes.plot(*points.T, color=color, linewidth=3, path_effects=halo, zorder=4,
+              solid_joinstyle='round')
+    axes.plot(*points[:-1].T, 'o', color='white', markeredgecolor=_ARM, markersize=6,
+              alpha=alpha, zorder=5)
+    size = 15 if marker == '*' else 9
+    # a start that is the best goal shows both
+    order = 7 if marker == 'o' else 6
+    axes.plot(*points[-1], marker, color=_TIPS[marker], markeredgecolor='white', markersize=size,
+              zorder=order, linestyle='')
+    return Line2D([], [], color=color, linewidth=3, label=label, marker=marker,
+                  markerfacecolor=_TIPS[marker], markeredgecolor='white', markersize=size)

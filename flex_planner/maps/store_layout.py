@@ -1,0 +1,119 @@
+"""How a map is laid out in its store: variables, chunks and metadata."""
+
+from __future__ import annotations
+
+from datetime import datetime, timezone
+from importlib.metadata import version
+from pathlib import Path
+import reprlib
+from typing import Any, TYPE_CHECKING
+
+from dask import array
+from flex_planner import __version__
+from flex_planner.arms.arm_files import plain_arm
+from flex_planner.maps.cell_results import CellCode
+from flex_planner.maps.kept_motions import signature_fields
+from flex_planner.optimal_control.task import Task
+from numcodecs import Blosc, VLenArray
+import numpy as np
+import xarray as xr
+import yaml
+import zarr
+
+if TYPE_CHECKING:
+    from flex_planner.maps.study import Study
+
+_CONVENTIONS = 'CF-1.11'
+_LIBRARIES = ('casadi', 'numpy', 'scipy', 'xarray', 'zarr')
+_TEXT = np.dtype('O', metadata={'element_type': str})  # how xarray marks text of any length
+MOTIONS = 'motions'  # a group of its own, which xarray leaves alone
+# type, what stands where nothing is written, metadata; the quantity itself comes first
+BESIDE: dict[str, tuple[Any, float | None, dict[str, str]]] = {
+    'bound': (float, np.nan, {'long_name': 'bound of the true value'}),
+    'cost': (float, np.nan, {'long_name': 'cost J of eq. (6)', 'units': 'N^2 m^2 s'}),
+    'tip_error': (float, np.nan, {'long_name': 'tip error of the re-simulation', 'units': 'm'}),
+    'iterations': (np.int32, -1, {'long_name': 'Newton iterations', 'units': '1'}),
+    'seconds': (float, np.nan, {'long_name': 'computing time', 'units': 's'}),
+    'warm': (np.int8, -1, {'long_name': 'started from a neighbor: 1, otherwise 0'}),
+    'message': (_TEXT, None, {'long_name': 'what became of the cell'}),
+    # without a filler, which would have xarray turn the numbers into floats
+    'code': (np.int8, None, {'long_name': 'kind of outcome'}),
+}
+
+
+def write_empty(path: Path, study: Study) -> None:
+    """Write a store without any result."""
+    names, chunks = [axis.name for axis in study.axes], {'chunks': study.block_shape}
+    key, unit = study.quantity.key, {'units': study.quantity.unit}
+    kinds: dict[str, tuple[Any, float | None, dict[str, Any]]] = {
+        key: (float, np.nan, {'long_name': study.quantity.value, **unit}), **BESIDE}
+    variables = {
+        # a single lazy block, so that nothing but metadata is written
+        name: (names, array.zeros(study.shape, chunks=study.shape, dtype=kind), attributes)
+        for name, (kind, _, attributes) in kinds.items()}
+    coordinates = {axis.name: (axis.name, np.asarray(axis.values, dtype=float),
+                               {'long_name': axis.title, 'units': axis.unit or '1'})
+                   for axis in study.axes}
+    encoding: dict[str, dict[str, Any]] = {
+        name: {'_FillValue': filler, **chunks} for name, (_, filler, _) in kinds.items()}
+    encoding['message'] = chunks  # text has no filler
+    dataset = xr.Dataset(variables, coordinates, metadata(study))
+    dataset['bound'].attrs |= unit
+    dataset['code'].attrs |= _flags()
+    dataset.to_zarr(path, mode='w-', compute=False, consolidated=True, zarr_format=2,
+                    safe_chunks=False,
+                    encoding={**encoding, **{name: {'_FillValue': None} for name in names}})
+    group = zarr.open_group(str(path), mode='r+')
+    group['code'][...] = CellCode.PENDING
+    if study.keeps_motions:
+        _add_motions(group, study)
+
+
+def _add_motions(group: Any, study: Study) -> None:
+    """Make room for what other motions may start from."""
+    arm = study.arm
+    names = signature_fields(Task(arm=arm, start_positions=np.zeros(arm.n_joints),
+                                  goal_positions=np.zeros(arm.n_joints), duration=1.0))
+    motions = group.create_group(MOTIONS)
+    motions.attrs.update({'signature': names, 'comment': (
+        'motion: payload [kg], price dJ/dm_p [1/kg], number of nodes, their times [s], and '
+        'z = (q, dq/dt, psi_1, psi_2) at each of them; signature: what it solves')})
+    motions.create_dataset('signature', shape=(*study.shape, len(names)), dtype='f8',
+                           chunks=(*study.block_shape, len(names)), fill_value=np.nan)
+    motions.create_dataset('motion', shape=study.shape, chunks=study.block_shape, dtype=object,
+                           object_codec=VLenArray('<f4'), compressor=Blosc('zstd', 5, 0),
+                           fill_value=None)
+
+
+def _flags() -> dict[str, Any]:
+    """Return what the codes mean, as CF has it, and in words."""
+    return {'flag_values': [int(code) for code in CellCode],
+            'flag_meanings': ' '.join(code.name.lower() for code in CellCode),
+            'comment': '; '.join(f'{code.value}: {code.meaning}' for code in CellCode)}
+
+
+def metadata(study: Study) -> dict[str, str]:
+    """Return the metadata of a study's store."""
+    return {'title': study.name, 'quantity': study.quantity.key, 'study': study.text,
+            'arm': yaml.safe_dump(plain_arm(study.arm), sort_keys=False),
+            'Conventions': _CONVENTIONS,
+            'date_created': datetime.now(timezone.utc).isoformat(timespec='seconds'),
+            'flex_planner_version': __version__,
+            **{f'{name}_version': version(name) for name in _LIBRARIES}}
+
+
+def differences(there: dict[str, Any], wanted: dict[str, str]) -> list[str]:
+    """Return how the metadata of two maps differ, as far as the numbers depend on it."""
+    found = [f'{name.replace("_", " ")}: {wanted[name]}, there {there.get(name)}'
+             for name in ('flex_planner_version', 'quantity') if wanted[name] != there.get(name)]
+    for name in ('study', 'arm'):
+        old, new = yaml.safe_load(str(there.get(name))), yaml.safe_load(wanted[name])
+        if old == new:
+            continue
+        if not isinstance(old, dict) or not isinstance(new, dict):
+            found.append(name)
+            continue
+        found += [f'{name}, {key}: {reprlib.repr(new.get(key))}, there '
+                  f'{reprlib.repr(old.get(key))}'
+                  for key in dict.fromkeys([*new, *old]) if new.get(key) != old.get(key)]
+    return found

@@ -1,0 +1,204 @@
+"""A task as a boundary-value problem: eqs. (11), (12), (14)-(16) for the collocation solver."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from flex_planner.base.errors import InvalidTaskError, NoEquilibriumError
+from flex_planner.base.validation import Array
+from flex_planner.collocation import CollocationSolution, GaussRule
+from flex_planner.dynamics.statics import equilibrium, natural_modes
+from flex_planner.optimal_control.arm_model import ArmModel, Parameters
+from flex_planner.optimal_control.task import MAX_PAYLOAD, Task
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+Indices = NDArray[np.intp]
+
+# of the highest natural frequency; an exact solution takes two or three times as many
+_POINTS_PER_CYCLE = 5.0
+# share of its stall torque by which a motor is said to be too weak for a buckled arm
+_OVERLOADED = 1e3
+
+
+class MotionProblem:
+    """
+    The optimality conditions of a task.
+
+    The unknowns are z = (q, q', psi_1, psi_2), 4 n_t of them. The state is given at the start.
+    At the goal each coordinate and rate is either given, eq. (16), or weighs in the cost by the
+    terminal term of eq. (6), whose derivative is its costate there (transversality).
+
+    Parameters
+    ----------
+    model : ArmModel
+        Of the task's arm, or of the same arm made rigid.
+    task : Task
+        Start, goal, duration, payload.
+    parameters : Parameters
+        Weights and limits, see :func:`task_parameters`.
+
+    Attributes
+    ----------
+    start, goal : numpy.ndarray, shape (2 n_t,)
+        States at both ends, bent as gravity bends the arm at rest.
+    goal_weights : numpy.ndarray, shape (2 n_t,)
+        Diagonals of W_p and W_v of eq. (6); infinite where the goal must be met.
+    holding_torque : numpy.ndarray, shape (n,)
+        Holds the arm at the goal [N m].
+    p : numpy.ndarray
+        Stacked parameters.
+    explicit : numpy.ndarray of int
+        q and psi_1, whose rates the collocation need not factorise.
+
+    Raises
+    ------
+    InvalidTaskError
+        If a motor is too weak to hold the arm at a goal where it comes to rest.
+
+    """
+
+    def __init__(self, model: ArmModel, task: Task, parameters: Parameters) -> None:
+        self.model, self.task, self.parameters = model, task, parameters
+        self.p = parameters.stacked()
+        n_t = model.arm.n_coordinates
+        self.size = 4 * n_t
+        start, _ = equilibrium(model, task.start_positions, parameters)
+        goal, self.holding_torque = equilibrium(model, task.goal_positions, parameters)
+        if task.ends_at_rest:
+            _check_holding(self.holding_torque, parameters)
+        self.start = np.concatenate([start, task.start_velocities])
+        self.goal = np.concatenate([goal, task.goal_velocities])
+        self.goal_weights = np.concatenate([task.goal_position_weights,
+                                            task.goal_velocity_weights])
+        self.scale = self._scale()
+        self.explicit: Indices = np.r_[0:n_t, 2 * n_t:3 * n_t]
+        self._left_rows = np.eye(2 * n_t, 4 * n_t)
+        self._right_rows = _transversality(self.goal_weights)
+
+    def rate(self, t: Array, z: Array) -> Array:
+        """Return z'; the problem does not depend on time."""
+        return self.model.optimality(z, self.p)
+
+    def rate_jacobian(self, t: Array, z: Array) -> tuple[Array, Array]:
+        """Return z' and its Jacobian."""
+        return self.model.optimality_jacobian(z, self.p)
+
+    def switches(self, t: Array, z: Array, p: Array | None = None) -> Array:
+        """Return how far the unbounded torque is from each bound of eq. (15), (k, 2 n)."""
+        free = self.model.controls(z, self.p if p is None else p).free_torque
+        n_t, n = self.model.arm.n_coordinates, self.model.arm.n_joints
+        stall, slope = self.parameters.stall_torque, self.parameters.torque_slope
+        shifted = free + slope * z[:, n_t:n_t + n]
+        return np.hstack([shifted - stall, shifted + stall])
+
+    def left(self, z: Array) -> tuple[Array, Array]:
+        """Return the initial conditions of eq. (16)."""
+        return z[:self.start.size] - self.start, self._left_rows
+
+    def right(self, z: Array) -> tuple[Array, Array]:
+        """Return the final conditions of eq. (16), or transversality of eq. (6)."""
+        half = self.goal.size
+        miss = np.concatenate([z[:half] - self.goal, z[half:]])
+        residual: Array = self._right_rows @ miss
+        return residual, self._right_rows
+
+    def reached(self, end: Array) -> Array:
+        """Return the state (2 n_t,) that a motion ending in `end` is to reach."""
+        return np.where(np.isinf(self.goal_weights), self.goal, end)
+
+    def fewest_intervals(self, stages: int) -> int:
+        """Return the intervals of a mesh that resolves nothing finely but overlooks nothing."""
+        rates, _ = natural_modes(self.model, self.start[:self.size // 4], self.parameters,
+                                 locked=False)
+        cycles = float(np.nan_to_num(rates).max()) * self.task.duration / (2 * np.pi)
+        return int(np.ceil(_POINTS_PER_CYCLE * cycles / stages))
+
+    def straight_line(self, intervals: int, rule: GaussRule) -> CollocationSolution:
+        """Return constant velocity from start to goal with zero costates, as a guess."""
+        n_t = self.model.arm.n_coordinates
+        mesh = np.linspace(0, self.task.duration, intervals + 1, dtype=np.float64)
+        nodes = np.zeros((intervals + 1, self.size))
+        change = self.goal[:n_t] - self.start[:n_t]
+        nodes[:, :n_t] = self.start[:n_t] + np.outer(mesh / self.task.duration, change)
+        nodes[:, n_t:2 * n_t] = change / self.task.duration
+        return CollocationSolution.from_values(mesh, nodes, rule)
+
+    def _scale(self) -> Array:
+        """
+        Return the magnitude of each unknown that matters, shape (4 n_t,).
+
+        A tenth of what a motion with constant acceleration, then deceleration would need: its
+        torque gives the costates through u = -R^-1 B^T M^-1 psi_2, its inertia forces the
+        bending.
+
+        """
+        arm, duration = self.model.arm, self.task.duration
+        n = arm.n_joints
+        travel = np.maximum(np.abs(self.goal - self.start)[:n], 0.1)
+        mass = self.model.mass_and_energy(self.start[None], self.p)[0][0]
+        inertia = np.abs(mass[:, :n]) @ (4 * travel / duration**2)
+        bend = np.zeros(0)
+        if arm.n_modes:
+            coordinates = self.start[None, :arm.n_coordinates]
+            stiffness = self.model.static_forces(coordinates, self.p)[1][0, n:, n:]
+            bend = np.maximum(np.abs(np.linalg.solve(stiffness, inertia[n:])), 1e-9 * arm.reach)
+        positions = np.concatenate([travel, bend])
+        velocity_costates = np.abs(mass[:, :n]) @ (self.parameters.effort_weights * inertia[:n])
+        scale: Array = np.concatenate([positions, positions / duration,
+                                       velocity_costates / duration, velocity_costates]) / 10
+        return scale
+
+
+def _transversality(weights: Array) -> Array:
+    """Return the rows of ``x - goal = 0``, or of ``psi - W (x - goal) = 0`` for finite W."""
+    given = np.isinf(weights)
+    states = np.where(given, 1.0, -np.where(given, 0.0, weights))
+    return np.hstack([np.diag(states), np.diag(np.where(given, 0.0, 1.0))])
+
+
+def _check_holding(torque: Array, parameters: Parameters) -> None:
+    """Refuse a goal at which the arm would sink as soon as it has arrived."""
+    for i, (needed, stall) in enumerate(zip(torque, parameters.stall_torque, strict=True), 1):
+        if abs(needed) > stall:
+            raise InvalidTaskError(
+                f'joint {i} needs {abs(needed):.4g} N m to hold the arm with its payload at the '
+                f'goal, but the stall torque of its motor is {stall:.4g} N m')
+
+
+def holding_limit(problem: MotionProblem) -> tuple[float, int]:
+    """
+    Return the payload [kg] that the motors just hold at the goal, and the joint that is first.
+
+    The payload is infinite where gravity does not load the joints, or motors have no limits.
+
+    """
+    model, parameters = problem.model, problem.parameters
+
+    def load(payload: float) -> Array:
+        """Return the share of the stall torque that each motor needs."""
+        try:
+            torque = equilibrium(model, problem.task.goal_positions,
+                                 replace(parameters, payload_mass=payload))[1]
+        except NoEquilibriumError:
+            return np.full(model.arm.n_joints, _OVERLOADED)
+        share: Array = np.abs(torque) / parameters.stall_torque
+        return share
+
+    heavy = 1.0
+    while load(heavy).max() < 1:
+        heavy *= 2
+        if heavy > MAX_PAYLOAD:
+            return np.inf, 0
+    limit = float(brentq(lambda payload: load(payload).max() - 1, 0.0, heavy, xtol=1e-12))
+    return limit, int(load(limit).argmax())
+
+
+def task_parameters(task: Task) -> Parameters:
+    """Return the parameters that a task and its arm determine."""
+    return Parameters.of(task.arm, payload_mass=task.payload_mass,
+                         payload_inertia=task.payload_inertia,
+                         effort_weights=task.effort_weights,
+                         position_weights=task.position_weights,
+                         velocity_weights=task.velocity_weights)

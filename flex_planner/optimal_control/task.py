@@ -1,0 +1,173 @@
+"""What is asked of the planner: a point-to-point motion and how to judge it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from flex_planner.arms.arm import Arm
+from flex_planner.arms.inverse_kinematics import check_angle_limits, inverse_kinematics
+from flex_planner.base.errors import SingularError, UnreachableError
+from flex_planner.base.validation import Array, number, vector
+import numpy as np
+from numpy.typing import ArrayLike
+
+MAX_JOINT_ANGLE = 100.0
+MAX_DURATION = 1000.0
+MAX_PAYLOAD = 1e6
+MAX_VELOCITY = 1e3
+MAX_TIME_WEIGHT = 1e9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Task:
+    """
+    A motion between two postures, with the weights of eqs. (6) and (7).
+
+    By default it goes from rest to rest in a given time.
+
+    Parameters
+    ----------
+    arm : Arm
+        n joints, n_t coordinates.
+    start_positions, goal_positions : array_like, shape (n,)
+        Joint angles, within +-100 rad.
+    duration : float
+        t_f, > 0 and at most 1000 [s]; a first guess of it if `time_weight` is not 0.
+    payload_mass : float
+        m_p, >= 0 and at most 1e6 [kg].
+    payload_inertia : float
+        Rotary inertia of the payload about the tip, >= 0 and at most 1e6 [kg m^2].
+    effort_weights : array_like, shape (n,)
+        Diagonal of R, > 0; empty for ones.
+    position_weights, velocity_weights : array_like, shape (n,) or (n_t,)
+        Diagonals of W_1 and W_2, >= 0; empty for zeros, n entries for the joints alone.
+    start_velocities, goal_velocities : array_like, shape (n,) or (n_t,)
+        Rates at both ends [rad/s, m/s]; empty for zeros, n entries for the joints alone.
+    goal_position_weights, goal_velocity_weights : array_like, shape (n,) or (n_t,)
+        Diagonals of W_p and W_v of eq. (6): the goal is approached at this price, and is free
+        where the weight is 0. ``inf`` means that it must be met, and is the default; n entries
+        leave it so for the modal coordinates.
+    time_weight : float
+        Price of a second, >= 0 [1/s]: if not 0, the duration is free and this times t_f is
+        added to eq. (6). The larger it is, the nearer the motion comes to minimum time.
+    tolerance : float
+        eps of eq. (17) with W_p = W_v = 1, > 0 and at most 1.
+
+    Raises
+    ------
+    InvalidValueError
+        Naming field, value and bound.
+
+    """
+
+    arm: Arm
+    start_positions: Array
+    goal_positions: Array
+    duration: float
+    payload_mass: float = 0.0
+    payload_inertia: float = 0.0
+    effort_weights: Array = field(default_factory=lambda: np.zeros(0))
+    position_weights: Array = field(default_factory=lambda: np.zeros(0))
+    velocity_weights: Array = field(default_factory=lambda: np.zeros(0))
+    start_velocities: Array = field(default_factory=lambda: np.zeros(0))
+    goal_velocities: Array = field(default_factory=lambda: np.zeros(0))
+    goal_position_weights: Array = field(default_factory=lambda: np.zeros(0))
+    goal_velocity_weights: Array = field(default_factory=lambda: np.zeros(0))
+    time_weight: float = 0.0
+    tolerance: float = 1e-3
+
+    def __post_init__(self) -> None:
+        n, n_t = self.arm.n_joints, self.arm.n_coordinates
+        for name in ('start_positions', 'goal_positions'):
+            self._set(name, vector(name, getattr(self, name), n, at_least=-MAX_JOINT_ANGLE,
+                                   at_most=MAX_JOINT_ANGLE, unit='rad'))
+            check_angle_limits(self.arm, name, getattr(self, name))
+        number('duration', self.duration, above=0, at_most=MAX_DURATION, unit='s')
+        number('payload_mass', self.payload_mass, at_least=0, at_most=MAX_PAYLOAD, unit='kg')
+        number('payload_inertia', self.payload_inertia, at_least=0, at_most=MAX_PAYLOAD,
+               unit='kg m^2')
+        number('tolerance', self.tolerance, above=0, at_most=1)
+        number('time_weight', self.time_weight, at_least=0, at_most=MAX_TIME_WEIGHT, unit='1/s')
+        effort = vector('effort_weights', self.effort_weights, (0, n), above=0)
+        self._set('effort_weights', effort if effort.size else vector('', np.ones(n), n))
+        for name in ('position_weights', 'velocity_weights'):
+            self._set(name, _padded(name, getattr(self, name), n, n_t, 0.0, at_least=0))
+        for name in ('start_velocities', 'goal_velocities'):
+            self._set(name, _padded(name, getattr(self, name), n, n_t, 0.0,
+                                    at_least=-MAX_VELOCITY, at_most=MAX_VELOCITY))
+        for name in ('goal_position_weights', 'goal_velocity_weights'):
+            self._set(name, _goal_weights(name, getattr(self, name), n, n_t))
+
+    @property
+    def ends_at_rest(self) -> bool:
+        """Return whether the arm must come to rest at the goal, bent as gravity bends it."""
+        hard = np.isinf(self.goal_position_weights) & np.isinf(self.goal_velocity_weights)
+        return bool(hard.all()) and not bool(self.goal_velocities.any())
+
+    def _set(self, name: str, value: Array) -> None:
+        object.__setattr__(self, name, value)
+
+
+def _padded(name: str, values: ArrayLike, n: int, n_t: int, rest: float,
+            **bounds: float) -> Array:
+    """Return n_t checked entries; those that are not given are `rest`."""
+    given = vector(name, values, (0, n, n_t), **bounds)  # type: ignore[arg-type]
+    padded: Array = np.concatenate([given, np.full(n_t - given.size, rest)])
+    padded.setflags(write=False)
+    return padded
+
+
+def _goal_weights(name: str, values: ArrayLike, n: int, n_t: int) -> Array:
+    """Return n_t weights, >= 0 or infinite."""
+    try:
+        given = np.array(values, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        given = np.zeros(0)
+    hard = np.isposinf(given)
+    if given.ndim == 1 and hard.any():
+        checked = _padded(name, np.where(hard, 0.0, given), n, n_t, np.inf, at_least=0)
+        padded = np.where(np.pad(hard, (0, n_t - hard.size)), np.inf, checked)
+        padded.setflags(write=False)
+        return padded
+    return _padded(name, values, n, n_t, np.inf, at_least=0)
+
+
+def postures_from_points(arm: Arm, start: ArrayLike, goal: ArrayLike,
+                         elbow: int) -> tuple[Array, Array]:
+    """
+    Return start and goal joint angles of a motion between two points of the tip.
+
+    The goal is the posture nearest to the start, so that the arm does not make a needless full
+    turn.
+
+    Parameters
+    ----------
+    arm : Arm
+        n joints.
+    start, goal : array_like, shape (2,)
+        Tip positions in the base frame [m].
+    elbow : int
+        See :func:`flex_planner.arms.inverse_kinematics.inverse_kinematics`, +1 or -1.
+
+    Returns
+    -------
+    tuple of numpy.ndarray, shape (n,)
+        [rad].
+
+    Raises
+    ------
+    UnreachableError, SingularError, InvalidValueError
+        See `inverse_kinematics`; the message says which point.
+
+    """
+    first = _posture(arm, 'start_point', start, elbow, None)
+    return first, _posture(arm, 'goal_point', goal, elbow, first)
+
+
+def _posture(arm: Arm, name: str, point: ArrayLike, elbow: int, near: Array | None) -> Array:
+    """Return the posture of one point; errors say which."""
+    checked = vector(name, point, 2, unit='m')
+    try:
+        return inverse_kinematics(arm, checked, elbow, near)
+    except (UnreachableError, SingularError) as error:
+        raise type(error)(f'{name}: {error}') from None

@@ -1,0 +1,143 @@
+"""Every plan is checked by means that did not produce it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+from flex_planner.arms.kinematics import tip_position
+from flex_planner.base.progress import Monitor
+from flex_planner.base.validation import Array
+from flex_planner.collocation import CollocationResult, CollocationSolution
+from flex_planner.dynamics.statics import residual_vibration
+from flex_planner.optimal_control.motion_problem import MotionProblem
+from flex_planner.optimal_control.planned_torque import PlannedTorque, resimulated
+from flex_planner.planning.plan import Certificate
+import numpy as np
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CertificateLimits:
+    """
+    What a certificate must not exceed, entry by entry, to be passed.
+
+    The collocation residual has no limit here: the solver's tolerance is one already.
+
+    """
+
+    boundary_error: float = 1e-3
+    hamiltonian_drift: float = 0.02
+    tip_error: float = 1e-5
+    residual_vibration: float = 1e-4
+
+    def violations(self, certificate: Certificate) -> list[str]:
+        """Return a sentence for each limit that is not met."""
+        pairs = ((entry.name, getattr(certificate, entry.name), getattr(self, entry.name))
+                 for entry in fields(self))
+        return [f'{name.replace("_", " ")} is {value:.3g}, but must be <= {limit:g}'
+                for name, value, limit in pairs if not value <= limit]
+
+
+def certify(problem: MotionProblem, result: CollocationResult, monitor: Monitor, *,
+            rtol: float = 1e-8) -> Certificate:
+    """
+    Return the certificate of a solution.
+
+    The planned torque is applied to the original dynamics, from the start, by an integrator of
+    another kind; H is evaluated between the collocation points.
+
+    Raises
+    ------
+    StoppedError
+        If the monitor stopped it.
+    ValueError
+        If the solution is of another duration than the task.
+
+    """
+    if not np.isclose(result.solution.mesh[-1], problem.task.duration, rtol=1e-12):
+        raise ValueError('the solution does not last as long as its task')
+    final, reached = final_state(problem, result.solution, monitor, rtol)
+    if not np.isfinite(final).all():
+        return Certificate(collocation_residual=result.residual)
+    arm, n_t = problem.model.arm, problem.model.arm.n_coordinates
+    miss = final - reached
+    tips = tip_position(arm, np.stack([final[:n_t], reached[:n_t]]))
+    return Certificate(
+        collocation_residual=result.residual, boundary_error=float(miss @ miss / 2),
+        hamiltonian_drift=hamiltonian_drift(problem, result.solution),
+        tip_error=float(np.linalg.norm(tips[0] - tips[1])),
+        residual_vibration=residual_vibration(problem.model, _at_rest(problem) + miss,
+                                              problem.goal[:n_t], problem.parameters),
+        state_error=float(result.errors[:2 * n_t].max()),
+        costate_error=float(result.errors[2 * n_t:].max()))
+
+
+def final_state(problem: MotionProblem, solution: CollocationSolution, monitor: Monitor,
+                rtol: float) -> tuple[Array, Array]:
+    """
+    Return where the planned torque leads, and where it should, shape (2 n_t,) each.
+
+    Raises
+    ------
+    StoppedError
+        If the monitor stopped it.
+
+    """
+    final = resimulated(problem.model, problem.p, problem.start,
+                        PlannedTorque.of(problem, solution), monitor, rtol=rtol, atol=rtol / 100)
+    return final, problem.reached(solution.nodes[-1, :problem.goal.size])
+
+
+def _at_rest(problem: MotionProblem) -> Array:
+    """Return the goal without its velocities."""
+    half = problem.goal.size // 2
+    return np.concatenate([problem.goal[:half], np.zeros(half)])
+
+
+def hamiltonian_drift(problem: MotionProblem, solution: CollocationSolution) -> float:
+    """Return the spread of H over the motion relative to the size of its terms."""
+    times = np.linspace(0, problem.task.duration, 4 * solution.intervals + 1, dtype=np.float64)
+    z = solution(times)
+    controls = problem.model.controls(z, problem.p)
+    half = z.shape[1] // 2
+    powers = np.abs(z[:, half:] * problem.rate(times, z)[:, :half]).max(axis=1)
+    size = max(float(np.max(controls.cost_rate)), float(np.max(powers)), np.finfo(float).tiny)
+    return float(np.ptp(controls.hamiltonian)) / size
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Totals:
+    """
+    Integrals over a motion, as in `Plan`.
+
+    J of eq. (6), effort [N^2 m^2 s], energy [J], and the share of time of each motor on its limit.
+
+    """
+
+    cost: float
+    effort: float
+    energy: float
+    saturation: Array
+
+
+def totals(problem: MotionProblem, solution: CollocationSolution) -> Totals:
+    """Return cost, effort and energy, by Gauss quadrature on the mesh."""
+    n, n_t = problem.model.arm.n_joints, problem.model.arm.n_coordinates
+    z = solution.stage_values().reshape(-1, problem.size)
+    controls = problem.model.controls(z, problem.p)
+    weights = (solution.steps[:, None] * solution.rule.weights).ravel()
+
+    def integral(values: Array) -> float:
+        return float(weights @ values)
+
+    power = np.abs(controls.torque * z[:, n_t:n_t + n]).sum(axis=1)
+    saturated = controls.torque != controls.free_torque
+    return Totals(cost=integral(controls.cost_rate) + _terminal_cost(problem, solution),
+                  effort=integral((controls.torque ** 2).sum(axis=1)), energy=integral(power),
+                  saturation=weights @ saturated / problem.task.duration)
+
+
+def _terminal_cost(problem: MotionProblem, solution: CollocationSolution) -> float:
+    """Return the first terms of eq. (6), and the price of the duration."""
+    miss = solution.nodes[-1, :problem.goal.size] - problem.goal
+    weights = np.where(np.isinf(problem.goal_weights), 0.0, problem.goal_weights)
+    return float(weights @ miss**2 / 2 + problem.task.time_weight * problem.task.duration)

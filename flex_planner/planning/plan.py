@@ -1,0 +1,236 @@
+"""A planned motion with its certificate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+from flex_planner.arms.arm import Arm
+from flex_planner.arms.kinematics import tip_position
+from flex_planner.base.validation import Array
+from flex_planner.collocation import CollocationSolution
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.motion_problem import MotionProblem
+from flex_planner.optimal_control.task import Task
+from flex_planner.planning.objectives import ObjectiveSearch
+import numpy as np
+
+
+class PlanStatus(Enum):
+    """How planning ended; the value is shown to people."""
+
+    SOLVED = 'solved and certified'
+    NOT_CONVERGED = 'not converged, which does not show that the motion is impossible'
+    INFEASIBLE = 'impossible within the limits of the motors'
+    CERTIFICATE_FAILED = 'converged, but the re-simulated motion misses its tolerances'
+    OBJECTIVE_NOT_MET = 'an objective cannot be met, this is the closest motion'
+    TIMEOUT = 'time limit reached'
+    CANCELED = 'canceled'
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Certificate:
+    """
+    How exactly a plan meets its conditions; ``inf`` where nothing was found out.
+
+    Attributes
+    ----------
+    collocation_residual : float
+        Largest defect of a mesh interval relative to the unknowns.
+    boundary_error : float
+        Left side of eq. (17) with W_p = W_v = 1, at the end of the re-simulation.
+    hamiltonian_drift : float
+        Spread of H over the motion relative to its largest term; 0 on an extremal.
+    tip_error : float
+        Distance of the re-simulated tip from the goal [m].
+    residual_vibration : float
+        Largest bending after the joints are locked at the end of the re-simulation [m].
+    state_error, costate_error : float
+        Estimated largest error of states and costates at the nodes of the mesh, relative to
+        the largest value of each.
+
+    """
+
+    collocation_residual: float = np.inf
+    boundary_error: float = np.inf
+    hamiltonian_drift: float = np.inf
+    tip_error: float = np.inf
+    residual_vibration: float = np.inf
+    state_error: float = np.inf
+    costate_error: float = np.inf
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Samples:
+    """
+    A plan at chosen times.
+
+    Attributes
+    ----------
+    times : numpy.ndarray, shape (k,)
+        [s].
+    coordinates, rates, accelerations : numpy.ndarray, shape (k, n_t)
+        q, q', q'': joints [rad], then modes [m].
+    torques : numpy.ndarray, shape (k, n)
+        [N m].
+    lower_bounds, upper_bounds : numpy.ndarray, shape (k, n)
+        Of the torques at those speeds, eq. (15) [N m].
+    position_costates, velocity_costates : numpy.ndarray, shape (k, n_t)
+        psi_1 and psi_2.
+    hamiltonian : numpy.ndarray, shape (k,)
+        H of eq. (8).
+    tip : numpy.ndarray, shape (k, 2)
+        Tip of the bent arm [m].
+
+    """
+
+    times: Array
+    coordinates: Array
+    rates: Array
+    accelerations: Array
+    torques: Array
+    lower_bounds: Array
+    upper_bounds: Array
+    position_costates: Array
+    velocity_costates: Array
+    hamiltonian: Array
+    tip: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Plan:
+    """
+    The outcome of planning one task, whether it succeeded or not.
+
+    Attributes
+    ----------
+    task : Task
+        What was asked.
+    status : PlanStatus
+        Only ``SOLVED`` plans may be executed.
+    message : str
+        The status in more words.
+    strategy : str
+        What led to the solution.
+    problem : MotionProblem
+        The boundary-value problem.
+    solution : CollocationSolution or None
+        None unless a solution was found.
+    certificate : Certificate
+        Residuals.
+    cost : float
+        J of eq. (6).
+    effort : float
+        Integral of the squared torques [N^2 m^2 s].
+    energy : float
+        Integral of the absolute mechanical power of the motors [J].
+    switching_times : numpy.ndarray
+        When a motor reaches or leaves its limit [s].
+    saturation : numpy.ndarray, shape (n,)
+        Share of the time that each motor spends on its limit.
+    objectives : ObjectiveSearch or None
+        How objectives were met; None if there are none.
+    iterations : int
+        Newton iterations, failed strategies included.
+    planning_time : float
+        [s].
+
+    """
+
+    task: Task
+    status: PlanStatus
+    message: str
+    strategy: str
+    problem: MotionProblem
+    solution: CollocationSolution | None
+    certificate: Certificate = field(default_factory=Certificate)
+    cost: float = np.inf
+    effort: float = np.inf
+    energy: float = np.inf
+    switching_times: Array = field(default_factory=lambda: np.zeros(0))
+    saturation: Array = field(default_factory=lambda: np.zeros(0))
+    objectives: ObjectiveSearch | None = None
+    iterations: int = 0
+    planning_time: float = 0.0
+
+    @property
+    def solved(self) -> bool:
+        """Return whether the plan is certified."""
+        return self.status is PlanStatus.SOLVED
+
+    @property
+    def arm(self) -> Arm:
+        """Return the arm."""
+        return self.task.arm
+
+    @property
+    def model(self) -> ArmModel:
+        """Return the arm's compiled functions."""
+        return self.problem.model
+
+    @property
+    def mesh_intervals(self) -> int:
+        """Return the intervals of the final mesh, 0 without a solution."""
+        return self.solution.intervals if self.solution else 0
+
+    def sample(self, times: Array) -> Samples:
+        """
+        Return the motion at times (k,) from 0 to the task's duration.
+
+        Raises
+        ------
+        ValueError
+            If the plan has no solution.
+
+        """
+        if self.solution is None:
+            raise ValueError(f'the plan has no solution: {self.message}')
+        arm, z = self.arm, self.solution(times)
+        n_t = arm.n_coordinates
+        control = self.model.controls(z, self.problem.p)
+        lower, upper = arm.torque_bounds(z[:, n_t:n_t + arm.n_joints])
+        return Samples(
+            times=times, coordinates=z[:, :n_t], rates=z[:, n_t:2 * n_t],
+            accelerations=control.acceleration, torques=control.torque, lower_bounds=lower,
+            upper_bounds=upper, position_costates=z[:, 2 * n_t:3 * n_t],
+            velocity_costates=z[:, 3 * n_t:], hamiltonian=control.hamiltonian,
+            tip=tip_position(arm, z[:, :n_t]))
+
+    def uniform_samples(self, count: int) -> Samples:
+        """Return the motion at evenly spaced times, both ends included."""
+        return self.sample(np.linspace(0, self.task.duration, count, dtype=np.float64))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Peaks:
+    """
+    Largest speeds and torques of a motion, per joint.
+
+    Attributes
+    ----------
+    speeds : numpy.ndarray, shape (n,)
+        [rad/s].
+    speed_shares : numpy.ndarray, shape (n,)
+        Of the no-load speed; 0 where there is none.
+    torques : numpy.ndarray, shape (n,)
+        [N m].
+    torque_shares : numpy.ndarray, shape (n,)
+        Of the bound in that direction at that speed; 0 where there is none.
+
+    """
+
+    speeds: Array
+    speed_shares: Array
+    torques: Array
+    torque_shares: Array
+
+
+def peaks(plan: Plan, samples: Samples) -> Peaks:
+    """Return the largest speeds and torques of a sampled plan."""
+    n = plan.arm.n_joints
+    speeds = np.abs(samples.rates[:, :n])
+    no_load = np.array([joint.motor.no_load_speed for joint in plan.arm.joints])
+    bounds = np.where(samples.torques >= 0, samples.upper_bounds, -samples.lower_bounds)
+    torques = np.abs(samples.torques)
+    return Peaks(speeds=speeds.max(axis=0), speed_shares=(speeds / no_load).max(axis=0),
+                 torques=torques.max(axis=0), torque_shares=(torques / bounds).max(axis=0))

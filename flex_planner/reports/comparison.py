@@ -1,0 +1,55 @@
+"""What planning for flexible links is worth, as a table of text."""
+
+from __future__ import annotations
+
+from flex_planner.planning.plan import Plan
+from flex_planner.reports.motion import columns, planning_row, Row
+from flex_planner.simulation.comparison import Comparison
+from flex_planner.simulation.execution import Outcome
+
+_MILLI = 1e3
+
+
+def comparison_rows(comparison: Comparison) -> list[Row]:
+    """Return what was compared."""
+    simulated = comparison.arm
+    rigidity = ', '.join(f'{link.flexural_rigidity:g}' for link in simulated.links)
+    x, y = comparison.goal
+    return [
+        ('planned flexible', _planning(comparison.flexible)),
+        ('planned rigid', _planning(comparison.rigid)),
+        ('simulated arm', f'E I = {rigidity} N m^2, {simulated.n_modes} modes, '
+                          f'{comparison.payload_mass:g} kg'),
+        ('goal of the tip', f'({x:.6g}, {y:.6g}) m'),
+        ('watched after arrival', f'{comparison.settling:g} s')]
+
+
+def comparison_table(comparison: Comparison) -> str:
+    """
+    Return a line for each way, as text; empty if no plan was solved.
+
+    Errors are distances of the tip from the goal, on arrival and when it has settled. The tip's
+    motion after the arrival is peak to peak; bending is the largest deflection of the links if
+    the joints were locked on arrival. Tracking is the largest error of a joint on the way.
+
+    """
+    if not comparison.outcomes:
+        return ''
+    return columns(
+        ['', 'error on arrival [mm]', 'settled [mm]', 'tip motion after [mm]',
+         'bending left [mm]', 'tracking [mrad]'],
+        [_cells(outcome) for outcome in comparison.outcomes])
+
+
+def _planning(plan: Plan) -> str:
+    """Return how planning went."""
+    if plan.solved:
+        return planning_row(plan.planning_time, plan.strategy,
+                            f'{plan.iterations} iterations')[1]
+    return ': '.join(dict.fromkeys([plan.status.value, plan.message]))
+
+
+def _cells(outcome: Outcome) -> list[str]:
+    values = (outcome.arrival_error, outcome.final_error, outcome.residual.tip, outcome.bending,
+              outcome.tracking_error)
+    return [outcome.way.value, *(f'{value * _MILLI:.3g}' for value in values)]

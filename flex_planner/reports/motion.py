@@ -1,0 +1,156 @@
+"""What came of planning, as tables of text."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from flex_planner.capacity.max_payload import MaxPayload
+from flex_planner.planning.plan import Certificate, Peaks, Plan, PlanStatus
+import numpy as np
+
+Row = tuple[str, str]
+
+_NAMES = 26
+
+
+def table(rows: Iterable[Row]) -> str:
+    """Return names and values as lines of text."""
+    return '\n'.join(f'{name:<{_NAMES}} {value}' for name, value in rows)
+
+
+def columns(names: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return lines of cells, each column as wide as it needs to be."""
+    lines = [names, *rows]
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    return '\n'.join('   '.join(f'{cell:>{width}}' for cell, width in zip(
+        line, widths, strict=True)) for line in lines)
+
+
+def planning_row(seconds: float, *details: str) -> Row:
+    """Return how long planning took, and how it went."""
+    return 'planned in', f'{seconds:.2f} s ({", ".join(detail for detail in details if detail)})'
+
+
+def joint_rows(speeds: Sequence[float], speed_shares: Sequence[float], torques: Sequence[float],
+               torque_shares: Sequence[float]) -> list[Row]:
+    """Return the peaks of each joint, see `Peaks`; a share of 0 means that there is no limit."""
+    peaks = zip(speeds, speed_shares, torques, torque_shares, strict=True)
+    return [(f'joint {i}', f'peak speed {speed:.3f} rad/s{_share("", part, "no-load speed")}, '
+                           f'peak torque {torque:.3f} N m{_share("up to ", full, "its limit")}')
+            for i, (speed, part, torque, full) in enumerate(peaks, 1)]
+
+
+def _share(before: str, share: float, whole: str) -> str:
+    return f' ({before}{share:.0%} of {whole})' if share else ''
+
+
+def certificate_rows(certificate: Certificate) -> list[Row]:
+    """Return the residuals of a plan; the message of a report has the same entries."""
+    return [
+        ('certificate', 'every plan is checked by means that did not make it'),
+        ('  collocation residual', f'{certificate.collocation_residual:.1e}'),
+        ('  boundary error (eq. 17)', f'{certificate.boundary_error:.1e}'),
+        ('  Hamiltonian drift', f'{certificate.hamiltonian_drift:.1e}'),
+        ('  re-simulated tip error', f'{certificate.tip_error * 1e3:.1e} mm'),
+        ('  residual vibration', f'{certificate.residual_vibration * 1e3:.1e} mm')]
+
+
+def plan_rows(plan: Plan, peaks: Peaks | None) -> list[Row]:
+    """Return what came of a task; `peaks` only with a solution."""
+    intervals = f'{plan.mesh_intervals} intervals' if plan.mesh_intervals else ''
+    rows = [('status', plan.status.value),
+            planning_row(plan.planning_time, plan.strategy, f'{plan.iterations} iterations',
+                         intervals)]
+    rows += objective_rows(plan)
+    return rows if peaks is None else [*rows, *motion_rows(plan, peaks)]
+
+
+def motion_rows(plan: Plan, peaks: Peaks) -> list[Row]:
+    """Return what a motion is like, and its certificate."""
+    return [
+        ('cost J', f'{plan.cost:.6g}'),
+        ('effort', f'{plan.effort:.6g} N^2 m^2 s, the integral of the squared torques'),
+        ('energy', f'{plan.energy:.6g} J, the integral of the absolute power'),
+        *joint_rows(*(list(values) for values in (
+            peaks.speeds, peaks.speed_shares, peaks.torques, peaks.torque_shares))),
+        ('motors on their limit', _saturation(plan)),
+        *certificate_rows(plan.certificate)]
+
+
+def _saturation(plan: Plan) -> str:
+    """Return for how long the motors are on their limits."""
+    if not plan.saturation.any():
+        return 'never'
+    shares = ', '.join(f'joint {i} {share:.1%}' for i, share in enumerate(plan.saturation, 1))
+    count = plan.switching_times.size
+    return f'{shares} of the time; {count} switching time{"" if count == 1 else "s"}'
+
+
+def objective_rows(plan: Plan) -> list[Row]:
+    """Return the weights that meet the objectives of a plan; empty if it has none."""
+    search = plan.objectives
+    if search is None:
+        return []
+    if not search.trials:
+        return [('objectives', 'met with the weights of the task')]
+    rows = [('objectives', 'met by the smallest weights' if search.met else 'not met')]
+    rows += [(f'  {margin.objective.value}', f'weight {margin.weight:.4g}: {margin.share:.2%} of '
+              f'the limit; {margin.relaxed_weight:.4g}: {margin.relaxed_share:.2%}')
+             for margin in search.margins]
+    return rows
+
+
+def weights_table(plan: Plan) -> str:
+    """Return the weights tried, as lines of text; empty if there are none."""
+    if plan.objectives is None or not plan.objectives.trials:
+        return ''
+    return columns(['trial', 'objective', 'weight', 'share of the limit', 'met'], [
+        [str(i), trial.objective.value, f'{trial.weight:.5g}', f'{trial.share:.4f}',
+         'yes' if trial.met else 'no'] for i, trial in enumerate(plan.objectives.trials, 1)])
+
+
+def payload_rows(found: MaxPayload, peaks: Peaks | None) -> list[Row]:
+    """Return what came of a search for the maximum payload; `peaks` only with a motion."""
+    rows = [('status', found.status.value), ('method', found.method.value),
+            planning_row(found.planning_time, f'{found.iterations} iterations'),
+            ('largest payload', _bracket(found))]
+    if found.limiting_joint is not None:
+        rows.append(('limited by', _limit(found)))
+    if found.plan is None or peaks is None:
+        return rows
+    return [*rows, ('strategy of the motion', found.plan.strategy),
+            *motion_rows(found.plan, peaks)]
+
+
+def _bracket(found: MaxPayload) -> str:
+    """Return the bracket of the largest payload."""
+    below = f'{found.payload:.6g} kg' if found.payload else 'none found'
+    if not np.isfinite(found.upper):
+        return below
+    status = 'is too much' if found.status is PlanStatus.SOLVED else 'was tried in vain'
+    return f'{below}; {found.upper:.6g} kg {status}'
+
+
+def _limit(found: MaxPayload) -> str:
+    """Return which motor allows no more."""
+    assert found.limiting_joint is not None
+    if found.held or found.plan is None:
+        reason = 'which can hold no more at the goal'
+    else:
+        reason = f'on its limit for {found.plan.saturation[found.limiting_joint]:.1%} of the time'
+    return f'the motor of joint {found.limiting_joint + 1}, {reason}'
+
+
+def search_table(found: MaxPayload) -> str:
+    """Return the payloads met on the way, as lines of text; empty if there are none."""
+    front = found.front
+    if front.payloads.size:
+        priced = zip(front.payloads, front.efforts, front.prices, strict=True)
+        return columns(['payload [kg]', 'J [N^2 m^2 s]', 'dJ/dm_p [N^2 m^2 s/kg]'], [
+            [f'{payload:.6f}', f'{effort:.6f}', f'{price:.4g}']
+            for payload, effort, price in priced])
+    if found.trials:
+        return columns(['trial', 'payload [kg]', 'step [kg]', 'carried', 'boundary error'], [
+            [str(i), f'{trial.payload:.6f}', f'{trial.step:.6f}', 'yes' if trial.solved else 'no',
+             f'{trial.boundary_error:.1e}'] for i, trial in enumerate(found.trials, 1)])
+    return ''

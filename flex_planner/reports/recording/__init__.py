@@ -1,0 +1,26 @@
+"""
+What a recording tells: read back into the core's terms, checked again, shown as a page.
+
+Needs neither ROS nor the planner that made the recording, only the recording.
+
+"""
+
+from __future__ import annotations
+
+from flex_planner.reports.recording.check import check_motion, CheckLimits, Finding, MotionCheck
+from flex_planner.reports.recording.contents import RecordedMotion, RecordedRequest
+from flex_planner.reports.recording.page import report_page, write_report
+from flex_planner.reports.recording.tables import check_table, verdict
+
+__all__ = [
+    'CheckLimits',
+    'Finding',
+    'MotionCheck',
+    'RecordedMotion',
+    'RecordedRequest',
+    'check_motion',
+    'check_table',
+    'report_page',
+    'verdict',
+    'write_report',
+]

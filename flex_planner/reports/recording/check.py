@@ -1,0 +1,267 @@
+"""
+A recorded plan checked against the model, from the recording alone.
+
+The recorded torques, interpolated linearly as a controller does, are applied to the arm of the
+recording; nothing of the collocation that made the plan is used. What linear interpolation
+changes is in the result: this is what the arm will do, apart from feedback.
+
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from flex_planner.arms.kinematics import tip_position
+from flex_planner.base.errors import RecordingError
+from flex_planner.base.progress import Monitor
+from flex_planner.base.validation import Array
+from flex_planner.dynamics.statics import equilibrium
+from flex_planner.optimal_control.arm_model import ArmModel, Parameters, RUNGE_KUTTA_STAGES
+from flex_planner.reports.recording.contents import RecordedMotion, RecordedRequest
+import numpy as np
+from scipy.integrate import DOP853
+
+_STAGE_TIMES: Array = np.array(DOP853.C[:RUNGE_KUTTA_STAGES], dtype=float)
+_FINEST = 256  # steps between two samples
+_CONVERGED = 1e-9
+_TINY = float(np.finfo(float).tiny)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CheckLimits:
+    """
+    What the findings must not exceed; the boundary error has the limit of the task.
+
+    Attributes
+    ----------
+    tip_deviation : float
+        Of the tip, as a share of the arm's reach: linear interpolation costs up to 1e-4 at the
+        planner's default sampling.
+    joint_deviation : float
+        Of joint angles and speeds, as a share of the largest.
+    torque_error : float
+        By which a torque may leave its bounds of eq. (15) or differ from eq. (14), as a share
+        of the largest torque.
+    hamiltonian_drift : float
+        Spread of H relative to its largest term.
+    end_error : float
+        Of the first and the last sample [rad, m, rad/s, m/s].
+
+    """
+
+    tip_deviation: float = 1e-3
+    joint_deviation: float = 1e-2
+    torque_error: float = 1e-6
+    hamiltonian_drift: float = 0.02
+    end_error: float = 1e-6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """
+    One number that the check found.
+
+    Attributes
+    ----------
+    name, unit : str
+        What it is.
+    value, limit : float
+        Passed if value <= limit.
+    recorded : float or None
+        The same in the recorded certificate, where it has it.
+
+    """
+
+    name: str
+    unit: str
+    value: float
+    limit: float
+    recorded: float | None = None
+
+    @property
+    def passed(self) -> bool:
+        """Return whether the value keeps its limit; not a number does not."""
+        return self.value <= self.limit
+
+    def __str__(self) -> str:
+        """Return the finding in words."""
+        unit = f' {self.unit}' if self.unit else ''
+        planned = '' if self.recorded is None else f', {self.recorded:.1e}{unit} when planned'
+        verdict = 'passed' if self.passed else 'FAILED'
+        return f'{verdict}: {self.value:.3g}{unit} (limit {self.limit:.3g}{unit}{planned})'
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MotionCheck:
+    """
+    What the check of a recorded motion found.
+
+    Attributes
+    ----------
+    findings : tuple of Finding
+        In the order in which they are shown.
+    tip : numpy.ndarray, shape (k, 2)
+        Tip of the re-simulated arm at the recorded times [m].
+
+    """
+
+    findings: tuple[Finding, ...]
+    tip: Array
+
+    @property
+    def passed(self) -> bool:
+        """Return whether every finding keeps its limit."""
+        return all(finding.passed for finding in self.findings)
+
+
+def check_motion(request: RecordedRequest, model: ArmModel | None = None,
+                 monitor: Monitor | None = None, limits: CheckLimits | None = None) -> MotionCheck:
+    """
+    Check the motion of a recording.
+
+    Parameters
+    ----------
+    request : RecordedRequest
+        With a motion.
+    model : ArmModel, optional
+        Of the recorded arm; default: it is compiled.
+    monitor : Monitor, optional
+        May stop it.
+    limits : CheckLimits, optional
+        What must be kept.
+
+    Raises
+    ------
+    RecordingError
+        If the recording has no motion.
+    FlexPlannerError
+        If the arm cannot rest at an end of the motion.
+    StoppedError
+        If the monitor stopped it.
+
+    """
+    motion, parameters = request.motion, request.parameters
+    if motion is None:
+        raise RecordingError(f'{request.path} has no motion that could be checked: '
+                             f'{request.report.error_msg or "it failed"}')
+    model, limits = model or ArmModel(request.arm), limits or CheckLimits()
+    ends = [_at_rest(model, row, parameters) for row in motion.coordinates[[0, -1]]]
+    states = resimulated_states(model, parameters.stacked(), ends[0], motion.times,
+                                motion.torques, monitor or Monitor())
+    tip = tip_position(request.arm, states[:, :request.arm.n_coordinates])
+    return MotionCheck(tip=tip, findings=(
+        *_resimulation(request, motion, states[-1] - ends[1], tip, limits),
+        _joint_path(motion, states, request.arm.n_joints, limits),
+        *_ends(motion, ends, limits), *_asked(request, motion, limits),
+        *_optimality(model, motion, parameters, limits)))
+
+
+def resimulated_states(model: ArmModel, p: Array, start: Array, times: Array, torques: Array,
+                       monitor: Monitor) -> Array:
+    """
+    Return the states (k, 2 n_t) at times (k,) under torques (k, n), linear in between.
+
+    Equal steps of order 8 between two times, twice as many until it makes no difference; NaN
+    if it always does.
+
+    Raises
+    ------
+    StoppedError
+        If the monitor stopped it.
+
+    """
+    advance, before, count = model.runge_kutta_steps(p), np.full(start.size, np.nan), 1
+    while True:
+        shares = ((np.arange(count)[:, None] + _STAGE_TIMES) / count)[:, :, None]
+        states = np.full((times.size, start.size), np.nan)
+        states[0] = start
+        with np.errstate(over='ignore', invalid='ignore'):
+            for k, length in enumerate(np.diff(times)):
+                monitor.check()
+                stages = torques[k] + shares * (torques[k + 1] - torques[k])
+                states[k + 1] = advance(states[k], stages.reshape(count, -1),
+                                        float(length) / count)[0][-1]
+                if not np.isfinite(states[k + 1]).all():
+                    break  # it ran away
+        change = np.abs(states[-1] - before).max()
+        if change <= _CONVERGED:
+            return states
+        if count == _FINEST:
+            return np.full_like(states, np.nan)
+        before, count = states[-1], 2 * count
+
+
+def _at_rest(model: ArmModel, coordinates: Array, parameters: Parameters) -> Array:
+    """Return the state at rest with given joint angles."""
+    rest, _ = equilibrium(model, coordinates[:model.arm.n_joints], parameters)
+    return np.concatenate([rest, np.zeros_like(rest)])
+
+
+def _resimulation(request: RecordedRequest, motion: RecordedMotion, miss: Array, tip: Array,
+                  limits: CheckLimits) -> list[Finding]:
+    """Return where the recorded torques lead."""
+    most = limits.tip_deviation * request.arm.reach
+    distance = np.linalg.norm(tip - motion.tip, axis=1)
+    return [
+        Finding(name='tip error at the end', unit='m', value=float(distance[-1]), limit=most,
+                recorded=float(request.report.tip_error)),
+        Finding(name='tip off its path', unit='m', value=float(distance.max()), limit=most),
+        Finding(name='boundary error (eq. 17)', unit='', value=float(miss @ miss / 2),
+                limit=request.tolerance, recorded=float(request.report.boundary_error))]
+
+
+def _joint_path(motion: RecordedMotion, states: Array, n: int, limits: CheckLimits) -> Finding:
+    """Return how far angles and speeds of the joints are from the recorded ones."""
+    n_t = motion.coordinates.shape[1]
+    pairs = ((states[:, :n], motion.coordinates[:, :n]),
+             (states[:, n_t:n_t + n], motion.rates[:, :n]))
+    shares = [np.abs(found - recorded).max() / max(np.ptp(recorded, axis=0).max(), _TINY)
+              for found, recorded in pairs]
+    return Finding(name='joints off their path', unit='', limit=limits.joint_deviation,
+                   value=float(np.max(shares)))
+
+
+def _ends(motion: RecordedMotion, ends: list[Array], limits: CheckLimits) -> list[Finding]:
+    """Return how far the first and the last sample are from rest."""
+    samples = np.hstack([motion.coordinates, motion.rates])[[0, -1]]
+    return [Finding(name=f'{name} from rest', unit='', limit=limits.end_error,
+                    value=float(np.abs(sample - end).max()))
+            for name, sample, end in zip(('start', 'goal'), samples, ends, strict=True)]
+
+
+def _asked(request: RecordedRequest, motion: RecordedMotion,
+           limits: CheckLimits) -> list[Finding]:
+    """Return how far both ends are from what was asked: joint angles, or the tip unbent."""
+    task, n = request.task, request.arm.n_joints
+    joints = motion.coordinates[[0, -1], :n]
+    if task.space == task.JOINT:
+        found, unit = joints, 'rad'
+        asked = np.array([task.start_positions, task.goal_positions])
+    else:
+        unbent = np.hstack([joints, np.zeros((2, request.arm.n_modes))])
+        found, unit = tip_position(request.arm, unbent), 'm'
+        asked = np.array([(point.x, point.y) for point in (task.start_point, task.goal_point)])
+    return [Finding(name=f'{name} from what was asked', unit=unit, limit=limits.end_error,
+                    value=float(np.abs(miss).max()))
+            for name, miss in zip(('start', 'goal'), found - asked, strict=True)]
+
+
+def _optimality(model: ArmModel, motion: RecordedMotion, parameters: Parameters,
+                limits: CheckLimits) -> list[Finding]:
+    """Return whether torques keep their bounds and follow from the costates."""
+    n, size = model.arm.n_joints, max(float(np.abs(motion.torques).max()), _TINY)
+    lower, upper = model.arm.torque_bounds(motion.rates[:, :n])
+    bounds = np.where(motion.torques >= 0, upper, -lower)
+    # the last sample holds the arm, it is not of the extremal
+    z = np.hstack([motion.coordinates, motion.rates, motion.position_costates,
+                   motion.velocity_costates])[:-1]
+    controls = model.controls(z, parameters.stacked())
+    powers = np.abs(motion.position_costates * motion.rates).max()
+    scale = max(float(controls.cost_rate.max()), float(powers), _TINY)
+    return [
+        Finding(name='torque beyond its bounds', unit='N m', limit=limits.torque_error * size,
+                value=max(float((np.abs(motion.torques) - bounds).max()), 0.0)),
+        Finding(name='torques against eq. (14)', unit='N m', limit=limits.torque_error * size,
+                value=float(np.abs(controls.torque - motion.torques[:-1]).max())),
+        Finding(name='Hamiltonian drift', unit='', limit=limits.hamiltonian_drift,
+                value=float(np.ptp(controls.hamiltonian)) / scale)]

@@ -1,0 +1,221 @@
+"""The recording of a request, read back into arm, parameters and arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from flex_planner.arms.arm import Arm, Joint, Link, Motor, Node
+from flex_planner.base.errors import FlexPlannerError, RecordingError
+from flex_planner.base.validation import Array
+from flex_planner.optimal_control.arm_model import Parameters
+from flex_planner.recording import (
+    definition_folder,
+    MessageTypes,
+    read_attachments,
+    read_metadata,
+    read_recording,
+)
+import numpy as np
+import yaml
+
+_TYPES = 'flex_planner_interfaces/msg/'
+_WANTED = ('MotionTask', 'PlanReport', 'PayloadSearch', 'FlexibleTrajectory')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RecordedMotion:
+    """
+    The samples of a recorded plan, n joints and n_t coordinates.
+
+    Attributes
+    ----------
+    times : numpy.ndarray, shape (k,)
+        [s]; the last sample holds the arm, shortly after the end of the motion.
+    coordinates, rates : numpy.ndarray, shape (k, n_t)
+        Joints [rad], then modes [m], and their rates.
+    torques : numpy.ndarray, shape (k, n)
+        [N m].
+    position_costates, velocity_costates : numpy.ndarray, shape (k, n_t)
+        psi_1 and psi_2.
+    tip : numpy.ndarray, shape (k, 2)
+        [m].
+    payload_mass : float
+        Planned for [kg].
+
+    """
+
+    times: Array
+    coordinates: Array
+    rates: Array
+    torques: Array
+    position_costates: Array
+    velocity_costates: Array
+    tip: Array
+    payload_mass: float
+
+    @classmethod
+    def of(cls, message: Any) -> RecordedMotion:
+        """Return the motion of a FlexibleTrajectory."""
+        joints, bends = message.joint_trajectory.points, message.points
+        stamps = [point.time_from_start for point in joints]
+        return cls(
+            times=np.array([stamp.sec + stamp.nanosec * 1e-9 for stamp in stamps]),
+            coordinates=np.hstack([_rows(joints, 'positions'),
+                                   _rows(bends, 'modal_displacements')]),
+            rates=np.hstack([_rows(joints, 'velocities'), _rows(bends, 'modal_rates')]),
+            torques=_rows(joints, 'effort'),
+            position_costates=_rows(bends, 'position_costates'),
+            velocity_costates=_rows(bends, 'velocity_costates'),
+            tip=np.array([(point.x, point.y) for point in message.tip_path]),
+            payload_mass=float(message.payload_mass))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RecordedRequest:
+    """
+    A request with its outcome, as it was recorded.
+
+    Attributes
+    ----------
+    path : Path
+        The recording.
+    arm : Arm
+        From the attached scenario.
+    settings : mapping
+        Parameters of the planner, by name.
+    task, report : object
+        The messages MotionTask and PlanReport.
+    search : object or None
+        The message PayloadSearch, where a maximum payload was asked for.
+    joint_names : tuple of str
+        As the arm's controller knows them.
+    motion : RecordedMotion or None
+        None where there is no plan.
+
+    """
+
+    path: Path
+    arm: Arm
+    settings: Mapping[str, Any]
+    task: Any
+    report: Any
+    search: Any | None
+    joint_names: tuple[str, ...]
+    motion: RecordedMotion | None
+
+    @classmethod
+    def read(cls, path: Path | str) -> RecordedRequest:
+        """
+        Read a recording of the planner.
+
+        Raises
+        ------
+        RecordingError
+            If it cannot be read, or is not what the planner records.
+
+        """
+        types = MessageTypes.load([definition_folder('flex_planner_interfaces')])
+        scenario = _scenario(path)
+        found = {entry.topic.type_name.removeprefix(_TYPES): entry.message
+                 for entry in read_recording(path, types, _topics(path))}
+        if 'MotionTask' not in found or 'PlanReport' not in found:
+            raise RecordingError(f'{path} is no recording of a request: it has no MotionTask '
+                                 'with a PlanReport')
+        trajectory = found.get('FlexibleTrajectory')
+        try:
+            arm = arm_from_scenario(scenario['arm'])
+            settings = dict(scenario['parameters'])
+            motion = RecordedMotion.of(trajectory) if trajectory else None
+            if motion is not None:
+                _check_sizes(arm, motion)
+            return cls(path=Path(path), arm=arm, settings=settings, task=found['MotionTask'],
+                       report=found['PlanReport'], search=found.get('PayloadSearch'),
+                       joint_names=tuple(settings['joint_names']), motion=motion)
+        except (FlexPlannerError, LookupError, TypeError, ValueError) as error:
+            raise RecordingError(f'{path} contradicts itself: {error}') from error
+
+    @property
+    def solved(self) -> bool:
+        """Return whether there is a plan that may be executed."""
+        return self.report.error_code == self.report.NONE and self.motion is not None
+
+    @property
+    def tolerance(self) -> float:
+        """Return eps of eq. (17), that of the task or of the parameters."""
+        return float(self.task.tolerance or self.settings['tolerance'])
+
+    @property
+    def parameters(self) -> Parameters:
+        """Return payload, limits and weights of the plan, which a search may have changed."""
+        payload = self.task.payload_mass if self.motion is None else self.motion.payload_mass
+        n, n_t = self.arm.n_joints, self.arm.n_coordinates
+
+        def weights(values: Any, count: int) -> Array | None:
+            given = np.asarray(values, dtype=np.float64)
+            return np.append(given, np.zeros(count - given.size)) if given.size else None
+
+        return Parameters.of(
+            self.arm, payload_mass=payload, payload_inertia=self.task.payload_inertia,
+            effort_weights=weights(self.report.effort_weights, n),
+            position_weights=weights(self.task.position_weights, n_t),
+            velocity_weights=weights(self.report.velocity_weights, n_t))
+
+
+def arm_from_scenario(content: Mapping[str, Any]) -> Arm:
+    """
+    Return the arm that a scenario describes by the fields of the dataclasses in `arm`.
+
+    Raises
+    ------
+    FlexPlannerError
+        If a value breaks its bound.
+    TypeError
+        If a field is unknown or missing.
+
+    """
+    joints = [Joint(**{**entry, 'motor': Motor(**entry['motor'])}) for entry in content['joints']]
+    return Arm(**{**content, 'joints': tuple(joints),
+                  'links': tuple(Link(**entry) for entry in content['links']),
+                  'nodes': tuple(Node(**entry) for entry in content['nodes'])})
+
+
+def _scenario(path: Path | str) -> Mapping[str, Any]:
+    """Return the attachment with arm and parameters."""
+    attached = read_attachments(path).get('scenario.yaml')
+    if attached is None:
+        raise RecordingError(f'{path} is no recording of a request: it has no scenario.yaml')
+    try:
+        scenario = yaml.safe_load(attached)
+    except yaml.YAMLError as error:
+        raise RecordingError(f'{path} has a scenario.yaml that is no YAML: {error}') from error
+    if not isinstance(scenario, Mapping):
+        raise RecordingError(f'{path} has a scenario.yaml without arm and parameters')
+    return scenario
+
+
+def _topics(path: Path | str) -> list[str]:
+    """Return the names of the topics that tell of request and outcome."""
+    wanted = {f'{_TYPES}{name}' for name in _WANTED}
+    return [entry.topic.name for entry in read_metadata(path).topics
+            if entry.topic.type_name in wanted]
+
+
+def _rows(points: Sequence[Any], field: str) -> Array:
+    """Return a field of all points, a point a row."""
+    return np.array([getattr(point, field) for point in points], dtype=np.float64)
+
+
+def _check_sizes(arm: Arm, motion: RecordedMotion) -> None:
+    """Raise ValueError unless a motion is one of an arm."""
+    count, n_t = motion.times.size, arm.n_coordinates
+    shapes = {'coordinates': n_t, 'rates': n_t, 'torques': arm.n_joints, 'tip': 2,
+              'position_costates': n_t, 'velocity_costates': n_t}
+    for name, columns in shapes.items():
+        shape = getattr(motion, name).shape
+        if shape != (count, columns):
+            raise ValueError(f'{name} are {shape}, but must be {(count, columns)}')
+    if count < 3 or not (np.diff(motion.times) > 0).all():
+        raise ValueError('the times of the motion do not increase, or are less than 3')

@@ -1,0 +1,100 @@
+"""
+A report as one HTML file that needs nothing else.
+
+The plots are drawn by ``plots.js`` beside this module, which is copied into the page: a library
+like plotly would make it 4 MB larger and would be one more dependency.
+
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from html import escape
+import json
+import math
+import os
+from pathlib import Path
+from string import Template
+from typing import Any
+
+from flex_planner import __version__
+from flex_planner.base.errors import RecordingError
+from flex_planner.base.validation import Array
+from flex_planner.reports.recording.check import MotionCheck
+from flex_planner.reports.recording.contents import RecordedRequest
+from flex_planner.reports.recording.frequencies import NaturalFrequencies
+from flex_planner.reports.recording.plots import Plot, plots, Series
+from flex_planner.reports.recording.tables import Table, tables, verdict
+
+_FOLDER = Path(__file__).parent
+_DIGITS = 9
+_PLAIN = ('key', 'title', 'x_label', 'y_label', 'group', 'log', 'equal')
+
+
+def report_page(request: RecordedRequest, check: MotionCheck | None = None) -> str:
+    """Return the report of a recording as HTML."""
+    frequencies = NaturalFrequencies.of(request)
+    drawn = plots(request, check, frequencies)
+    template = Template((_FOLDER / 'page.html').read_text(encoding='utf-8'))
+    passed = request.solved and (check is None or check.passed)
+    kind = 'find_max_payload' if request.search is not None else 'plan_path'
+    return template.substitute(
+        title=escape(f'{kind}: {request.arm.name}'), kind='' if passed else 'failed',
+        file=escape(f'{request.path.name}, report of flex_planner {__version__}'),
+        verdict=escape(verdict(request, check)), hidden='' if drawn else 'hidden',
+        data=_json(_content(tables(request, check, frequencies), drawn)),
+        script=(_FOLDER / 'plots.js').read_text(encoding='utf-8'))
+
+
+def write_report(path: Path, request: RecordedRequest, check: MotionCheck | None = None) -> None:
+    """
+    Write the report of a recording, in place of an older one only when it is complete.
+
+    Raises
+    ------
+    RecordingError
+        If the system refuses.
+
+    """
+    draft = path.with_name(f'.{path.name}.{os.getpid()}')
+    try:
+        draft.write_text(report_page(request, check), encoding='utf-8')
+        draft.replace(path)
+    except OSError as error:
+        draft.unlink(missing_ok=True)
+        raise RecordingError(f'cannot write {path}: {error.strerror or error}') from error
+
+
+def _content(told: list[Table], drawn: list[Plot]) -> dict[str, Any]:
+    """Return tables and plots; the arrays along x are shared."""
+    axes: dict[str, list[float | None]] = {}
+    names: dict[bytes, str] = {}
+
+    def axis(values: Array) -> str:
+        """Return the name of an array along x."""
+        name = names.setdefault(values.tobytes(), f'x{len(names)}')
+        if name not in axes:
+            axes[name] = _numbers(values)
+        return name
+
+    def line(series: Series) -> dict[str, Any]:
+        """Return a line of a plot."""
+        return {'name': series.name, 'x': axis(series.x), 'y': _numbers(series.y),
+                'colour': series.colour, 'dashed': series.dashed, 'dots': series.dots}
+
+    shown = [{**{name: getattr(plot, name) for name in _PLAIN},
+              'bands': None if plot.bands is None else asdict(plot.bands),
+              'series': [line(series) for series in plot.series]} for plot in drawn]
+    return {'tables': [asdict(table) for table in told], 'axes': axes, 'plots': shown}
+
+
+def _numbers(values: Array) -> list[float | None]:
+    """Return numbers as JSON has them: nine digits, none where there is no number."""
+    return [float(f'{value:.{_DIGITS}g}') if math.isfinite(value) else None
+            for value in values.tolist()]
+
+
+def _json(content: dict[str, Any]) -> str:
+    """Return JSON that cannot end the element it stands in."""
+    text = json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(',', ':'))
+    return text.replace('<', '\\u003c')

@@ -1,0 +1,213 @@
+"""The plots of a report, as what plots.js draws."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from flex_planner.base.validation import Array
+from flex_planner.reports.recording.check import MotionCheck
+from flex_planner.reports.recording.contents import RecordedMotion, RecordedRequest
+from flex_planner.reports.recording.frequencies import NaturalFrequencies
+from flex_planner.reports.recording.spectra import spectrum
+import numpy as np
+from numpy.typing import NDArray
+
+_TIME = 'time [s]'
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Series:
+    """
+    A line of a plot.
+
+    Attributes
+    ----------
+    name : str
+        In the legend.
+    x, y : numpy.ndarray, shape (k,)
+        The points; what is not finite is a gap.
+    colour : int
+        Index; lines of one colour belong together.
+    dashed, dots : bool
+        Drawn so instead of as a line.
+
+    """
+
+    name: str
+    x: Array
+    y: Array
+    colour: int
+    dashed: bool = False
+    dots: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bands:
+    """
+    Ranges along x that are marked from top to bottom.
+
+    Attributes
+    ----------
+    name : str
+        In the legend.
+    labels : list of str
+        At each range.
+    ranges : list of [low, high]
+        In the unit of x.
+
+    """
+
+    name: str
+    labels: list[str]
+    ranges: list[list[float]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Plot:
+    """
+    A plot.
+
+    Attributes
+    ----------
+    key, title, x_label, y_label : str
+        Its names.
+    series : list of Series
+        Its lines.
+    group : str
+        Plots of one group are zoomed together; empty for none.
+    log, equal : bool
+        Logarithmic upwards; the same scale in both directions.
+    bands : Bands or None
+        What is marked.
+
+    """
+
+    key: str
+    title: str
+    x_label: str
+    y_label: str
+    series: list[Series] = field(default_factory=list)
+    group: str = ''
+    log: bool = False
+    equal: bool = False
+    bands: Bands | None = None
+
+
+def plots(request: RecordedRequest, check: MotionCheck | None = None,
+          frequencies: NaturalFrequencies | None = None) -> list[Plot]:
+    """Return the plots of a report; those of the motion only where there is one."""
+    found = [] if request.motion is None else _motion_plots(request, request.motion, check,
+                                                            _bands(frequencies))
+    return [*found, *([] if request.search is None else _search_plots(request.search))]
+
+
+def _motion_plots(request: RecordedRequest, motion: RecordedMotion, check: MotionCheck | None,
+                  bands: Bands | None) -> list[Plot]:
+    arm, n = request.arm, request.arm.n_joints
+    joints, modes, t = request.joint_names, arm.modal_names, motion.times
+    found = [
+        _torques(request, motion),
+        _over_time('positions', 'Joint angles', 'angle [rad]', t, motion.coordinates[:, :n],
+                   joints),
+        _over_time('speeds', 'Joint speeds', 'speed [rad/s]', t, motion.rates[:, :n], joints),
+        _tip(motion, check)]
+    if arm.n_modes:
+        moving = slice(0, -1)  # without the sample that holds the arm, just after the last
+        bends, rates = motion.coordinates[:, n:], motion.rates[:, n:]
+        found += [
+            _over_time('modes', 'Modal displacements', 'displacement [m]', t, bends, modes),
+            _over_time('modal_rates', 'Modal rates', 'rate [m/s]', t, rates, modes),
+            _spectrum('modes_spectrum', 'Spectrum of the modal displacements', 'amplitude [m]',
+                      t[moving], bends[moving], modes, bands),
+            _spectrum('modal_rates_spectrum', 'Spectrum of the modal rates', 'amplitude [m/s]',
+                      t[moving], rates[moving], modes, bands)]
+    names = [*joints, *modes]
+    return [
+        *found,
+        _over_time('position_costates', 'Costates ψ₁ of the positions',
+                   'N²m²s/rad, N²m s', t, motion.position_costates, names),
+        _over_time('velocity_costates', 'Costates ψ₂ of the rates',
+                   'N²m²s²/rad, N²m s²', t, motion.velocity_costates, names)]
+
+
+def _torques(request: RecordedRequest, motion: RecordedMotion) -> Plot:
+    """Return the torques between their bounds, eq. (15)."""
+    n = request.arm.n_joints
+    plot = _over_time('torques', 'Torques between their bounds', 'torque [N m]', motion.times,
+                      motion.torques, request.joint_names)
+    for name, values in zip(('lowest', 'highest'),
+                            request.arm.torque_bounds(motion.rates[:, :n]), strict=True):
+        plot.series.extend(
+            Series(name=f'{joint} {name}', x=motion.times, y=values[:, i], colour=i, dashed=True)
+            for i, joint in enumerate(request.joint_names) if np.isfinite(values[:, i]).any())
+    return plot
+
+
+def _over_time(key: str, title: str, unit: str, times: Array, values: Array,
+               names: Sequence[str]) -> Plot:
+    """Return columns over time."""
+    return Plot(key=key, title=title, x_label=_TIME, y_label=unit, group='time', series=[
+        Series(name=name, x=times, y=values[:, i], colour=i) for i, name in enumerate(names)])
+
+
+def _bands(frequencies: NaturalFrequencies | None) -> Bands | None:
+    """Return where spectra should have their peaks: under given torques the joints are free."""
+    if frequencies is None:
+        return None
+    ranges = frequencies.free.tolist()
+    return Bands(name='natural frequencies, joints free, over the postures of the motion',
+                 labels=[f'f{k}' for k in range(1, len(ranges) + 1)], ranges=ranges)
+
+
+def _spectrum(key: str, title: str, unit: str, times: Array, values: Array,
+              names: Sequence[str], bands: Bands | None) -> Plot:
+    """Return the spectra of columns."""
+    frequencies, amplitudes = spectrum(times, values)
+    return Plot(key=key, title=title, x_label='frequency [Hz]', y_label=unit, log=True,
+                group='frequency', bands=bands, series=[
+                    Series(name=name, x=frequencies, y=amplitudes[:, i], colour=i)
+                    for i, name in enumerate(names)])
+
+
+def _tip(motion: RecordedMotion, check: MotionCheck | None) -> Plot:
+    """Return the path of the tip, and where the check went."""
+    path = motion.tip
+    series = [Series(name='planned', x=path[:, 0], y=path[:, 1], colour=0)]
+    if check is not None:
+        series.append(Series(name='re-simulated', x=check.tip[:, 0], y=check.tip[:, 1], colour=1,
+                             dashed=True))
+    series += [Series(name=name, x=path[k:k + 1, 0], y=path[k:k + 1, 1], colour=colour, dots=True)
+               for name, k, colour in (('start', 0, 2), ('goal', len(path) - 1, 6))]
+    return Plot(key='tip', title='Path of the tip', x_label='x [m]', y_label='y [m]', equal=True,
+                series=series)
+
+
+def _search_plots(search: Any) -> list[Plot]:
+    """Return the front of a direct search, or the trials of an incremental one."""
+    found = []
+    if len(search.front_payloads):
+        payloads = np.asarray(search.front_payloads)
+        for key, title, unit, values in (
+                ('front', 'Effort that carries a payload', 'J [N²m²s]', search.front_efforts),
+                ('prices', 'Price of a payload', 'dJ/dm [N²m²s/kg]', search.front_prices)):
+            line = Series(name=unit, x=payloads, y=np.asarray(values), colour=0)
+            dots = Series(name='solved', x=payloads, y=np.asarray(values), colour=0, dots=True)
+            found.append(Plot(key=key, title=title, x_label='payload [kg]', y_label=unit,
+                              series=[line, dots], group='payload'))
+    if len(search.tried_payloads):
+        found.append(_tried(np.asarray(search.tried_payloads, dtype=float),
+                            np.asarray(search.tried_solved, dtype=bool)))
+    return found
+
+
+def _tried(payloads: Array, carried: NDArray[np.bool_]) -> Plot:
+    """Return the payloads in the order they were tried."""
+    numbers: Array = np.arange(1, payloads.size + 1).astype(np.float64)
+    return Plot(key='trials', title='Payloads tried', x_label='trial', y_label='payload [kg]',
+                series=[Series(name='tried', x=numbers, y=payloads, colour=7, dashed=True)] + [
+                    Series(name=name, x=numbers[chosen], y=payloads[chosen], colour=colour,
+                           dots=True)
+                    for name, chosen, colour in (('carried', carried, 2),
+                                                 ('not carried', ~carried, 1)) if chosen.any()])

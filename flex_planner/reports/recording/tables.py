@@ -1,0 +1,240 @@
+"""The tables of a report: text only, for the page and for the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+from flex_planner.arms.arm import Arm
+from flex_planner.planning.certificate import CertificateLimits
+from flex_planner.reports.recording.check import MotionCheck
+from flex_planner.reports.recording.contents import RecordedRequest
+from flex_planner.reports.recording.frequencies import NaturalFrequencies
+import numpy as np
+
+Cells = tuple[str, ...]
+_CERTIFICATE = {
+    'collocation_residual': '', 'boundary_error': '', 'hamiltonian_drift': '', 'tip_error': ' m',
+    'residual_vibration': ' m', 'state_error': '', 'costate_error': ''}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table:
+    """
+    A table.
+
+    Attributes
+    ----------
+    title : str
+        Its heading.
+    columns : tuple of str
+        Their names; empty where rows are names and values.
+    rows : tuple of tuple of str
+        The cells.
+
+    """
+
+    title: str
+    columns: Cells = ()
+    rows: tuple[Cells, ...]
+
+
+def verdict(request: RecordedRequest, check: MotionCheck | None = None) -> str:
+    """Return in a sentence what came of the request."""
+    report = request.report
+    if not request.solved:
+        return f'Failed, error {report.error_code}: {report.error_msg or "no reason is recorded"}'
+    found = '' if request.search is None else f'Maximum payload {request.search.payload:.6g} kg. '
+    if check is None:
+        return f'{found}Solved and certified when it was planned; not checked again here.'
+    failed = [finding.name for finding in check.findings if not finding.passed]
+    again = f'FAILED ({", ".join(failed)})' if failed else 'passed'
+    return f'{found}Solved and certified when it was planned; the check of the recording {again}.'
+
+
+def tables(request: RecordedRequest, check: MotionCheck | None = None,
+           frequencies: NaturalFrequencies | None = None) -> list[Table]:
+    """Return the tables of a report."""
+    found = [_task(request), _outcome(request)]
+    if request.solved:
+        found.append(_certificate(request))
+    if check is not None:
+        found.append(check_table(check))
+    if request.motion is not None:
+        found.append(_joints(request))
+    if frequencies is not None:
+        found.append(_frequencies(frequencies))
+    if request.search is not None:
+        found += [_search(request.search), *_trials(request.search)]
+    if len(request.report.tried_weights):
+        found.append(_objectives(request.report))
+    return [*found, *_arm(request.arm), _settings(request)]
+
+
+def check_table(check: MotionCheck) -> Table:
+    """Return the findings of a check."""
+    return Table(title='Check of the recording against the model', rows=tuple(
+        (finding.name, f'{finding.value:.3g} {finding.unit}', f'{finding.limit:.3g}',
+         'passed' if finding.passed else 'FAILED') for finding in check.findings),
+        columns=('', 'found', 'limit', ''))
+
+
+def numbers(values: Iterable[float]) -> str:
+    """Return numbers in a line, or a dash."""
+    return ', '.join(f'{value:.6g}' for value in values) or '–'
+
+
+def _task(request: RecordedRequest) -> Table:
+    """Return what was asked."""
+    task = request.task
+    if task.space == task.CARTESIAN:
+        ends = [f'({point.x:g}, {point.y:g}) m' for point in (task.start_point, task.goal_point)]
+    else:
+        ends = [f'({numbers(np.degrees(angles))}) deg'
+                for angles in (task.start_positions, task.goal_positions)]
+    rows = [('start', ends[0]), ('goal', ends[1]), ('duration', f'{task.duration:g} s'),
+            ('payload', f'{task.payload_mass:g} kg, {task.payload_inertia:g} kg m²'),
+            ('weights R', numbers(task.effort_weights)),
+            ('weights W1', numbers(task.position_weights)),
+            ('weights W2', numbers(task.velocity_weights)),
+            ('tolerance, eq. (17)', f'{request.tolerance:g}')]
+    for name in ('max_joint_speeds', 'max_torque_shares', 'max_modal_rates'):
+        if len(getattr(task, name)):
+            rows.append((name.replace('_', ' '), numbers(getattr(task, name))))
+    return Table(title='Task', rows=tuple(rows))
+
+
+def _outcome(request: RecordedRequest) -> Table:
+    """Return what came of it."""
+    report = request.report
+    seconds = report.planning_time.sec + report.planning_time.nanosec * 1e-9
+    rows = [('error code', str(report.error_code))]
+    if report.error_msg:
+        rows.append(('error', report.error_msg))
+    rows += [('planned in', f'{seconds:.3f} s'), ('strategy', report.strategy or '–'),
+             ('iterations', str(report.iterations)), ('intervals', str(report.mesh_intervals))]
+    if getattr(report, 'map_cell', ''):  # older recordings do not have it
+        rows.append(('started from', report.map_cell))
+    if request.motion is not None:
+        rows += [('payload', f'{request.motion.payload_mass:.6g} kg'),
+                 ('cost J', f'{report.cost:.6g}'), ('effort', f'{report.effort:.6g} N²m²s'),
+                 ('energy', f'{report.energy:.6g} J'),
+                 ('switching times [s]', numbers(report.switching_times))]
+    return Table(title='Outcome', rows=tuple(rows))
+
+
+def _certificate(request: RecordedRequest) -> Table:
+    """Return the certificate with the limits that it was held against."""
+    limits = {entry.name: getattr(CertificateLimits(), entry.name)
+              for entry in fields(CertificateLimits)} | {'boundary_error': request.tolerance}
+    rows = []
+    for name, unit in _CERTIFICATE.items():
+        value, limit = float(getattr(request.report, name)), limits.get(name)
+        judged = '' if limit is None else 'passed' if value <= limit else 'FAILED'
+        rows.append((name.replace('_', ' '), f'{value:.2e}{unit}',
+                     '–' if limit is None else f'{limit:.0e}', judged))
+    return Table(title='Certificate when planned', columns=('', 'found', 'limit', ''),
+                 rows=tuple(rows))
+
+
+def _joints(request: RecordedRequest) -> Table:
+    """Return what the motors have to give."""
+    report, n = request.report, request.arm.n_joints
+    shares = report.peak_speed_shares if len(report.peak_speed_shares) else np.full(n, np.nan)
+    saturation = report.saturation if len(report.saturation) else np.full(n, np.nan)
+    rows = zip(request.joint_names, report.peak_torques, report.peak_torque_shares,
+               report.peak_speeds, shares, saturation, strict=True)
+    return Table(
+        title='Motors', columns=('', 'peak torque', 'of its limit', 'peak speed',
+                                 'of no-load speed', 'time on its limit'),
+        rows=tuple((name, f'{torque:.4g} N m', _percent(part), f'{speed:.4g} rad/s',
+                    _percent(share), _percent(full))
+                   for name, torque, part, speed, share, full in rows))
+
+
+def _frequencies(frequencies: NaturalFrequencies) -> Table:
+    """Return how the arm rings with the payload of the plan."""
+    pairs = zip(frequencies.free, frequencies.locked, strict=True)
+    return Table(
+        title='Natural frequencies over the postures of the motion [Hz]',
+        columns=('', 'joints free (marked in the spectra)', 'joints locked'),
+        rows=tuple((f'f{k}', _span(*free), _span(*locked))
+                   for k, (free, locked) in enumerate(pairs, 1)))
+
+
+def _search(search: Any) -> Table:
+    """Return how the maximum payload was searched."""
+    return Table(title='Search for the maximum payload', rows=(
+        ('method', 'payload as an unknown at a rising price' if search.method == search.DIRECT
+         else 'payload raised step by step'),
+        ('largest payload', f'{search.payload:.6g} kg'),
+        ('too much, or in vain', f'{search.payload_upper:.6g} kg'),
+        ('accuracy asked for', f'{search.payload_accuracy:g} kg'),
+        ('limiting joint', '–' if search.limiting_joint < 0 else
+         f'{search.limiting_joint + 1}{", which can hold no more" if search.held else ""}')))
+
+
+def _trials(search: Any) -> list[Table]:
+    """Return the payloads met on the way."""
+    found = []
+    if len(search.front_payloads):
+        rows = zip(search.front_payloads, search.front_efforts, search.front_prices, strict=True)
+        found.append(Table(title='What a payload costs',
+                           columns=('payload [kg]', 'J [N²m²s]', 'dJ/dm [N²m²s/kg]'),
+                           rows=tuple(_cells(row) for row in rows)))
+    if len(search.tried_payloads):
+        tried = zip(search.tried_payloads, search.tried_solved, search.tried_errors, strict=True)
+        found.append(Table(title='Payloads tried',
+                           columns=('payload [kg]', 'carried', 'boundary error'), rows=tuple(
+                               (f'{payload:.6g}', 'yes' if solved else 'no', f'{error:.2g}')
+                               for payload, solved, error in tried)))
+    return found
+
+
+def _objectives(report: Any) -> Table:
+    """Return the weights tried for the objectives."""
+    tried = zip(report.tried_objectives, report.tried_weights, report.tried_shares, strict=True)
+    return Table(title='Weights tried for the objectives',
+                 columns=('objective', 'weight', 'share of the limit'),
+                 rows=tuple((name, f'{weight:.5g}', f'{share:.4f}')
+                            for name, weight, share in tried))
+
+
+def _arm(arm: Arm) -> list[Table]:
+    """Return the arm's links and joints."""
+    return [
+        Table(title=f'Arm: {arm.name}', columns=(
+            'link', 'length [m]', 'density [kg/m]', 'E I [N m²]', 'modes', 'damping'), rows=tuple(
+                (str(i), f'{link.length:g}', f'{link.linear_density:g}',
+                 f'{link.flexural_rigidity:g}', f'{link.modes} {link.mode_family}'
+                 if link.modes else 'rigid', f'{link.damping_ratio:g}')
+                for i, link in enumerate(arm.links, 1))),
+        Table(title='Joints', columns=(
+            'joint', 'stall torque [N m]', 'no-load speed [rad/s]', 'friction [N m s/rad]',
+            'mass at it [kg]'), rows=tuple(
+                (str(i), f'{joint.motor.stall_torque:g}', f'{joint.motor.no_load_speed:g}',
+                 f'{joint.viscous_friction:g}', f'{node.mass:g}')
+                for i, (joint, node) in enumerate(zip(arm.joints, arm.nodes, strict=False), 1)))]
+
+
+def _settings(request: RecordedRequest) -> Table:
+    """Return the planner's parameters."""
+    return Table(title='Parameters of the planner', rows=tuple(
+        (name, ', '.join(map(str, value)) if isinstance(value, Sequence)
+         and not isinstance(value, str) else str(value))
+        for name, value in request.settings.items()))
+
+
+def _percent(share: float) -> str:
+    return f'{share:.1%}' if np.isfinite(share) else '–'
+
+
+def _span(low: float, high: float) -> str:
+    """Return a range, or the one number that it is."""
+    ends = [f'{value:.4g}' for value in (low, high)]
+    return ends[0] if ends[0] == ends[1] else ' to '.join(ends)
+
+
+def _cells(row: Iterable[float]) -> Cells:
+    return tuple(f'{value:.6g}' for value in row)

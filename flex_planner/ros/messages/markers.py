@@ -1,0 +1,78 @@
+"""A plan as markers, for RViz and Foxglove."""
+
+from __future__ import annotations
+
+from flex_planner.arms.arm import Arm
+from flex_planner.arms.kinematics import link_points
+from flex_planner.base.validation import Array
+from flex_planner.planning.sampling import Reference
+from geometry_msgs.msg import Point
+import numpy as np
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker, MarkerArray
+
+_INSTANTS = 9
+_STATIONS = 20  # points a link
+_LONGEST_PATH = 500  # points
+_LINK, _PATH, _START, _GOAL = (0.2, 0.4, 0.8), (0.9, 0.5, 0.1), (0.2, 0.7, 0.2), (0.8, 0.2, 0.2)
+
+
+def motion_markers(arm: Arm, reference: Reference, frame: str) -> MarkerArray:
+    """
+    Return the bent links at nine instants, the later the less transparent, and the tip's path.
+
+    Namespaces: ``links``, ``tip_path``, ``start`` and ``goal``. What a plan before has left is
+    deleted first.
+
+    Parameters
+    ----------
+    arm : Arm
+        The arm.
+    reference : Reference
+        Samples of the plan.
+    frame : str
+        Of the base.
+
+    """
+    times, tip, width = reference.times_ns, reference.samples.tip, _reach(arm) / 100
+    chosen = np.searchsorted(times, np.linspace(0, times[-1], _INSTANTS))
+    shapes = link_points(arm, reference.samples.coordinates[chosen], _STATIONS)
+    steps = np.unique(np.linspace(0, len(tip) - 1, _LONGEST_PATH).astype(int))
+    markers = [Marker(action=Marker.DELETEALL)]
+    for k, links in enumerate(shapes):
+        alpha = 0.2 + 0.8 * k / (_INSTANTS - 1)
+        markers += [_line('links', k * arm.n_joints + i, points, (*_LINK, alpha), width)
+                    for i, points in enumerate(links)]
+    markers += [_line('tip_path', 0, tip[steps], (*_PATH, 1.0), width / 2),
+                _ball('start', tip[0], (*_START, 1.0), 3 * width),
+                _ball('goal', tip[-1], (*_GOAL, 1.0), 3 * width)]
+    for marker in markers:
+        marker.header.frame_id = frame
+    return MarkerArray(markers=markers)
+
+
+def _reach(arm: Arm) -> float:
+    return float(sum(link.length for link in arm.links))
+
+
+def _marker(namespace: str, number: int, kind: int, color: tuple[float, ...]) -> Marker:
+    red, green, blue, alpha = color
+    marker = Marker(ns=namespace, id=number, type=kind, action=Marker.ADD,
+                    color=ColorRGBA(r=red, g=green, b=blue, a=alpha))
+    marker.pose.orientation.w = 1.0
+    return marker
+
+
+def _line(namespace: str, number: int, points: Array, color: tuple[float, ...],
+          width: float) -> Marker:
+    marker = _marker(namespace, number, Marker.LINE_STRIP, color)
+    marker.points = [Point(x=float(x), y=float(y), z=0.0) for x, y in points]
+    marker.scale.x = width
+    return marker
+
+
+def _ball(namespace: str, place: Array, color: tuple[float, ...], size: float) -> Marker:
+    marker = _marker(namespace, 0, Marker.SPHERE, color)
+    marker.pose.position = Point(x=float(place[0]), y=float(place[1]), z=0.0)
+    marker.scale.x = marker.scale.y = marker.scale.z = size
+    return marker

@@ -1,0 +1,227 @@
+"""Between the messages of flex_planner_interfaces and the core's tasks and plans."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from builtin_interfaces.msg import Duration
+from flex_planner.arms.arm import Arm
+from flex_planner.base.errors import (
+    FlexPlannerError,
+    InvalidSizeError,
+    InvalidTaskError,
+    InvalidValueError,
+    NotFiniteError,
+    SingularError,
+    UnreachableError,
+)
+from flex_planner.base.progress import StopReason
+from flex_planner.base.validation import Array, number
+from flex_planner.optimal_control.task import postures_from_points, Task
+from flex_planner.planning.objectives import Objectives
+from flex_planner.planning.plan import peaks, Plan, PlanStatus, Samples
+from flex_planner.planning.sampling import Reference
+from flex_planner.ros.settings.planner import PlannerSettings
+from flex_planner_interfaces.msg import (
+    FlexiblePoint,
+    FlexibleTrajectory,
+    MotionTask,
+    PlanReport,
+)
+from geometry_msgs.msg import Point
+import numpy as np
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+ERROR_CODES: tuple[tuple[type[FlexPlannerError], int], ...] = (
+    (InvalidSizeError, PlanReport.INVALID_SIZE),
+    (NotFiniteError, PlanReport.NOT_FINITE),
+    (InvalidValueError, PlanReport.OUT_OF_RANGE),
+    (InvalidTaskError, PlanReport.INVALID_TASK),
+    (UnreachableError, PlanReport.UNREACHABLE),
+    (SingularError, PlanReport.SINGULAR),
+)
+STATUS_CODES = {
+    PlanStatus.SOLVED: PlanReport.NONE,
+    PlanStatus.NOT_CONVERGED: PlanReport.NOT_CONVERGED,
+    PlanStatus.INFEASIBLE: PlanReport.INFEASIBLE,
+    PlanStatus.CERTIFICATE_FAILED: PlanReport.CERTIFICATE_FAILED,
+    PlanStatus.OBJECTIVE_NOT_MET: PlanReport.OBJECTIVE_NOT_MET,
+    PlanStatus.TIMEOUT: PlanReport.TIMEOUT,
+    PlanStatus.CANCELED: PlanReport.CANCELED,
+}
+STOP_CODES = {StopReason.TIMEOUT: PlanReport.TIMEOUT,
+              StopReason.CANCELED: PlanReport.CANCELED}
+OBJECTIVE_FIELDS = ('max_joint_speeds', 'max_torque_shares', 'max_modal_rates')
+_MAX_PLANNING_TIME = 3600.0
+
+
+def task_from_message(message: MotionTask, arm: Arm, settings: PlannerSettings) -> Task:
+    """
+    Return the task that a request describes, with the parameters' defaults filled in.
+
+    Raises
+    ------
+    FlexPlannerError
+        One of `ERROR_CODES`, naming field, value and bound.
+
+    """
+    start, goal = _postures(message, arm, settings)
+    tolerance = number('tolerance', message.tolerance, at_least=0, at_most=1)
+    return Task(
+        arm=arm, start_positions=start, goal_positions=goal, duration=message.duration,
+        payload_mass=message.payload_mass, payload_inertia=message.payload_inertia,
+        effort_weights=np.asarray(message.effort_weights or settings.effort_weights),
+        position_weights=np.asarray(message.position_weights),
+        velocity_weights=np.asarray(message.velocity_weights),
+        tolerance=tolerance or settings.tolerance)
+
+
+def objectives_from_message(message: MotionTask) -> Objectives | None:
+    """
+    Return the objectives of a request, None if it has none.
+
+    Raises
+    ------
+    InvalidValueError
+        Naming field, value and bound.
+
+    """
+    given: dict[str, Any] = {name: np.asarray(getattr(message, name)) for name in OBJECTIVE_FIELDS}
+    return Objectives(**given) if any(limits.size for limits in given.values()) else None
+
+
+def planning_time_limit(message: MotionTask, settings: PlannerSettings) -> float:
+    """Return the time limit of a request [s], or raise InvalidValueError."""
+    limit = number('allowed_planning_time', message.allowed_planning_time, at_least=0,
+                   at_most=_MAX_PLANNING_TIME, unit='s')
+    return limit or settings.allowed_planning_time
+
+
+def _postures(message: MotionTask, arm: Arm,
+              settings: PlannerSettings) -> tuple[Array, Array]:
+    """Return start and goal joint angles as they were given or follow from points."""
+    if message.space == MotionTask.JOINT:
+        return np.asarray(message.start_positions), np.asarray(message.goal_positions)
+    if message.space != MotionTask.CARTESIAN:
+        raise InvalidValueError('space', message.space, '0 (JOINT) or 1 (CARTESIAN)')
+    if message.elbow not in (-1, 0, 1):
+        raise InvalidValueError('elbow', message.elbow, '-1, +1, or 0 for the default')
+    start, goal = message.start_point, message.goal_point
+    return postures_from_points(arm, (start.x, start.y), (goal.x, goal.y),
+                                elbow=message.elbow or settings.elbow)
+
+
+def error_code(error: Exception) -> int:
+    """Return the code of PlanReport for an exception."""
+    return next((code for kind, code in ERROR_CODES if isinstance(error, kind)),
+                int(PlanReport.UNKNOWN))
+
+
+def failure_report(code: int, sentence: str) -> PlanReport:
+    """Return a report without numbers."""
+    report = PlanReport(error_code=code, error_msg=sentence)
+    for name in ('cost', 'effort', 'energy', 'collocation_residual', 'boundary_error',
+                 'hamiltonian_drift', 'tip_error', 'residual_vibration', 'state_error',
+                 'costate_error', 'torque_interpolation_error'):
+        setattr(report, name, float('inf'))
+    return report
+
+
+def report_from_plan(plan: Plan) -> PlanReport:
+    """Return the report of a plan, solved or not."""
+    sentence = '' if plan.solved else f'{plan.status.value}: {plan.message}'
+    report = failure_report(STATUS_CODES[plan.status], sentence)
+    report.strategy = plan.strategy
+    report.iterations, report.mesh_intervals = plan.iterations, plan.mesh_intervals
+    for name in ('cost', 'effort', 'energy'):
+        setattr(report, name, float(getattr(plan, name)))
+    for name in plan.certificate.__slots__:
+        setattr(report, name, float(getattr(plan.certificate, name)))
+    report.switching_times = plan.switching_times.tolist()
+    report.saturation = plan.saturation.tolist()
+    report.velocity_weights = plan.task.velocity_weights.tolist()
+    report.effort_weights = plan.task.effort_weights.tolist()
+    trials = plan.objectives.trials if plan.objectives else ()
+    report.tried_objectives = [trial.objective.value for trial in trials]
+    report.tried_weights = [float(trial.weight) for trial in trials]
+    report.tried_shares = [float(trial.share) for trial in trials]
+    return report
+
+
+def add_reference(report: PlanReport, plan: Plan, reference: Reference) -> None:
+    """Add to a report what the sampled plan shows."""
+    most = peaks(plan, reference.samples)
+    limited = np.isfinite([joint.motor.no_load_speed for joint in plan.arm.joints]).any()
+    report.peak_torques = most.torques.tolist()
+    report.peak_torque_shares = most.torque_shares.tolist()
+    report.peak_speeds = most.speeds.tolist()
+    report.peak_speed_shares = most.speed_shares.tolist() if limited else []
+    report.torque_interpolation_error = reference.torque_error
+
+
+def duration_message(nanoseconds: int) -> Duration:
+    """Return a duration message."""
+    seconds, rest = divmod(int(nanoseconds), 10**9)
+    return Duration(sec=seconds, nanosec=rest)
+
+
+def duration_seconds(duration: Duration) -> float:
+    """Return a duration message in seconds."""
+    return float(duration.sec + duration.nanosec * 1e-9)
+
+
+def joint_trajectory(reference: Reference, joint_names: Sequence[str]) -> JointTrajectory:
+    """Return what a joint_trajectory_controller with an effort interface takes."""
+    samples, n = reference.samples, len(joint_names)
+    points = [
+        JointTrajectoryPoint(
+            time_from_start=duration_message(time), positions=samples.coordinates[k, :n].tolist(),
+            velocities=samples.rates[k, :n].tolist(),
+            accelerations=samples.accelerations[k, :n].tolist(),
+            effort=samples.torques[k].tolist())
+        for k, time in enumerate(reference.times_ns)]
+    return JointTrajectory(joint_names=list(joint_names), points=points)
+
+
+def flexible_trajectory(plan: Plan, reference: Reference, joints: JointTrajectory,
+                        frame: str) -> FlexibleTrajectory:
+    """Return the trajectory with the bending of the links, costates and the tip's path."""
+    samples = reference.samples
+    message = FlexibleTrajectory(
+        joint_trajectory=joints, modal_names=list(plan.arm.modal_names),
+        points=[_flexible_point(plan.arm.n_joints, samples, k, time)
+                for k, time in enumerate(reference.times_ns)],
+        tip_path=[Point(x=float(x), y=float(y), z=0.0) for x, y in samples.tip],
+        payload_mass=plan.task.payload_mass)
+    message.header.frame_id = frame
+    return message
+
+
+def reported_trajectory(report: PlanReport, plan: Plan, reference: Reference,
+                        settings: PlannerSettings) -> FlexibleTrajectory:
+    """Return the trajectory of a sampled plan, and add to its report what the samples show."""
+    add_reference(report, plan, reference)
+    joints = joint_trajectory(reference, settings.joint_names)
+    return flexible_trajectory(plan, reference, joints, settings.base_frame)
+
+
+def _flexible_point(n: int, samples: Samples, k: int, time: int) -> FlexiblePoint:
+    return FlexiblePoint(
+        time_from_start=duration_message(time),
+        modal_displacements=samples.coordinates[k, n:].tolist(),
+        modal_rates=samples.rates[k, n:].tolist(),
+        position_costates=samples.position_costates[k].tolist(),
+        velocity_costates=samples.velocity_costates[k].tolist())
+
+
+def reference_state(plan: Plan, samples: Samples, k: int, names: Sequence[str],
+                    stamp_ns: int) -> JointState:
+    """Return one sample as a JointState: joints and modal coordinates, with the torque."""
+    torque = np.concatenate([samples.torques[k], np.zeros(plan.arm.n_modes)])
+    message = JointState(name=list(names), position=samples.coordinates[k].tolist(),
+                         velocity=samples.rates[k].tolist(), effort=torque.tolist())
+    stamp = duration_message(stamp_ns)
+    message.header.stamp.sec, message.header.stamp.nanosec = stamp.sec, stamp.nanosec
+    return message

@@ -1,0 +1,155 @@
+"""A kind of request over ROS: a service, and an action of the same name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Coroutine
+from functools import partial
+from typing import Any, NamedTuple
+
+from flex_planner.ros.messages.payload_searches import fill_response, search_without_result
+from flex_planner.ros.messages.plans import duration_message
+from flex_planner.ros.planner.request_planner import Outcome
+from flex_planner.ros.planner.request_queue import Pending, Work
+from flex_planner.ros.planner.request_state import Ticket
+from flex_planner_interfaces.msg import MotionTask, PlanReport
+from rclpy.action import ActionServer, CancelResponse
+from rclpy.action.server import ServerGoalHandle
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+
+# [s], how long the result of a goal can be asked for: clients ask when the goal is accepted, and
+# what is kept of trajectories is most of what the node grows by when goals come fast
+RESULT_TIMEOUT = 5
+# requests and answers on their way: with ROS's depth of 10, more at once would get lost
+_MANY = QoSProfile(depth=1000)
+_FEEDBACK_PERIOD = 0.1  # [s]
+
+
+class Counter(NamedTuple):
+    """
+    What endpoints do with requests.
+
+    Attributes
+    ----------
+    submit : callable
+        Hands a request in.
+    withdraw : callable
+        Cancels it.
+    conclude : callable
+        Coroutine that waits for the outcome and acts on it; never raises.
+
+    """
+
+    submit: Callable[[Work], Pending]
+    withdraw: Callable[[Pending], None]
+    conclude: Callable[[Pending, MotionTask], Coroutine[Any, Any, Outcome]]
+
+
+class Endpoint:
+    """
+    Serves one kind of request.
+
+    Parameters
+    ----------
+    node : Node
+        Where.
+    name : str
+        Of the service and of the action.
+    kinds : pair of types
+        Of the service and of the action; the request has the fields of the goal, and the
+        response those of the result.
+    counter : Counter
+        Where requests are handed in.
+    work : callable
+        Returns the outcome of a request; runs in the thread of the worker.
+    fill : callable
+        Enters an outcome into a response or result, given the request.
+
+    """
+
+    def __init__(self, node: Node, name: str, kinds: tuple[Any, Any], counter: Counter,
+                 work: Callable[[Any, Ticket], Outcome],
+                 fill: Callable[[Any, Any, Outcome], None]) -> None:
+        self._counter, self._work, self._fill = counter, work, fill
+        self._goals: dict[bytes, tuple[ServerGoalHandle, Pending]] = {}
+        service, self._action = kinds
+        # in the group that all else is in, a request that waits would hold up the others
+        group = ReentrantCallbackGroup()
+        node.create_service(service, name, self._on_request, qos_profile=_MANY,
+                            callback_group=group)
+        self._server = ActionServer(
+            node, self._action, name, self._execute, callback_group=group,
+            handle_accepted_callback=self._on_goal, cancel_callback=self._on_cancel,
+            goal_service_qos_profile=_MANY, result_service_qos_profile=_MANY,
+            cancel_service_qos_profile=_MANY, result_timeout=RESULT_TIMEOUT)
+        node.create_timer(_FEEDBACK_PERIOD, self._send_feedback, callback_group=group)
+
+    async def _on_request(self, request: Any, response: Any) -> Any:
+        """Serve a request of the service."""
+        pending = self._counter.submit(partial(self._work, request))
+        self._fill(response, request, await self._counter.conclude(pending, request.task))
+        return response
+
+    def _on_goal(self, goal: ServerGoalHandle) -> None:
+        """Hand in an accepted goal: it can be canceled from here on."""
+        pending = self._counter.submit(partial(self._work, goal.request))
+        self._goals[_key(goal)] = goal, pending
+        goal.execute()
+
+    async def _execute(self, goal: ServerGoalHandle) -> Any:
+        """Wait for the outcome of a goal and return its result."""
+        pending = self._goals[_key(goal)][1]
+        outcome = await self._counter.conclude(pending, goal.request.task)
+        del self._goals[_key(goal)]
+        result = self._action.Result()
+        self._fill(result, goal.request, outcome)
+        _end(goal, outcome.report.error_code)
+        return result
+
+    def _on_cancel(self, goal: ServerGoalHandle) -> CancelResponse:
+        """Give a goal up, unless its outcome is there."""
+        entry = self._goals.get(_key(goal))
+        if entry is None or entry[1].future.done():
+            return CancelResponse.REJECT
+        self._counter.withdraw(entry[1])
+        return CancelResponse.ACCEPT
+
+    def _send_feedback(self) -> None:
+        """Tell every client where its goal is, also while the solver says nothing new."""
+        for goal, pending in list(self._goals.values()):
+            if not pending.future.done():
+                goal.publish_feedback(_feedback(self._action, pending.ticket))
+
+
+def fill_plan(response: Any, request: Any, outcome: Outcome) -> None:
+    """Enter the outcome of planning a path."""
+    response.report, response.trajectory = outcome.report, outcome.trajectory
+
+
+def fill_search(response: Any, request: Any, outcome: Outcome) -> None:
+    """Enter the outcome of a search for the maximum payload."""
+    fill_plan(response, request, outcome)
+    fill_response(response, outcome.search or search_without_result(request))
+
+
+def _feedback(action: Any, ticket: Ticket) -> Any:
+    progress = ticket.progress
+    return action.Feedback(
+        phase=progress.phase, iteration=int(progress.iteration),
+        residual=float(progress.residual), payload=float(progress.payload),
+        elapsed=duration_message(ticket.elapsed_ns), intervals=int(progress.intervals))
+
+
+def _key(goal: ServerGoalHandle) -> bytes:
+    return bytes(goal.goal_id.uuid)
+
+
+def _end(goal: ServerGoalHandle, code: int) -> None:
+    """Bring a goal to its end state."""
+    if code == PlanReport.NONE:
+        goal.succeed()
+    elif code == PlanReport.CANCELED and goal.is_cancel_requested:
+        goal.canceled()
+    else:
+        goal.abort()

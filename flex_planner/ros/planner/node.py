@@ -1,0 +1,163 @@
+"""The planner node: services and actions that plan, topics that carry the plan to controllers."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.ros.messages.markers import motion_markers
+from flex_planner.ros.messages.plans import duration_seconds
+from flex_planner.ros.planner.diagnostics import Diagnostics, Record
+from flex_planner.ros.planner.endpoints import Counter, Endpoint, fill_plan, fill_search
+from flex_planner.ros.planner.map_starts import Starts
+from flex_planner.ros.planner.recorder import OutcomeRecorder
+from flex_planner.ros.planner.request_planner import Outcome, Planning, unknown_failure
+from flex_planner.ros.planner.request_queue import Desk, Pending, Work
+from flex_planner.ros.planner.streamer import Streamer
+from flex_planner.ros.runtime.parameters import (
+    declare,
+    declare_arm,
+    judge_changes,
+    validated_changes,
+)
+from flex_planner.ros.runtime.running import run_node
+from flex_planner.ros.settings.planner import PlannerSettings
+from flex_planner_interfaces import action
+from flex_planner_interfaces.msg import FlexibleTrajectory, MotionTask
+from flex_planner_interfaces.srv import FindMaxPayload, PlanPath
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from trajectory_msgs.msg import JointTrajectory
+from visualization_msgs.msg import MarkerArray
+
+LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
+                     durability=DurabilityPolicy.TRANSIENT_LOCAL)
+_STOP_TIMEOUT = 0.5
+_SWITCH_INTERVAL = 5e-4  # [s], the solver hands over to callbacks that soon where it can
+
+
+class PlannerNode(Node):  # type: ignore[misc]
+    """
+    Plans motions of one arm on request.
+
+    Services and actions
+    --------------------
+    ~/plan_path : flex_planner_interfaces/srv/PlanPath, flex_planner_interfaces/action/PlanPath
+    ~/find_max_payload : flex_planner_interfaces/srv/FindMaxPayload, .../action/FindMaxPayload
+
+    Topics published
+    ----------------
+    ~/joint_trajectory : trajectory_msgs/msg/JointTrajectory, latched
+    ~/flexible_trajectory : flex_planner_interfaces/msg/FlexibleTrajectory, latched
+    ~/reference_states : sensor_msgs/msg/JointState, along a published plan, by another process
+    ~/markers : visualization_msgs/msg/MarkerArray, latched
+    /diagnostics : diagnostic_msgs/msg/DiagnosticArray
+
+    Raises
+    ------
+    FlexPlannerError
+        If a parameter or the arm's file is wrong.
+
+    """
+
+    def __init__(self) -> None:
+        super().__init__('flex_planner')
+        arm = declare_arm(self)
+        self._settings = declare(self, PlannerSettings.for_arm(arm))
+        self._settings.check_joints(arm.n_joints)
+        self._streamer = Streamer(self)
+        self.add_on_set_parameters_callback(self._judge_parameters)
+        self.add_post_set_parameters_callback(self._apply_parameters)
+        self.get_logger().info(f'preparing the dynamics of {arm.name}')
+        starts = Starts(self._settings.map_store, arm)
+        if self._settings.map_store:
+            self.get_logger().info(f'{len(starts)} motions of {self._settings.map_store} are '
+                                   'there to start from')
+        self._planning = Planning(
+            ArmModel(arm), OutcomeRecorder(arm, self.get_fully_qualified_name()), starts)
+        self._desk = Desk(self._settings.queue_length)
+        self._joints = self.create_publisher(JointTrajectory, '~/joint_trajectory', LATCHED)
+        self._flexible = self.create_publisher(
+            FlexibleTrajectory, '~/flexible_trajectory', LATCHED)
+        self._markers = self.create_publisher(MarkerArray, '~/markers', LATCHED)
+        self._record = Record()
+        self._diagnostics = Diagnostics(self, self._desk, self._record, self._streamer,
+                                        self._joints, arm.name)
+        self._endpoints = self._create_endpoints()
+        self._streamer.wait_until_ready()
+        self.get_logger().info(f'ready to plan for {arm.name}')
+
+    def _create_endpoints(self) -> list[Endpoint]:
+        counter = Counter(self._submit, self._desk.withdraw, self._conclude)
+        plan, search = self._planning.plan, self._planning.find_max_payload
+        return [
+            Endpoint(self, '~/plan_path', (PlanPath, action.PlanPath), counter,
+                     lambda request, ticket: plan(request.task, ticket), fill_plan),
+            Endpoint(self, '~/find_max_payload', (FindMaxPayload, action.FindMaxPayload), counter,
+                     search, fill_search)]
+
+    def _judge_parameters(self, changes: list[Parameter]) -> SetParametersResult:
+        return judge_changes(self._settings, changes)
+
+    def _apply_parameters(self, changes: list[Parameter]) -> None:
+        self._settings = validated_changes(self._settings, changes)
+
+    def _submit(self, work: Work) -> Pending:
+        return self._desk.submit(work, self._settings, self.executor)
+
+    async def _conclude(self, pending: Pending, task: MotionTask) -> Outcome:
+        """Return what a request led to: an exception here would end the node."""
+        try:
+            outcome: Outcome = await pending.future
+            if task.publish and outcome.publishable:
+                self._publish(outcome, pending.ticket.settings)
+        except Exception as error:
+            self.get_logger().error(f'a request failed: {type(error).__name__}: {error}')
+            outcome = unknown_failure(error)
+        self._record.add(outcome.report)
+        self._log(outcome)
+        return outcome
+
+    def _publish(self, outcome: Outcome, settings: PlannerSettings) -> None:
+        """Publish a plan and stream it from now on."""
+        plan, reference = outcome.plan, outcome.reference
+        if plan is None or reference is None:
+            return
+        markers = motion_markers(plan.arm, reference, settings.base_frame)
+        self._joints.publish(outcome.trajectory.joint_trajectory)
+        self._flexible.publish(outcome.trajectory)
+        self._markers.publish(markers)
+        self._streamer.start(plan, reference, settings)
+
+    def _log(self, outcome: Outcome) -> None:
+        report = outcome.report
+        seconds = duration_seconds(report.planning_time)
+        if outcome.publishable:
+            search = outcome.search
+            found = f'maximum payload {search.payload:.6g} kg, ' if search else ''
+            self.get_logger().info(
+                f'{found}planned in {seconds:.2f} s ({report.strategy}): J = {report.cost:.6g}, '
+                f'tip error {report.tip_error * 1e3:.2g} mm, recorded in '
+                f'{report.recording or "-"}')
+        else:
+            self.get_logger().warning(f'error {report.error_code}: {report.error_msg}')
+
+    def destroy_node(self) -> Any:
+        """Stop the streamer and the worker, then the node."""
+        self._streamer.close()
+        if not self._desk.close(_STOP_TIMEOUT):
+            self._planning.abandon()
+        return super().destroy_node()
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the planner node until it is told to stop."""
+    sys.setswitchinterval(_SWITCH_INTERVAL)
+    run_node(PlannerNode, 'flex_planner', args)
+
+
+if __name__ == '__main__':
+    main()

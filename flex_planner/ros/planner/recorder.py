@@ -1,0 +1,140 @@
+"""What the planner node puts into a recording of one request."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import datetime, timezone
+import itertools
+from pathlib import Path
+
+from flex_planner import __version__
+from flex_planner.arms.arm import Arm
+from flex_planner.arms.arm_files import plain_arm
+from flex_planner.base.errors import RecordingError
+from flex_planner.planning.plan import Plan
+from flex_planner.planning.sampling import Reference
+from flex_planner.recording import (
+    DEFAULT,
+    definition_folder,
+    LATCHED,
+    MessageTypes,
+    Recording,
+    Topic,
+)
+from flex_planner.ros.messages.plans import reference_state
+from flex_planner.ros.runtime.parameters import as_mapping
+from flex_planner.ros.settings.planner import PlannerSettings
+from flex_planner_interfaces.msg import (
+    FlexibleTrajectory,
+    MotionTask,
+    PayloadSearch,
+    PlanReport,
+)
+import yaml
+
+
+class OutcomeRecorder:
+    """
+    Writes one recording a request.
+
+    The request comes first, at the time it was accepted; report and trajectories follow when
+    they were ready, then the samples at the times a controller would reach them.
+
+    Parameters
+    ----------
+    arm : Arm
+        Described in an attachment.
+    namespace : str
+        Full name of the node, which the topics start with.
+
+    """
+
+    def __init__(self, arm: Arm, namespace: str) -> None:
+        self._arm = arm
+        self._types = MessageTypes.load([definition_folder('flex_planner_interfaces')])
+        self._numbers = itertools.count(1)
+        interfaces = 'flex_planner_interfaces/msg/'
+        self._task = Topic(f'{namespace}/motion_task', f'{interfaces}MotionTask')
+        self._report = Topic(f'{namespace}/plan_report', f'{interfaces}PlanReport')
+        self._search = Topic(f'{namespace}/payload_search', f'{interfaces}PayloadSearch')
+        self._joints = Topic(f'{namespace}/joint_trajectory',
+                             'trajectory_msgs/msg/JointTrajectory', LATCHED)
+        self._flexible = Topic(f'{namespace}/flexible_trajectory',
+                               f'{interfaces}FlexibleTrajectory', LATCHED)
+        self._states = Topic(f'{namespace}/reference_states', 'sensor_msgs/msg/JointState',
+                             DEFAULT)
+
+    def write(self, settings: PlannerSettings, stamp: int, task: MotionTask, report: PlanReport,
+              trajectory: FlexibleTrajectory, plan: Plan | None, reference: Reference | None,
+              canceled: Callable[[], bool], *, search: PayloadSearch | None = None) -> Path:
+        """
+        Write a recording and return its folder.
+
+        Parameters
+        ----------
+        settings : PlannerSettings
+            Parameters at the request, kept in an attachment; they tell where it goes and from
+            which size on it is split.
+        stamp : int
+            When the request was accepted [ns since 1970].
+        task : MotionTask
+            The request.
+        report : PlanReport
+            Its outcome; the recording's path is entered.
+        trajectory : FlexibleTrajectory
+            The plan as it is published.
+        plan : Plan or None
+            None where none was made.
+        reference : Reference or None
+            Samples of the plan.
+        canceled : callable
+            Returns True once writing should stop, which is an error.
+        search : PayloadSearch, optional
+            Where the request was for a maximum payload; the folder's name says so.
+
+        Raises
+        ------
+        RecordingError
+            If it cannot be written; nothing is left behind then.
+
+        """
+        ready = stamp + report.planning_time.sec * 10**9 + report.planning_time.nanosec
+        path = settings.output_folder() / self._name(stamp, search)
+        report.recording = str(path)
+        with Recording.create(path.parent, path.name, self._types,
+                              custom_data={'flex_planner': __version__},
+                              max_bytes=settings.max_recording_size or None) as recording:
+            recording.attach('scenario.yaml', self._scenario(settings).encode(),
+                             media_type='application/yaml', time_ns=stamp)
+            recording.write(self._task, task, stamp)
+            recording.write(self._report, report, ready)
+            if search is not None:
+                recording.write(self._search, search, ready)
+            if plan is not None and reference is not None:
+                recording.write(self._joints, trajectory.joint_trajectory, ready)
+                recording.write(self._flexible, trajectory, ready)
+                self._write_states(recording, settings, plan, reference, ready, canceled)
+        return path
+
+    def _write_states(self, recording: Recording, settings: PlannerSettings, plan: Plan,
+                      reference: Reference, ready: int, canceled: Callable[[], bool]) -> None:
+        names = [*settings.joint_names, *plan.arm.modal_names]
+        for k, time in enumerate(reference.times_ns):
+            if canceled():
+                raise RecordingError(f'writing stopped after {k} of {len(reference.times_ns)} '
+                                     'samples')
+            stamp = ready + int(time)
+            message = reference_state(plan, reference.samples, k, names, stamp)
+            recording.write(self._states, message, stamp)
+
+    def _name(self, stamp: int, search: PayloadSearch | None) -> str:
+        """Return a name that sorts by kind and time and is not used twice."""
+        kind = 'plan_path' if search is None else 'find_max_payload'
+        moment = datetime.fromtimestamp(stamp // 10**9, timezone.utc)
+        return f'{kind}_{moment:%Y%m%dT%H%M%S}_{stamp % 10**9:09d}_{next(self._numbers):04d}'
+
+    def _scenario(self, settings: PlannerSettings) -> str:
+        """Return arm and parameters as YAML."""
+        text: str = yaml.safe_dump({'arm': plain_arm(self._arm),
+                                    'parameters': dict(as_mapping(settings))}, sort_keys=False)
+        return text

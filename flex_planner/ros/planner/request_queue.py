@@ -1,0 +1,119 @@
+"""Where requests are handed in and their outcomes are waited for, without blocking callbacks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+import threading
+
+from flex_planner.ros.planner.request_planner import busy, canceled, Outcome, unknown_failure
+from flex_planner.ros.planner.request_state import Ticket
+from flex_planner.ros.planner.worker import Job, Worker
+from flex_planner.ros.settings.planner import PlannerSettings
+from rclpy.executors import Executor
+from rclpy.task import Future
+
+Work = Callable[[Ticket], Outcome]
+
+
+class Pending:
+    """
+    A request that was handed in.
+
+    Parameters
+    ----------
+    ticket : Ticket
+        Of the request.
+    executor : Executor
+        Runs what awaits `future`.
+
+    """
+
+    def __init__(self, ticket: Ticket, executor: Executor) -> None:
+        self.ticket, self.future = ticket, Future(executor=executor)
+        self.job: Job | None = None
+        self._executor, self._lock = executor, threading.Lock()
+
+    def conclude(self, outcome: Outcome) -> None:
+        """Set the outcome, unless there is one already; from any thread."""
+        with self._lock:
+            if self.future.done():
+                return
+            self.future.set_result(outcome)
+        # a future that another thread completes does not wake the executor by itself
+        self._executor.wake()
+
+
+class Desk:
+    """
+    Takes requests, one at work and a bounded number waiting.
+
+    Parameters
+    ----------
+    queue_length : int
+        Requests that may wait.
+
+    """
+
+    def __init__(self, queue_length: int) -> None:
+        self._queue_length = queue_length
+        self._worker = Worker(queue_length)
+        self._active: Pending | None = None
+
+    @property
+    def waiting(self) -> int:
+        """How many requests wait."""
+        return self._worker.waiting
+
+    @property
+    def active(self) -> Ticket | None:
+        """Return what is at work, None if nothing is."""
+        active = self._active
+        return active.ticket if active else None
+
+    def submit(self, work: Work, settings: PlannerSettings, executor: Executor) -> Pending:
+        """
+        Hand in a request.
+
+        Parameters
+        ----------
+        work : callable
+            Returns the outcome; runs in the thread of the worker.
+        settings : PlannerSettings
+            To serve it with.
+        executor : Executor
+            Runs what awaits the outcome.
+
+        """
+        ticket = Ticket(settings=settings, stopping=lambda: self._worker.stopping)
+        pending = Pending(ticket, executor)
+        pending.job = partial(self._serve, work, pending)
+        if not self._worker.submit(pending.job):
+            pending.conclude(busy(self._queue_length))
+        return pending
+
+    def withdraw(self, pending: Pending) -> None:
+        """
+        Cancel a request, whose outcome is there at once.
+
+        A solver that works on it gives up at its next iteration.
+
+        """
+        pending.ticket.withdrawn = True
+        if pending.job is not None:
+            self._worker.withdraw(pending.job)
+        pending.conclude(canceled(pending.ticket))
+
+    def close(self, timeout: float) -> bool:
+        """Take no more, tell the one at work to give up, and return whether it did [s]."""
+        return self._worker.stop(timeout)
+
+    def _serve(self, work: Work, pending: Pending) -> None:
+        self._active = pending
+        try:
+            outcome = work(pending.ticket)
+        except Exception as error:
+            outcome = unknown_failure(error)
+        finally:
+            self._active = None
+        pending.conclude(outcome)

@@ -1,0 +1,61 @@
+"""A request on its way through the node."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+import math
+import time
+
+from flex_planner.base.progress import Progress
+from flex_planner.ros.settings.planner import PlannerSettings
+
+_WAITING = Progress(phase='waiting for the requests before', iteration=0, residual=math.inf,
+                    intervals=0)
+
+
+def _never() -> bool:
+    return False
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Ticket:
+    """
+    What a request is served with, how far it is, and whether anyone still waits for it.
+
+    One thread reads it while another one writes.
+
+    Attributes
+    ----------
+    settings : PlannerSettings
+        Parameters when the request was accepted.
+    stopping : callable
+        Returns True once the node ends.
+    accepted_ns, stamp_ns : int
+        When it was accepted, by the monotonic clock and since 1970 [ns].
+    progress : Progress
+        The latest.
+    withdrawn : bool
+        Whether the client has canceled it.
+
+    """
+
+    settings: PlannerSettings
+    stopping: Callable[[], bool] = _never
+    accepted_ns: int = field(default_factory=time.monotonic_ns)
+    stamp_ns: int = field(default_factory=time.time_ns)
+    progress: Progress = _WAITING
+    withdrawn: bool = False
+
+    @property
+    def elapsed_ns(self) -> int:
+        """Time since it was accepted [ns]."""
+        return time.monotonic_ns() - self.accepted_ns
+
+    def canceled(self) -> bool:
+        """Return whether to give up."""
+        return self.withdrawn or self.stopping()
+
+    def report(self, progress: Progress) -> None:
+        """Note how far it is."""
+        self.progress = progress

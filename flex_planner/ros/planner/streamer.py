@@ -1,0 +1,101 @@
+"""The process that streams reference states, as the planner node sees it."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+import pickle
+import signal
+import subprocess
+import sys
+import time
+
+from flex_planner.planning.plan import Plan
+from flex_planner.planning.sampling import Reference
+from flex_planner.ros.reference_states import StreamedPlan
+from flex_planner.ros.settings.planner import PlannerSettings
+from rclpy.node import Node
+
+
+class Streamer:
+    """
+    Streams published plans on ``~/reference_states``.
+
+    A process that died is started again with the next plan; what was left of the one that it
+    streamed is lost.
+
+    Parameters
+    ----------
+    node : Node
+        The planner; its clock stamps the states.
+
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._process = self._started()
+
+    def wait_until_ready(self) -> None:
+        """Wait for the process to be there; it says one word, or ends."""
+        output = self._process.stdout
+        if output is None or not output.readline():
+            self._node.get_logger().error('the process that streams states did not start')
+
+    def start(self, plan: Plan, reference: Reference, settings: PlannerSettings) -> None:
+        """Stream a plan from now on, in place of the one before; that it fails is logged."""
+        samples = reference.samples
+        streamed = StreamedPlan(
+            names=[*settings.joint_names, *plan.arm.modal_names], rate=settings.reference_rate,
+            stamp_ns=self._node.get_clock().now().nanoseconds, began_ns=time.monotonic_ns(),
+            times_ns=reference.times_ns, coordinates=samples.coordinates,
+            rates=samples.rates, accelerations=samples.accelerations, torques=samples.torques)
+        try:
+            self._send(pickle.dumps(streamed))
+        except OSError as error:  # the plan is good all the same, and published
+            self._node.get_logger().error(f'the plan is not streamed: {error}')
+
+    @property
+    def failure(self) -> str:
+        """Return why nothing can be streamed, empty while the process runs."""
+        code = self._process.poll()
+        return '' if code is None else (
+            f'the process that streams ~/reference_states {_end(code)}; it is started again with '
+            'the next plan that is published')
+
+    def close(self) -> None:
+        """Let the process end, which it does by itself when its input does."""
+        for stream in (self._process.stdin, self._process.stdout):
+            with suppress(OSError):
+                if stream is not None:
+                    stream.close()
+
+    def _send(self, data: bytes) -> None:
+        if self._process.poll() is None:
+            with suppress(BrokenPipeError):  # it dies just now
+                self._write(data)
+                return
+        self._node.get_logger().warning(
+            'the process that streams ~/reference_states is gone: it is started again')
+        self.close()
+        self._process = self._started()
+        self._write(data)
+
+    def _write(self, data: bytes) -> None:
+        if self._process.stdin is not None:
+            self._process.stdin.write(data)
+            self._process.stdin.flush()
+
+    def _started(self) -> subprocess.Popen[bytes]:
+        node, topic = self._node, self._node.resolve_topic_name('~/reference_states')
+        return subprocess.Popen(
+            [sys.executable, '-m', 'flex_planner.ros.reference_states',
+             f'{node.get_name()}_states', node.get_namespace(), topic],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+
+
+def _end(code: int) -> str:
+    """Return in words how a process ended that had this exit code."""
+    if code >= 0:
+        return f'has ended with code {code}'
+    with suppress(ValueError):
+        return f'was ended by {signal.Signals(-code).name}'
+    return f'was ended by signal {-code}'

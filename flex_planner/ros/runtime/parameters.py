@@ -1,0 +1,140 @@
+"""Node parameters declared from a dataclass: description, range and flag in one place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, TypeVar
+
+from flex_planner.arms.arm import Arm
+from flex_planner.arms.arm_files import load_arm
+from flex_planner.base.errors import FlexPlannerError, InvalidValueError
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+Settings = TypeVar('Settings')
+
+_DEFAULT_ARM = 'korayem_ei50'
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Description:
+    """What a parameter is for, and which values it takes."""
+
+    text: str
+    lowest: float | None = None
+    highest: float | None = None
+    read_only: bool = False
+
+    def descriptor(self, value: object) -> ParameterDescriptor:
+        """Return the descriptor of a parameter with such a value."""
+        descriptor = ParameterDescriptor(description=self.text, read_only=self.read_only)
+        if self.lowest is None or self.highest is None:
+            return descriptor
+        if isinstance(value, int):
+            descriptor.integer_range = [IntegerRange(
+                from_value=int(self.lowest), to_value=int(self.highest), step=0)]
+        else:
+            descriptor.floating_point_range = [FloatingPointRange(
+                from_value=float(self.lowest), to_value=float(self.highest), step=0.0)]
+        return descriptor
+
+
+def described(default: Any, text: str, *, lowest: float | None = None,
+              highest: float | None = None, read_only: bool = False) -> Any:
+    """Return a dataclass field that is a parameter."""
+    description = Description(text=text, lowest=lowest, highest=highest, read_only=read_only)
+    metadata = {'description': description}
+    if isinstance(default, list):
+        return field(default_factory=lambda: list(default), metadata=metadata)
+    return field(default=default, metadata=metadata)
+
+
+def declare(node: Node, settings: Settings) -> Settings:
+    """
+    Declare every field of a settings dataclass as a parameter.
+
+    Parameters
+    ----------
+    node : Node
+        Where.
+    settings : dataclass
+        Its values are the defaults.
+
+    Returns
+    -------
+    dataclass
+        With the values that the node was started with.
+
+    Raises
+    ------
+    FlexPlannerError
+        If a value is empty or breaks a bound; what rclpy itself checks is a ParameterException.
+
+    """
+    values = {}
+    for entry in fields(settings):  # type: ignore[arg-type]
+        default = getattr(settings, entry.name)
+        description = entry.metadata['description']
+        value = node.declare_parameter(
+            entry.name, default, description.descriptor(default)).value
+        if value is None:  # what rcl makes of an empty list in YAML
+            raise InvalidValueError(entry.name, value, 'a value, or left out')
+        values[entry.name] = _plain(value)
+    return replace(settings, **values)  # type: ignore[type-var]
+
+
+def declare_arm(node: Node) -> Arm:
+    """
+    Declare the read-only parameter ``arm`` and return the arm that it names.
+
+    Raises
+    ------
+    ArmFileError
+        If there is no such arm, or its file is wrong.
+
+    """
+    description = Description(
+        text='Name of a preset in config/arms, or path of an arm file.', read_only=True)
+    name = str(node.declare_parameter('arm', _DEFAULT_ARM, description.descriptor('')).value)
+    return load_arm(name)
+
+
+def validated_changes(settings: Settings, changes: list[Parameter]) -> Settings:
+    """
+    Return the settings with changed parameters; those of others (use_sim_time) are ignored.
+
+    Raises
+    ------
+    FlexPlannerError
+        If the new values do not fit together.
+
+    """
+    known = {entry.name for entry in fields(settings)}  # type: ignore[arg-type]
+    values = {change.name: _plain(change.value) for change in changes if change.name in known}
+    return replace(settings, **values)  # type: ignore[type-var]
+
+
+def judge_changes(settings: Any, changes: list[Parameter]) -> SetParametersResult:
+    """Return whether changed parameters are acceptable, with the reason if not."""
+    try:
+        validated_changes(settings, changes)
+    except FlexPlannerError as error:
+        return SetParametersResult(successful=False, reason=str(error))
+    return SetParametersResult(successful=True)
+
+
+def as_mapping(settings: Any) -> Mapping[str, Any]:
+    """Return settings by parameter name."""
+    return {entry.name: getattr(settings, entry.name) for entry in fields(settings)}
+
+
+def _plain(value: Any) -> Any:
+    """Return a parameter value with arrays as lists."""
+    return list(value) if hasattr(value, 'tolist') or isinstance(value, tuple) else value

@@ -1,0 +1,127 @@
+"""Parameters of the planner node."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+import os
+from pathlib import Path
+
+from flex_planner.arms.arm import Arm
+from flex_planner.base.errors import InvalidSizeError, InvalidValueError
+from flex_planner.base.validation import vector
+from flex_planner.collocation import Settings
+from flex_planner.optimal_control.task import MAX_PAYLOAD
+from flex_planner.planning.sampling import SamplingSettings
+from flex_planner.ros.runtime.parameters import described
+
+# of the largest payload [kg]
+MIN_ACCURACY, MAX_ACCURACY = 1e-6, 1e3
+# of a file of a recording [bytes]: a slip in the unit must not make a file of every message
+MIN_RECORDING_SIZE, MAX_RECORDING_SIZE = 2**16, 2**40
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlannerSettings:
+    """
+    A snapshot of the node's parameters; each request is served with the one at its arrival.
+
+    Raises
+    ------
+    InvalidValueError
+        If a value breaks a bound that a parameter's range cannot express.
+
+    """
+
+    elbow: int = described(
+        -1, 'Sign of the second joint angle, +1 or -1, where a request leaves elbow at 0.',
+        lowest=-1, highest=1)
+    tolerance: float = described(
+        1e-3, 'eps of eq. (17): largest half squared error of the final state.',
+        lowest=1e-9, highest=1.0)
+    allowed_planning_time: float = described(
+        30.0, 'Time limit of a request that sets none [s].', lowest=1e-3, highest=3600.0)
+    effort_weights: list[float] = described(
+        [1.0], 'Diagonal of R where a request gives none: one entry a joint.')
+    payload_accuracy: float = described(
+        1e-3, 'Largest error of a maximum payload where a request gives none [kg].',
+        lowest=MIN_ACCURACY, highest=MAX_ACCURACY)
+    payload_step: float = described(
+        1.0, 'First step of the incremental search for it where a request gives none; where that '
+        'is less than the accuracy, the accuracy counts [kg].',
+        lowest=MIN_ACCURACY, highest=MAX_PAYLOAD)
+    joint_names: list[str] = described(
+        ['joint1'], 'Names of the joints in trajectories, from the base outwards.',
+        read_only=True)
+    base_frame: str = described('base_link', 'Frame of tip paths.', read_only=True)
+    stages: int = described(
+        8, 'Gauss points in a mesh interval; the order is twice that.', lowest=2, highest=11)
+    intervals: int = described(20, 'Intervals of the first mesh.', lowest=4, highest=20000)
+    max_intervals: int = described(
+        2000, 'Most intervals of a mesh.', lowest=4, highest=20000)
+    max_iterations: int = described(
+        60, 'Newton iterations on one mesh.', lowest=1, highest=1000)
+    error_tolerance: float = described(
+        1e-6, 'Largest estimated error of states and costates relative to their magnitude.',
+        lowest=1e-11, highest=1.0)
+    sampling_step: float = described(
+        0.01, 'Longest time between published samples [s].', lowest=2.5e-4, highest=1.0)
+    torque_tolerance: float = described(
+        0.02, 'Samples get closer until linear interpolation of the torque is this exact [N m].',
+        lowest=1e-6, highest=1e6)
+    reference_rate: float = described(
+        100.0, 'States a second that are streamed along a published plan [Hz].', lowest=1.0,
+        highest=1000.0)
+    map_store: str = described(
+        '', 'Store of a map of this arm that flex-planner map has made: requests near one of its '
+        'cells start from the motion there. Empty for none.', read_only=True)
+    queue_length: int = described(
+        8, 'Requests that may wait; more are answered BUSY.', lowest=1, highest=1000,
+        read_only=True)
+    recording_folder: str = described(
+        '', 'Folder of the recordings; empty for $ROS_HOME/flex_planner.', read_only=True)
+    record: bool = described(True, 'Whether to record every request with its outcome.')
+    max_recording_size: int = described(
+        0, 'Size from which on a recording continues in another file, at least 65536 [bytes]; 0: '
+        'recordings are never split.', lowest=0, highest=MAX_RECORDING_SIZE)
+
+    def __post_init__(self) -> None:
+        if self.elbow not in (-1, 1):
+            raise InvalidValueError('elbow', self.elbow, '+1 or -1')
+        vector('effort_weights', self.effort_weights, len(self.joint_names), above=0)
+        if len(set(self.joint_names)) != len(self.joint_names) or '' in self.joint_names:
+            raise InvalidValueError('joint_names', self.joint_names, 'different names')
+        if 0 < self.max_recording_size < MIN_RECORDING_SIZE:
+            raise InvalidValueError('max_recording_size', self.max_recording_size,
+                                    f'0 or at least {MIN_RECORDING_SIZE} bytes')
+        self.solver()
+        self.sampling()
+
+    @classmethod
+    def for_arm(cls, arm: Arm) -> PlannerSettings:
+        """Return the defaults for an arm."""
+        names = [f'joint{i}' for i in range(1, arm.n_joints + 1)]
+        return replace(cls(), joint_names=names, effort_weights=[1.0] * arm.n_joints)
+
+    def check_joints(self, count: int) -> None:
+        """Raise InvalidSizeError unless there is a name for each of the arm's joints."""
+        if len(self.joint_names) != count:
+            raise InvalidSizeError('joint_names', f'{len(self.joint_names)} names',
+                                   f'a list of {count} names')
+
+    def solver(self) -> Settings:
+        """Return the settings of the boundary-value solver."""
+        return Settings(stages=self.stages, intervals=self.intervals,
+                        max_intervals=self.max_intervals, max_iterations=self.max_iterations,
+                        error_tolerance=self.error_tolerance)
+
+    def sampling(self) -> SamplingSettings:
+        """Return how trajectories are sampled."""
+        return SamplingSettings(longest_step=self.sampling_step,
+                                torque_tolerance=self.torque_tolerance)
+
+    def output_folder(self) -> Path:
+        """Return where recordings go."""
+        if self.recording_folder:
+            return Path(self.recording_folder)
+        home = os.environ.get('ROS_HOME') or os.path.join(os.path.expanduser('~'), '.ros')
+        return Path(home) / 'flex_planner'

@@ -1,0 +1,155 @@
+"""
+What planning for flexible links is worth: one task planned in several ways, and carried out.
+
+Every plan is followed by the same flexible arm, which may differ from the planned one. The
+controller samples and holds, as one with hardware would.
+
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from flex_planner.arms.arm import Arm
+from flex_planner.arms.kinematics import tip_position
+from flex_planner.base.progress import Monitor
+from flex_planner.base.validation import Array, number
+from flex_planner.dynamics.arm_dynamics import PlantModel
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.task import Task
+from flex_planner.planning.plan import Plan
+from flex_planner.planning.plan_path import plan_path
+from flex_planner.planning.sampling import (
+    MAX_SAMPLES,
+    Reference,
+    sample_reference,
+    SamplingSettings,
+)
+from flex_planner.planning.strategies.initial_guesses import rigid_problem
+from flex_planner.simulation.execution import carried_out, Outcome, Setting, Way
+from flex_planner.simulation.joint_control import Gains
+from flex_planner.simulation.mismatch import Mismatch
+from flex_planner.simulation.plant import Control
+
+_STIFFNESS, _DAMPING = 100.0, 10.0
+# closer than a controller needs it, so that what is compared is the plans
+_STEP, _TORQUE_TOLERANCE = 2.5e-4, 1e-5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Comparison:
+    """
+    A task carried out in several ways.
+
+    Attributes
+    ----------
+    flexible, rigid : Plan
+        Of the task, and of the same arm made rigid.
+    arm : Arm
+        As simulated.
+    payload_mass : float
+        As simulated [kg].
+    goal : numpy.ndarray, shape (2,)
+        Where the tip is to go [m].
+    settling : float
+        How long the arm is watched after its arrival [s].
+    outcomes : tuple of Outcome
+        In the order of `Way`; without those of a plan that failed.
+
+    """
+
+    flexible: Plan
+    rigid: Plan
+    arm: Arm
+    payload_mass: float
+    goal: Array
+    settling: float
+    outcomes: tuple[Outcome, ...]
+
+    @property
+    def solved(self) -> bool:
+        """Return whether there is a plan for every way."""
+        return self.flexible.solved and self.rigid.solved
+
+    def of(self, way: Way) -> Outcome:
+        """Return one outcome; KeyError if its plan failed."""
+        return {outcome.way: outcome for outcome in self.outcomes}[way]
+
+
+def compare(task: Task, *, model: ArmModel | None = None, mismatch: Mismatch | None = None,
+            payload_mass: float | None = None, gains: Gains | None = None, rate: float = 1000.0,
+            settling: float = 1.0, monitor: Monitor | None = None) -> Comparison:
+    """
+    Plan a task with flexible and with rigid links, and carry out each plan on a flexible arm.
+
+    Parameters
+    ----------
+    task : Task
+        Ends at rest.
+    model : ArmModel, optional
+        Of the task's arm.
+    mismatch : Mismatch, optional
+        What is different about the simulated arm; default: nothing.
+    payload_mass : float, optional
+        That it carries, >= 0 [kg]; default: that of the task.
+    gains : Gains, optional
+        Of the PD; default: 100 N m/rad and 10 N m s/rad.
+    rate : float
+        Of the controller, 10 to 100000 [Hz].
+    settling : float
+        For how long to watch the arm after its arrival, > 0 and at most 1000 [s].
+    monitor : Monitor, optional
+        Receives progress, and may stop it.
+
+    Returns
+    -------
+    Comparison
+        Check `Comparison.solved`.
+
+    Raises
+    ------
+    InvalidValueError, InvalidTaskError
+        Naming what is wrong.
+    RunawayError
+        If the simulated arm gets out of hand.
+    StoppedError
+        If the monitor stopped a simulation.
+
+    """
+    watch = monitor or Monitor()
+    simulated = (mismatch or Mismatch()).applied(task.arm)
+    chosen = gains or Gains.of(task.arm.n_joints, _STIFFNESS, _DAMPING)
+    Control(gains=chosen, rate=rate).check(task.arm.n_joints)
+    number('settling', settling, above=0, at_most=1000, unit='s')
+    carried = number('payload_mass', task.payload_mass if payload_mass is None else payload_mass,
+                     at_least=0, unit='kg')
+    flexible = plan_path(task, model=model, monitor=watch)
+    again = Monitor(time_limit=watch.time_limit - watch.elapsed, canceled=watch.canceled,
+                    report=watch.report)
+    rigid = plan_path(rigid_problem(flexible.problem).task, monitor=again)
+    goal = tip_position(task.arm, flexible.problem.goal[:task.arm.n_coordinates])
+    setting = Setting(model=PlantModel(simulated), gains=chosen, rate=rate, settling=settling,
+                      payload_mass=carried, goal=goal, monitor=watch)
+    return Comparison(flexible=flexible, rigid=rigid, arm=simulated, payload_mass=carried,
+                      goal=goal, settling=settling,
+                      outcomes=_outcomes(flexible, rigid, setting))
+
+
+def _outcomes(flexible: Plan, rigid: Plan, setting: Setting) -> tuple[Outcome, ...]:
+    """Carry out every way whose plan is solved."""
+    references = {plan is rigid: finely_sampled(plan, setting.monitor)
+                  for plan in (flexible, rigid) if plan.solved}
+    plans = {False: flexible, True: rigid}
+    found = []
+    for way in Way:
+        if way.rigid in references:
+            setting.monitor.phase = way.value
+            found.append(carried_out(way, plans[way.rigid], references[way.rigid], setting))
+    return tuple(found)
+
+
+def finely_sampled(plan: Plan, monitor: Monitor) -> Reference:
+    """Return samples as close as they may be."""
+    step = max(_STEP, plan.task.duration / (MAX_SAMPLES - 1))
+    settings = SamplingSettings(longest_step=step, torque_tolerance=_TORQUE_TOLERANCE)
+    return sample_reference(plan, settings, monitor)

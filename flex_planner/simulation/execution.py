@@ -1,0 +1,197 @@
+"""One way to carry out a plan on a simulated flexible arm, and what came of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from flex_planner.arms.kinematics import tip_position
+from flex_planner.base.progress import Monitor
+from flex_planner.base.validation import Array
+from flex_planner.dynamics.arm_dynamics import PlantModel
+from flex_planner.dynamics.statics import equilibrium, residual_vibration
+from flex_planner.planning.plan import Plan
+from flex_planner.planning.sampling import Reference
+from flex_planner.simulation.joint_control import Gains, JointReference
+from flex_planner.simulation.plant import Control, Plant
+from flex_planner.simulation.settling import Residual
+import numpy as np
+
+_SETTLED = 0.1  # of the time after arrival
+
+
+class Way(Enum):
+    """How a task is planned and carried out; the value is shown to people."""
+
+    FLEXIBLE_OPEN = 'flexible plan, torque only'
+    RIGID_OPEN = 'rigid plan, torque only'
+    FLEXIBLE = 'flexible plan, torque and PD'
+    RIGID = 'rigid plan, torque and PD'
+    PD_ONLY = 'flexible plan, PD only'
+
+    @property
+    def rigid(self) -> bool:
+        """Return whether the plan takes the links as rigid."""
+        return self in (Way.RIGID_OPEN, Way.RIGID)
+
+    @property
+    def feedback(self) -> bool:
+        """Return whether the joints are under PD."""
+        return self not in (Way.FLEXIBLE_OPEN, Way.RIGID_OPEN)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Execution:
+    """
+    What the arm did, at every period of the controller from 0.
+
+    Attributes
+    ----------
+    times : numpy.ndarray, shape (k,)
+        Since the motion began [s].
+    coordinates : numpy.ndarray, shape (k, n_t)
+        Of the simulated arm.
+    torques : numpy.ndarray, shape (k, n)
+        Of the motors, over the period that ends there [N m].
+    tip : numpy.ndarray, shape (k, 2)
+        [m].
+
+    """
+
+    times: Array
+    coordinates: Array
+    torques: Array
+    tip: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Outcome:
+    """
+    What came of one way.
+
+    Attributes
+    ----------
+    way : Way
+        Which.
+    arrival : float
+        Planned duration [s].
+    arrival_error : float
+        Distance of the tip from the goal at that time [m].
+    final_error : float
+        The same after settling: the largest over the last tenth of the time [m].
+    bending : float
+        Largest deflection of the links if the joints were locked on arrival [m].
+    residual : Residual
+        Peak-to-peak motion from the arrival to the end; under torque alone nothing stops the
+        joints, and this is mostly how far the arm drifts.
+    tracking_error : float
+        Largest distance of a joint from its own reference up to the arrival [rad].
+    execution : Execution
+        All of it.
+
+    """
+
+    way: Way
+    arrival: float
+    arrival_error: float
+    final_error: float
+    bending: float
+    residual: Residual
+    tracking_error: float
+    execution: Execution
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Setting:
+    """
+    What all ways have in common.
+
+    Attributes
+    ----------
+    model : PlantModel
+        Of the simulated arm.
+    gains : Gains
+        Of the PD.
+    rate : float
+        Of the controller [Hz].
+    payload_mass : float
+        That the arm carries [kg].
+    goal : numpy.ndarray, shape (2,)
+        Of the tip [m].
+    settling : float
+        How long to watch the arm after its arrival [s].
+    monitor : Monitor
+        May stop it.
+
+    """
+
+    model: PlantModel
+    gains: Gains
+    rate: float
+    payload_mass: float
+    goal: Array
+    settling: float
+    monitor: Monitor
+
+
+def carried_out(way: Way, plan: Plan, sampled: Reference, setting: Setting) -> Outcome:
+    """
+    Follow a sampled plan in one way.
+
+    Raises
+    ------
+    RunawayError
+        If the simulated arm gets out of hand.
+    StoppedError
+        If the monitor stopped it.
+
+    """
+    reference, n = JointReference.of(sampled), plan.arm.n_joints
+    gains = setting.gains if way.feedback else Gains.of(n, 0.0, 0.0)
+    plant = Plant(
+        setting.model, Control(gains=gains, rate=setting.rate,
+                               feedforward=way is not Way.PD_ONLY),
+        payload_mass=setting.payload_mass, payload_inertia=plan.task.payload_inertia,
+        positions=plan.task.start_positions)
+    plant.follow(reference)
+    arrival = plan.task.duration
+    execution, bending = _watched(plant, arrival, setting)
+    error = np.linalg.norm(execution.tip - setting.goal, axis=1)
+    after = int(np.ceil(arrival * setting.rate - 1e-6))
+    end = execution.times[-1] - _SETTLED * setting.settling
+    demanded = np.array([reference.motion(time)[0] for time in execution.times[:after + 1]])
+    tracking = np.abs(execution.coordinates[:after + 1, :n] - demanded).max()
+    return Outcome(
+        way=way, arrival=arrival, arrival_error=float(error[after]),
+        final_error=float(error[execution.times >= end].max()), bending=bending,
+        residual=Residual.of(plant.model.arm, execution.coordinates[after:]),
+        tracking_error=float(tracking), execution=execution)
+
+
+def _watched(plant: Plant, arrival: float, setting: Setting) -> tuple[Execution, float]:
+    """Let an arm go; return what it did, and its bending with the joints locked on arrival."""
+    n_t = plant.model.arm.n_coordinates
+    times, states, torques = [0.0], [plant.state], [plant.torque]
+
+    def note(moved: Plant) -> None:
+        setting.monitor.check()
+        times.append(moved.elapsed)
+        states.append(moved.state)
+        torques.append(moved.torque)
+
+    plant.advance(np.ceil(arrival * setting.rate - 1e-6) / setting.rate, note)
+    bending = _bending(plant)
+    plant.advance(arrival + setting.settling, note)
+    coordinates = np.array(states)[:, :n_t]
+    torques[0] = torques[1]
+    return Execution(times=np.array(times), coordinates=coordinates, torques=np.array(torques),
+                     tip=tip_position(plant.model.arm, coordinates)), bending
+
+
+def _bending(plant: Plant) -> float:
+    """Return how far the links would bend if the joints were locked now."""
+    rest, _ = equilibrium(plant.model, plant.joint_state[0], plant.parameters)
+    locked = plant.state.copy()
+    n, n_t = plant.model.arm.n_joints, plant.model.arm.n_coordinates
+    locked[n_t:n_t + n] = 0
+    return residual_vibration(plant.model, locked, rest, plant.parameters)

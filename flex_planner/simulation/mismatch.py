@@ -1,0 +1,74 @@
+"""How a simulated arm differs from the one that a motion was planned for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+from flex_planner.arms.arm import Arm, Joint, Link, MAX_MODES
+from flex_planner.base.validation import Array, integer, number, vector
+import numpy as np
+
+AS_GIVEN = -1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Mismatch:
+    """
+    What is different; by default nothing.
+
+    Parameters
+    ----------
+    modes : int
+        Of every link that has any, 0 (rigid) to 8; -1 leaves them.
+    rigidity_scale : float
+        On E I of every link, 0.001 to 1000.
+    added_friction : array_like, shape (n,)
+        Viscous, of every joint, 0 to 1000 [N m s/rad]; empty for none.
+
+    Raises
+    ------
+    InvalidValueError
+        If a value breaks its bound.
+
+    """
+
+    modes: int = AS_GIVEN
+    rigidity_scale: float = 1.0
+    added_friction: Array = field(default_factory=lambda: np.zeros(0))
+
+    def __post_init__(self) -> None:
+        integer('modes', self.modes, at_least=AS_GIVEN, at_most=MAX_MODES)
+        number('rigidity_scale', self.rigidity_scale, at_least=1e-3, at_most=1e3)
+        given = np.atleast_1d(np.asarray(self.added_friction, dtype=float))
+        object.__setattr__(self, 'added_friction', vector(
+            'added_friction', given, given.size, at_least=0, at_most=1e3, unit='N m s/rad'))
+
+    def applied(self, arm: Arm) -> Arm:
+        """
+        Return the arm that is simulated instead.
+
+        Raises
+        ------
+        InvalidSizeError
+            If the friction has neither one entry a joint nor none.
+
+        """
+        friction = vector('added_friction', self.added_friction, (0, arm.n_joints))
+        added = friction if friction.size else np.zeros(arm.n_joints)
+        return replace(
+            arm, links=tuple(self._link(link) for link in arm.links),
+            joints=tuple(_rubbing(joint, float(more))
+                         for joint, more in zip(arm.joints, added, strict=True)))
+
+    def _link(self, link: Link) -> Link:
+        """Return a link with its own stiffness and number of modes; a rigid one stays."""
+        if not link.modes:
+            return link
+        modes = link.modes if self.modes == AS_GIVEN else self.modes
+        return replace(link, modes=modes,
+                       flexural_rigidity=link.flexural_rigidity * self.rigidity_scale)
+
+
+def _rubbing(joint: Joint, more: float) -> Joint:
+    """Return a joint with more friction."""
+    return replace(joint, viscous_friction=joint.viscous_friction + more)

@@ -1,0 +1,213 @@
+"""
+A simulated arm under a joint controller: feedforward torque and PD, sampled and held.
+
+The controller reads the encoders and holds its torque for a period; the links bend freely
+meanwhile. Knows no ROS and no clock: the caller says how far to go.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from flex_planner.base.errors import FlexPlannerError
+from flex_planner.base.validation import Array, integer, number, vector
+from flex_planner.dynamics.arm_dynamics import PlantModel
+from flex_planner.dynamics.statics import equilibrium
+from flex_planner.optimal_control.arm_model import Parameters
+from flex_planner.simulation.joint_control import (
+    Disturbance,
+    Encoder,
+    Gains,
+    JointReference,
+    JointSensor,
+    MAX_RATE,
+)
+import numpy as np
+
+RTOL, ATOL = 1e-8, 1e-10
+_LONGEST_STEP = 1e-3
+# a period of the controller is not cut finer: the arm must have run away
+_MOST_STEPS = 4096
+# error of a step below which half as many are as good, with a margin: the order is 8
+_EASY = 2.0**-10
+
+
+class RunawayError(FlexPlannerError):
+    """The simulated arm moves so wildly that it cannot be integrated."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Control:
+    """
+    How the joints are driven.
+
+    Parameters
+    ----------
+    gains : Gains
+        Of the PD.
+    rate : float
+        Of the controller, 10 to 100000 [Hz].
+    feedforward : bool
+        Whether the torque of a reference is applied.
+    limit_torques : bool
+        Whether the motors have the limits of eq. (15).
+    encoder : Encoder
+        What the PD sees.
+    disturbance : Disturbance
+        Acts beside the motors.
+
+    Raises
+    ------
+    InvalidValueError
+        If the rate breaks its bound.
+
+    """
+
+    gains: Gains
+    rate: float = 1000.0
+    feedforward: bool = True
+    limit_torques: bool = True
+    encoder: Encoder = Encoder()
+    disturbance: Disturbance = Disturbance()
+
+    def __post_init__(self) -> None:
+        number('rate', self.rate, at_least=10, at_most=MAX_RATE, unit='Hz')
+
+    def check(self, joints: int) -> None:
+        """Raise InvalidValueError unless it fits an arm of so many joints."""
+        for name in ('stiffness', 'damping'):
+            vector(name, getattr(self.gains, name), joints)
+        integer('disturbance_joint', self.disturbance.joint, at_least=0, at_most=joints)
+
+
+class Plant:
+    """
+    The arm, its controller and the present state.
+
+    Parameters
+    ----------
+    model : PlantModel
+        n joints, n_t coordinates.
+    control : Control
+        Of the joints.
+    payload_mass, payload_inertia : float
+        At the tip, >= 0 [kg], [kg m^2].
+    positions : array_like, shape (n,)
+        Joint angles at rest to start from [rad].
+
+    Attributes
+    ----------
+    parameters : Parameters
+        Of the arm, with its payload.
+    state : numpy.ndarray, shape (2 n_t,)
+        x = (q, q').
+    torque : numpy.ndarray, shape (n,)
+        Of the motors, applied last [N m].
+    sensor : JointSensor
+        What the encoders say.
+
+    """
+
+    def __init__(self, model: PlantModel, control: Control, *, payload_mass: float,
+                 positions: Array, payload_inertia: float = 0.0) -> None:
+        n = model.arm.n_joints
+        control.check(n)
+        self.model, self.control, self.period = model, control, 1 / control.rate
+        mass = number('payload_mass', payload_mass, at_least=0, unit='kg')
+        inertia = number('payload_inertia', payload_inertia, at_least=0, unit='kg m^2')
+        parameters = Parameters.of(model.arm, payload_mass=mass, payload_inertia=inertia)
+        rest, self.torque = equilibrium(model, vector('positions', positions, n, unit='rad'),
+                                        parameters)
+        self.state = np.concatenate([rest, np.zeros_like(rest)])
+        self.sensor = JointSensor(control.encoder, rest[:n])
+        self.parameters = parameters
+        self._step = model.step(parameters.stacked(), rtol=RTOL, atol=ATOL)
+        self._fewest = self._steps = int(np.ceil(self.period / _LONGEST_STEP - 1e-9))
+        self._ticks = self._began = 0
+        self._reference = JointReference.hold(rest[:n], self.torque)
+        self._moves = False
+
+    @property
+    def time(self) -> float:
+        """Return the time since the start [s]."""
+        return self._ticks * self.period
+
+    @property
+    def elapsed(self) -> float:
+        """Return the time since the motion began, or since the start [s]."""
+        return (self._ticks - self._began) * self.period
+
+    @property
+    def joint_state(self) -> tuple[Array, Array]:
+        """Return the true joint angles and speeds."""
+        n, n_t = self.model.arm.n_joints, self.model.arm.n_coordinates
+        return self.state[:n], self.state[n_t:n_t + n]
+
+    def follow(self, reference: JointReference) -> None:
+        """Follow a reference from now on."""
+        self._reference, self._began, self._moves = reference, self._ticks, True
+
+    def advance(self, until: float, observe: Callable[[Plant], None] | None = None) -> None:
+        """
+        Go on to a time [s] by whole periods of the controller; the observer is called after each.
+
+        Raises
+        ------
+        RunawayError
+            If the arm cannot be integrated further.
+
+        """
+        while self.time + self.period <= until + 1e-9:
+            self._go_on()
+            if observe is not None:
+                observe(self)
+
+    def _go_on(self) -> None:
+        """Compute a torque, hold it for one period."""
+        begin = self.elapsed
+        self.torque = self._commanded(begin)
+        total = self.torque
+        if self._moves:
+            total = total + self.control.disturbance.mean(begin, begin + self.period, total.size)
+        self.state = self._integrated(total)
+        self._ticks += 1
+        self.sensor.look(self.time, *self.joint_state)
+
+    def _commanded(self, elapsed: float) -> Array:
+        """Return what the motors do for the coming period."""
+        gains, sensor = self.control.gains, self.sensor
+        position, velocity = self._reference.motion(elapsed)
+        torque: Array = (gains.stiffness * (position - sensor.positions)
+                         + gains.damping * (velocity - sensor.speeds))
+        if self.control.feedforward or not self._moves:
+            # a torque that is held for a period is best taken from its middle
+            torque = torque + self._reference.torque(elapsed + self.period / 2)
+        if self.control.limit_torques:
+            lower, upper = self.model.arm.torque_bounds(self.joint_state[1])
+            torque = np.minimum(np.maximum(torque, lower), upper)
+        return torque
+
+    def _integrated(self, torque: Array) -> Array:
+        """Return the state after one period, in as many steps as it takes."""
+        with np.errstate(over='ignore', invalid='ignore'):
+            while self._steps <= _MOST_STEPS:
+                state, error = self._crossed(torque)
+                if error <= 1:
+                    if error < _EASY:
+                        self._steps = max(self._fewest, self._steps // 2)
+                    return state
+                self._steps *= 2
+        raise RunawayError(f'the simulated arm has run away after {self.time:.3f} s: gains that '
+                           'are too high for the rate of the controller, or too much torque')
+
+    def _crossed(self, torque: Array) -> tuple[Array, float]:
+        """Return the state after equal steps, and the error of the worst of them."""
+        state, worst, length = self.state, 0.0, self.period / self._steps
+        for _ in range(self._steps):
+            state, error = self._step(state, torque, length)
+            worst = max(worst, error)
+            if worst > 1:
+                break
+        return state, worst

@@ -1,0 +1,391 @@
+"""The commands that plan: what they print, draw, record and refuse, and how they are stopped."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import dataclass
+import io
+import os
+from pathlib import Path
+import pty
+import re
+import signal
+import subprocess
+import sys
+from typing import Any
+
+from flex_planner.arms.arm import Arm
+from flex_planner.base.progress import Progress
+from flex_planner.cli import main
+from flex_planner.cli.options import with_joined_lists
+from flex_planner.cli.progress_line import Display
+from flex_planner.optimal_control.task import postures_from_points, Task
+from flex_planner.planning.plan_path import plan_path
+from flex_planner.recording import definition_folder, MessageTypes, read_recording
+from flex_planner_interfaces.msg import MotionTask, PayloadSearch, PlanReport
+import pytest
+
+POINTS = ['--from', '0.5,0', '--to', '0.5,0.5']
+WEIGHTS = ['--effort-weights', '0.125,0.125']
+MOTION = [*POINTS, '--duration', '1', *WEIGHTS]
+DRY = ['--no-plot', '--no-recording']
+NODE = '/flex_planner'
+LARGEST = 5.855  # [kg], of the rigid arm, by brute force over 20000 constant torques
+NUMBER = r'[\d.e+-]+'
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a command did."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def rows(self) -> dict[str, str]:
+        """Return the table by its names."""
+        lines = (re.split(' {2,}', line.strip(), maxsplit=1) for line in self.out.splitlines())
+        return {line[0]: line[1] for line in lines if len(line) > 1}
+
+    def number(self, name: str) -> float:
+        """Return the first number in a row of the table."""
+        found = re.match(NUMBER, self.rows[name])
+        assert found is not None
+        return float(found[0])
+
+    @property
+    def reason(self) -> str:
+        """Return the last line on standard error."""
+        return self.err.splitlines()[-1]
+
+
+def run(*arguments: str) -> Outcome:
+    out, err = io.StringIO(), io.StringIO()
+    with redirect_stdout(out), redirect_stderr(err):
+        code = main(arguments)
+    return Outcome(code, out.getvalue(), err.getvalue())
+
+
+def is_picture(path: str) -> bool:
+    return Path(path).read_bytes().startswith(b'\x89PNG\r\n\x1a\n')
+
+
+def recorded(path: str) -> dict[str, Any]:
+    """Return the last message of each topic."""
+    types = MessageTypes.load([definition_folder('flex_planner_interfaces')])
+    return {entry.topic.name.removeprefix(f'{NODE}/'): entry.message
+            for entry in read_recording(path, types)}
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp('cli') / 'new' / 'output'
+
+
+@pytest.fixture(scope='module')
+def planned(folder: Path) -> Outcome:
+    return run('plan', 'korayem_rigid', *MOTION, '--payload', '1', '--output', str(folder),
+               '--no-plot')
+
+
+@pytest.fixture(scope='module')
+def searched(folder: Path) -> Outcome:
+    return run('payload', 'korayem_rigid', *MOTION, '--output', str(folder))
+
+
+@pytest.fixture(scope='module')
+def raised(folder: Path) -> Outcome:
+    return run('payload', 'korayem_rigid', *MOTION, '--output', str(folder), '--payload', '5',
+               '--method', 'incremental', '--step', '0.5', '--accuracy', '0.5', '--no-plot')
+
+
+def test_plan_is_told_with_its_costs_peaks_and_certificate(planned: Outcome,
+                                                           rigid_arm: Arm) -> None:
+    start, goal = postures_from_points(rigid_arm, (0.5, 0), (0.5, 0.5), elbow=-1)
+    plan = plan_path(Task(arm=rigid_arm, start_positions=start, goal_positions=goal, duration=1,
+                          payload_mass=1, effort_weights=[1 / 8, 1 / 8]))
+    assert planned.code == 0
+    assert planned.rows['motion'] == '(0.5, 0) m to (0.5, 0.5) m in 1 s with 1 kg'
+    assert planned.rows['status'] == 'solved and certified'
+    assert 'cold start, ' in planned.rows['planned in']
+    for name, value in (('cost J', plan.cost), ('effort', plan.effort), ('energy', plan.energy)):
+        assert planned.number(name) == pytest.approx(value, rel=1e-5)  # six digits are shown
+    assert 'of no-load speed), peak torque' in planned.rows['joint 2']
+    assert planned.rows['motors on their limit'] == 'never'
+    assert planned.number('re-simulated tip error') < 0.01
+
+
+def test_progress_is_a_line_per_phase(planned: Outcome, searched: Outcome) -> None:
+    for outcome, phase in ((planned, 'cold start'), (searched, 'payload at a rising price')):
+        lines = outcome.err.splitlines()
+        assert all(re.fullmatch(r' *[\d.]+ s  .+', line) for line in lines)
+        phases = [line.split(' s  ')[1] for line in lines]
+        assert phases[:2] == ['preparing the dynamics of Korayem 2009 two-link arm, rigid', phase]
+        assert len(set(phases)) == len(phases)
+
+
+def test_plan_is_recorded(planned: Outcome, folder: Path) -> None:
+    assert Path(planned.rows['recording']).parent == folder / 'recordings'
+    found = recorded(planned.rows['recording'])
+    assert set(found) == {'motion_task', 'plan_report', 'joint_trajectory',
+                          'flexible_trajectory', 'reference_states'}
+    assert found['plan_report'].error_code == PlanReport.NONE
+    assert found['plan_report'].cost == pytest.approx(planned.number('cost J'), rel=1e-5)
+    assert len(found['joint_trajectory'].points) > 100
+    task = found['motion_task']
+    assert (task.space, task.elbow, task.duration) == (MotionTask.CARTESIAN, -1, 1)
+    assert (task.goal_point.x, task.goal_point.y, task.payload_mass) == (0.5, 0.5, 1)
+
+
+def test_largest_payload_is_told_with_its_bracket_and_front(searched: Outcome) -> None:
+    assert searched.code == 0
+    assert searched.number('largest payload') == pytest.approx(LARGEST, abs=2e-3)
+    below, above = re.findall(rf'({NUMBER}) kg', searched.rows['largest payload'])
+    assert 0 < float(above) - float(below) <= 1e-3
+    assert searched.rows['limited by'].startswith('the motor of joint 1, on its limit for 99.')
+    names, *front = [line.split() for line in searched.out.split('\n\n')[1].splitlines()]
+    assert names[-1] == 's/kg]'
+    assert [float(line[0]) for line in front] == sorted(float(line[0]) for line in front)
+    assert float(front[-1][0]) == pytest.approx(float(below), abs=1e-5)
+    assert float(front[-1][1]) == pytest.approx(searched.number('cost J'), rel=1e-5)
+
+
+def test_search_is_drawn_and_recorded(searched: Outcome, folder: Path) -> None:
+    for name, file in (('search', 'max_payload'), ('motion', 'motion')):
+        assert searched.rows[f'picture of the {name}'] == str(folder / f'korayem_rigid_{file}.png')
+        assert is_picture(searched.rows[f'picture of the {name}'])
+    found = recorded(searched.rows['recording'])
+    search = found['payload_search']
+    assert search.method == PayloadSearch.DIRECT
+    assert search.payload == pytest.approx(LARGEST, abs=2e-3)
+    assert found['flexible_trajectory'].payload_mass == search.payload
+    assert (search.payload_accuracy, search.payload_step, search.limiting_joint) == (1e-3, 1, 0)
+    assert len(search.front_payloads) > 1
+
+
+def test_payloads_tried_are_told_and_recorded(raised: Outcome) -> None:
+    assert raised.code == 0
+    assert raised.rows['method'] == 'payload raised step by step'
+    assert raised.rows['largest payload'] == '5.5 kg; 6 kg is too much'
+    trials = [line.split() for line in raised.out.split('\n\n')[1].splitlines()[1:]]
+    assert [line[1:4] for line in trials] == [
+        ['5.500000', '0.500000', 'yes'], ['6.000000', '0.500000', 'no']]
+    search = recorded(raised.rows['recording'])['payload_search']
+    assert list(search.tried_payloads) == [5.5, 6]
+    assert 'picture of the search' not in raised.rows
+
+
+def test_nothing_is_left_beside_pictures_and_recordings(
+        planned: Outcome, searched: Outcome, raised: Outcome, folder: Path) -> None:
+    assert sorted(path.name for path in folder.iterdir()) == [
+        'korayem_rigid_max_payload.png', 'korayem_rigid_motion.png', 'recordings']
+    kinds = sorted(path.name.split('_2')[0] for path in (folder / 'recordings').iterdir())
+    assert kinds == ['find_max_payload', 'find_max_payload', 'plan_path']
+
+
+def test_joint_angles_say_the_same_as_points(planned: Outcome, tmp_path: Path) -> None:
+    outcome = run('plan', 'korayem_rigid', '--from-angles', '60,-120', '--to-angles', '90,-90',
+                  '--duration', '1', *WEIGHTS, '--payload', '1', '--no-plot',
+                  '--output', str(tmp_path))
+    assert outcome.rows['motion'] == '(60, -120) deg to (90, -90) deg in 1 s with 1 kg'
+    assert outcome.rows['cost J'] == planned.rows['cost J']
+    task = recorded(outcome.rows['recording'])['motion_task']
+    assert task.space == MotionTask.JOINT
+    assert task.goal_positions.tolist() == pytest.approx([1.5708, -1.5708], abs=1e-4)
+
+
+def test_nothing_is_written_if_told_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run('plan', 'korayem_rigid', *MOTION, *DRY).code == 0
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize('command', ['plan', 'payload'])
+def test_impossible_payload_is_a_failure_that_is_told_and_recorded(command: str,
+                                                                   tmp_path: Path) -> None:
+    outcome = run(command, 'korayem_rigid', *MOTION, '--payload', '7', '--output', str(tmp_path))
+    assert outcome.code == 1
+    assert outcome.reason.startswith('flex-planner: impossible within the limits of the motors: ')
+    assert 'at most 5.855 kg' in outcome.reason
+    assert outcome.rows['status'] == 'impossible within the limits of the motors'
+    assert 'iterations' in outcome.rows['planned in']
+    report = recorded(outcome.rows['recording'])['plan_report']
+    assert report.error_code == PlanReport.INFEASIBLE
+    assert not list(tmp_path.glob('*.png'))
+
+
+def test_time_limit_is_named_where_it_ends_a_search() -> None:
+    outcome = run('payload', 'korayem_rigid', *MOTION, *DRY, '--time-limit', '0.01')
+    assert outcome.code == 1
+    assert outcome.rows['largest payload'] == 'none found'
+    assert outcome.reason == 'flex-planner: time limit reached: --time-limit is 0.01 s'
+
+
+@pytest.mark.parametrize(('arguments', 'message'), [
+    (['--from', '0.5,0', '--duration', '1'], 'but the command has --from'),
+    (['--duration', '1'], 'but the command has none of them'),
+    ([*MOTION, '--from-angles', '1,2'], 'but the command has --from, --to, --from-angles'),
+    ([*MOTION, '--to', '2,0'], '--to: the point (2, 0) m is 2 m from the base; the arm reaches'),
+    ([*MOTION, '--from', '-1,0'], '--from: the arm is stretched out'),
+    ([*MOTION, '--from', '0.5,zero'], "--from is '0.5,zero', but must be numbers separated by"),
+    ([*MOTION, '--to', '1,2,3'], '--to has 3 numbers, but must be a list of 2 numbers'),
+    ([*MOTION, '--elbow', '2'], '--elbow is 2, but must be +1 or -1'),
+    ([*MOTION, '--duration', '-1'], '--duration is -1.0, but must be a number > 0 and <= 1000 s'),
+    ([*MOTION, '--payload', 'nan'], '--payload is nan, but must be a finite number >= 0'),
+    ([*MOTION, '--payload-inertia', '-1'], '--payload-inertia is -1.0, but must be'),
+    ([*MOTION, '--tolerance', '2'], '--tolerance is 2.0, but must be a number > 0 and <= 1'),
+    ([*MOTION, '--time-limit', '0'], '--time-limit is 0.0, but must be a number > 0'),
+    ([*MOTION, '--effort-weights', '1'], '--effort-weights has 1 numbers, but must be a list of'),
+    ([*MOTION, '--velocity-weights', '-1,0'], '--velocity-weights[0] is -1.0, but must be'),
+    ([*MOTION, '--position-weights', '1,2,3'], '--position-weights has 3 numbers'),
+    (['--from-angles', '0,90', '--to-angles', '0,1e5', '--duration', '1'],
+     '--to-angles[1] is 100000.0, but must be a number >= -5729.58 and <= 5729.58 deg')])
+def test_bad_option_is_answered_by_one_line_that_names_it(arguments: list[str],
+                                                          message: str) -> None:
+    outcome = run('plan', 'korayem_rigid', *arguments, *DRY)
+    assert (outcome.code, outcome.out) == (1, '')
+    assert outcome.err.startswith('flex-planner: ')
+    assert message in outcome.err
+    assert outcome.err.count('\n') == 1
+
+
+def test_joint_limits_are_told_in_radians(tmp_path: Path) -> None:
+    path = tmp_path / 'arm.yaml'
+    path.write_text('name: one\nlinks: [{length: 0.5, mass: 1}]\n'
+                    'joints: [{lower_limit: -1, upper_limit: 1}]\n')
+    outcome = run('plan', str(path), '--from-angles', '0', '--to-angles', '90', '--duration', '1')
+    assert '--to-angles[0] in radians is 1.57' in outcome.err
+    assert 'within the limits of the joint, -1 to 1 rad' in outcome.err
+
+
+@pytest.mark.parametrize(('arguments', 'message'), [
+    (['--accuracy', '0'], '--accuracy is 0.0, but must be a number >= 1e-06'),
+    (['--accuracy', '2', '--step', '1'], '--step is 1.0, but must be a number >= 2')])
+def test_bad_option_of_the_search_is_named(arguments: list[str], message: str) -> None:
+    outcome = run('payload', 'korayem_rigid', *MOTION, *DRY, *arguments)
+    assert (outcome.code, outcome.out) == (1, '')
+    assert message in outcome.reason
+
+
+@pytest.mark.parametrize('arguments', [
+    ['plan'], ['plan', 'korayem_rigid'], ['plan', 'korayem_rigid', *MOTION, '--payload', 'heavy'],
+    ['payload', 'korayem_rigid', *MOTION, '--method', 'guess']])
+def test_wrong_usage_is_told(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(arguments)
+    assert caught.value.code == 2
+    assert 'usage: flex-planner' in capsys.readouterr().err
+
+
+def test_folder_that_cannot_be_written_is_told_before_anything_is_solved(tmp_path: Path) -> None:
+    (tmp_path / 'file').write_text('')
+    outcome = run('plan', 'korayem_rigid', *MOTION, '--output', str(tmp_path / 'file' / 'new'))
+    assert (outcome.code, outcome.out) == (1, '')
+    assert '--output is ' in outcome.err
+    assert f'({tmp_path / "file"}: Not a directory)' in outcome.err
+    assert 'preparing' not in outcome.err
+
+
+def test_lists_may_begin_with_a_minus_sign() -> None:
+    assert with_joined_lists(['plan', 'arm', '--to', '-0.5,0', '--elbow', '-1', '--from=-1,0']) \
+        == ['plan', 'arm', '--to=-0.5,0', '--elbow', '-1', '--from=-1,0']
+    assert run('plan', 'korayem_rigid', '--from', '-.5,0', '--to', '-0.5,-0.5', '--duration',
+               '1.5', *DRY).code == 0
+
+
+def start_long_search(folder: Path) -> subprocess.Popen[str]:
+    """Start a search that takes many seconds, and wait until it is under way."""
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'flex_planner.cli', 'payload', 'korayem_ei50', *MOTION,
+         '--method', 'incremental', '--accuracy', '1e-6', '--output', str(folder / 'new')],
+        text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=folder)
+    assert process.stderr is not None
+    for line in process.stderr:
+        if 'payload raised' in line:
+            break
+    return process
+
+
+@pytest.fixture
+def long_search(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
+    process = start_long_search(tmp_path)
+    yield process
+    process.kill()
+    process.communicate()
+
+
+def test_interrupt_ends_the_search_and_leaves_nothing(long_search: subprocess.Popen[str],
+                                                      tmp_path: Path) -> None:
+    long_search.send_signal(signal.SIGINT)
+    out, err = long_search.communicate(timeout=20)
+    assert (long_search.returncode, out) == (130, '')
+    assert re.fullmatch(r'flex-planner: canceled after [\d.]+ s, in the phase '
+                        r"'payload raised'; nothing is written\n", err)
+    assert not list(tmp_path.iterdir())
+
+
+def test_plan_is_drawn_also_without_ros(tmp_path: Path) -> None:
+    blocked = ['rclpy', 'flex_planner_interfaces', 'geometry_msgs', 'rcl_interfaces']
+    arguments = ['plan', 'korayem_rigid', *MOTION, '--output', str(tmp_path)]
+    result = subprocess.run(
+        [sys.executable, '-c', f'import sys; sys.modules.update(dict.fromkeys({blocked}))\n'
+         f'from flex_planner.cli import main; sys.exit(main({arguments}))'],
+        text=True, capture_output=True, timeout=60, env=dict(os.environ))
+    assert result.returncode == 0
+    assert result.stderr.startswith('flex-planner: nothing will be recorded, which takes ROS 2: ')
+    (picture,) = tmp_path.iterdir()
+    assert picture.name == 'korayem_rigid_motion.png'
+    assert is_picture(str(picture))
+
+
+def test_terminal_shows_one_line_that_is_removed_in_the_end(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    leader, follower = pty.openpty()
+    shown = ''
+    with open(follower, 'w') as stream:
+        display = Display(stream)
+        monkeypatch.setattr(Display, 'elapsed', 1.0)
+        display.begin('some phase')
+        monkeypatch.setattr(Display, 'elapsed', 1.2)
+        for iteration in (7, 8):  # the second comes too soon to be shown
+            display.report(Progress(phase='some phase', iteration=iteration, residual=0.5,
+                                    intervals=20, payload=2.5))
+        display.close()
+        while shown.count('\r\x1b[K') < 3:
+            shown += os.read(leader, 4096).decode()
+    os.close(leader)
+    assert '\n' not in shown
+    assert [state.strip() for state in shown.split('\r\x1b[K')] == [
+        '', '1.0 s  some phase',
+        '1.2 s  some phase, payload 2.5 kg: iteration 7, correction 5.0e-01, 20 inter', '']
+
+
+# Objectives
+
+
+def test_plan_with_a_speed_limit_tells_the_weights_tried(capsys: pytest.CaptureFixture[str],
+                                                         tmp_path: Path) -> None:
+    code = main(['plan', 'korayem_rigid', '--from', '0.5,0', '--to', '0.5,0.5', '--duration', '1',
+                 '--payload', '1', '--effort-weights', '0.125,0.125', '--max-joint-speeds',
+                 '0.8,inf', '--no-plot', '--no-recording', '--output', str(tmp_path)])
+    text = capsys.readouterr().out
+    assert code == 0
+    assert 'objectives                 met by the smallest weights' in text
+    # within the 1 % of the weight, to which the speed answers weakly
+    assert re.search(r'^joint 1 +peak speed 0\.(79\d|800) rad/s', text, re.MULTILINE)
+    assert '    1   joint speeds' in text
+
+
+@pytest.mark.parametrize(('limits', 'text'), [
+    ('0.5,0.5', 'joint speeds: joint 1 reaches 0.61'),
+    ('0.8', '--max-joint-speeds has 1 entries, but must be a list of 2 numbers'),
+    ('0.8,0', '--max-joint-speeds[1] is 0.0, but must be > 0')])
+def test_speed_limit_that_cannot_be_kept_or_read_is_a_failure_with_a_reason(
+        capsys: pytest.CaptureFixture[str], tmp_path: Path, limits: str, text: str) -> None:
+    code = main(['plan', 'korayem_rigid', '--from', '0.5,0', '--to', '0.5,0.5', '--duration', '1',
+                 '--payload', '1', '--effort-weights', '0.125,0.125', '--max-joint-speeds',
+                 limits, '--no-plot', '--no-recording', '--output', str(tmp_path)])
+    assert code == 1
+    assert text in capsys.readouterr().err

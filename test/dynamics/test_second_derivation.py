@@ -1,0 +1,182 @@
+"""
+A second derivation of the dynamics, from positions alone, by automatic differentiation.
+
+Points of the links at Gauss stations are differentiated by autograd: velocities, energies, then
+the Euler-Lagrange equations. No link frame moves, no integral is taken by hand and CasADi is not
+used, so that little but the mode shapes is in common with
+:mod:`flex_planner.dynamics.planar_chain`.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import autograd
+from autograd.differential_operators import make_jvp
+import autograd.numpy as anp
+from flex_planner.arms.arm import Arm, Joint, Link, Node
+from flex_planner.base.validation import Array
+from flex_planner.optimal_control.arm_model import Parameters
+from light_model import LightModel
+import numpy as np
+import pytest
+
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(30)  # exact to rounding for modes 1 to 4
+PAYLOAD, INERTIA = 1.3, 0.07
+
+
+class SecondDerivation:
+    """Energies and Euler-Lagrange equations of an arm."""
+
+    def __init__(self, arm: Arm) -> None:
+        self.arm, ends = arm, [np.array([link.length]) for link in arm.links]
+        shapes = [link.mode_shapes() for link in arm.links]
+        self._stations = [link.length * (NODES + 1) / 2 for link in arm.links]
+        self._shapes = [modes.shape(x) for modes, x in zip(shapes, self._stations, strict=True)]
+        self._bends = [modes.curvature(x) for modes, x in zip(shapes, self._stations, strict=True)]
+        self._tips = [modes.shape(end)[0] for modes, end in zip(shapes, ends, strict=True)]
+        # the slope by a complex step; the frame of a pinned link is its chord, which has none
+        self._slopes = [0 * modes.tip_slope if link.mode_family == 'pinned_pinned'
+                        else modes.shape(end + 1e-20j)[0].imag / 1e-20
+                        for link, modes, end in zip(arm.links, shapes, ends, strict=True)]
+        density = [link.linear_density * link.length / 2 * WEIGHTS for link in arm.links]
+        masses = [node.mass for node in arm.nodes[1:]]
+        masses[-1] += PAYLOAD
+        self._masses = np.concatenate([*density, masses])
+        self._inertias = np.array([node.inertia for node in arm.nodes])
+        self._inertias[-1] += INERTIA
+
+    def places(self, q: Array) -> tuple[Array, Array]:
+        """Return all points with mass (k, 2) and the angles of all nodes (n + 1,)."""
+        angle, base, points, nodes, angles = 0.0, anp.zeros(2), [], [], []
+        for i, part in enumerate(self.arm.modal_slices):
+            angle, bend = angle + q[i], q[part]
+            angles.append(angle)
+            e, normal = (anp.array([anp.cos(angle), anp.sin(angle)]),
+                         anp.array([-anp.sin(angle), anp.cos(angle)]))
+            deflection = anp.dot(self._shapes[i], bend)
+            points.append(base + anp.outer(self._stations[i], e) + anp.outer(deflection, normal))
+            base = base + self.arm.links[i].length * e + anp.dot(self._tips[i], bend) * normal
+            angle = angle + anp.dot(self._slopes[i], bend)
+            nodes.append(base)
+        return anp.concatenate([*points, anp.array(nodes)]), anp.array([*angles, angle])
+
+    def kinetic(self, q: Array, rates: Array) -> Array:
+        velocities = make_jvp(lambda c: self.places(c)[0])(q)(rates)[1]
+        turning = make_jvp(lambda c: self.places(c)[1])(q)(rates)[1]
+        return (anp.dot(self._masses, anp.sum(velocities**2, axis=1))
+                + anp.dot(self._inertias, turning**2)) / 2
+
+    def potential(self, q: Array) -> Array:
+        total = -anp.dot(self._masses, anp.dot(self.places(q)[0], self.arm.gravity))
+        for link, bends, part in zip(self.arm.links, self._bends, self.arm.modal_slices,
+                                     strict=True):
+            if link.modes:
+                curvature = anp.dot(bends, q[part])
+                total += (link.flexural_rigidity * link.length / 4
+                          * anp.dot(WEIGHTS, curvature**2))
+        return total
+
+    def damping(self) -> Array:
+        coefficients = [joint.viscous_friction for joint in self.arm.joints]
+        for link, shapes, bends in zip(self.arm.links, self._shapes, self._bends, strict=True):
+            if link.modes:
+                squares = [link.length / 2 * WEIGHTS @ part**2 for part in (shapes, bends)]
+                product = link.linear_density * link.flexural_rigidity * squares[0] * squares[1]
+                coefficients += [*2 * link.damping_ratio * np.sqrt(product)]
+        return np.array(coefficients)
+
+    def inverse_dynamics(self, q: Array, rates: Array, a: Array) -> Array:
+        """Return d/dt dT/dq' - dT/dq + dV/dq + damping."""
+        momentum: Callable[[Array, Array], Array] = autograd.grad(self.kinetic, 1)
+        change = (autograd.jacobian(momentum, 1)(q, rates) @ a
+                  + autograd.jacobian(momentum, 0)(q, rates) @ rates)
+        force: Array = (change - autograd.grad(self.kinetic, 0)(q, rates)
+                        + autograd.grad(self.potential)(q) + self.damping() * rates)
+        return force
+
+
+def three_links() -> Arm:
+    """Return links of all families, one of them rigid, with everything at every node."""
+    links = (Link(length=0.6, linear_density=4.0, flexural_rigidity=60.0, modes=2,
+                  mode_family='clamped_mass', shape_mass=4.0, shape_inertia=0.4),
+             Link(length=0.5, linear_density=2.0),
+             Link(length=0.4, linear_density=1.0, flexural_rigidity=6.0, modes=3,
+                  mode_family='clamped_free', damping_ratio=0.03))
+    nodes = tuple(Node(mass=0.3 * i, inertia=0.02 + 0.01 * i) for i in range(4))
+    return Arm(name='three', links=links, joints=(Joint(viscous_friction=0.2),) * 3, nodes=nodes,
+               gravity=[1.3, -9.81])
+
+
+def pinned_in_the_middle() -> Arm:
+    """Return four links with the frames of clamped and pinned ones in turn."""
+    clamped = Link(length=0.5, linear_density=2.0, flexural_rigidity=9.0, modes=1,
+                   mode_family='clamped_mass', shape_mass=1.0, shape_inertia=0.1)
+    pinned = Link(length=0.4, linear_density=3.0, flexural_rigidity=7.0, modes=2)
+    return Arm(name='mixed', links=(pinned, clamped, pinned, clamped), joints=(Joint(),) * 4,
+               gravity=[0.0, -9.81])
+
+
+def states(arm: Arm, count: int, seed: int) -> tuple[Array, Array, Array]:
+    """Return coordinates, rates and accelerations."""
+    n, f = arm.n_joints, arm.n_modes
+    random = np.random.default_rng(seed)
+    q, rates, a = (random.uniform(-1, 1, (count, n + f)) * np.repeat(sizes, [n, f])
+                   for sizes in ([np.pi, 0.03], [4.0, 1.0], [20.0, 50.0]))
+    return q, rates, a
+
+
+@pytest.fixture(scope='module', params=['workshop', 'crane', 'three', 'mixed'])
+def arm(request: pytest.FixtureRequest) -> Arm:
+    made = {'three': three_links, 'mixed': pinned_in_the_middle}
+    found: Arm = (made[request.param]() if request.param in made
+                  else request.getfixturevalue(f'{request.param}_arm'))
+    return found
+
+
+def test_energies_and_mass_matrix_agree_with_the_second_derivation(arm: Arm) -> None:
+    second, (q, rates, _) = SecondDerivation(arm), states(arm, 4, 1)
+    p = Parameters.of(arm, payload_mass=PAYLOAD, payload_inertia=INERTIA).stacked()
+    mass, kinetic, potential = LightModel(arm).mass_and_energy(np.hstack([q, rates]), p)
+    for k in range(4):
+        M = autograd.jacobian(autograd.grad(second.kinetic, 1), 1)(q[k], rates[k])
+        # rounding, relative to the largest entry
+        np.testing.assert_allclose(mass[k], M, rtol=0, atol=1e-12 * np.abs(M).max())
+        assert kinetic[k] == pytest.approx(second.kinetic(q[k], rates[k]), rel=1e-12)
+        assert potential[k] == pytest.approx(second.potential(q[k]), rel=1e-11, abs=1e-10)
+
+
+def test_inverse_dynamics_agrees_with_the_second_derivation(arm: Arm) -> None:
+    second, (q, rates, a) = SecondDerivation(arm), states(arm, 4, 2)
+    p = Parameters.of(arm, payload_mass=PAYLOAD, payload_inertia=INERTIA).stacked()
+    found = LightModel(arm).inverse_dynamics(np.hstack([q, rates]), a, p)
+    for k in range(4):
+        expected = second.inverse_dynamics(q[k], rates[k], a[k])
+        # rounding, relative to the largest force
+        np.testing.assert_allclose(found[k], expected, rtol=0,
+                                   atol=1e-11 * np.abs(expected).max())
+
+
+def test_static_forces_agree_with_the_second_derivation(arm: Arm) -> None:
+    second, (q, _, _) = SecondDerivation(arm), states(arm, 4, 3)
+    p = Parameters.of(arm, payload_mass=PAYLOAD, payload_inertia=INERTIA).stacked()
+    force, stiffness = LightModel(arm).static_forces(q, p)
+    for k in range(4):
+        gradient = autograd.grad(second.potential)(q[k])
+        hessian = autograd.jacobian(autograd.grad(second.potential))(q[k])
+        np.testing.assert_allclose(force[k], gradient, rtol=0,
+                                   atol=1e-12 * np.abs(gradient).max())  # rounding
+        np.testing.assert_allclose(stiffness[k], hessian, rtol=0,
+                                   atol=1e-12 * np.abs(hessian).max())
+
+
+def test_compiled_inverse_dynamics_agree_with_the_second_derivation(
+        crane_arm: Arm, crane_model: object) -> None:
+    second, (q, rates, a) = SecondDerivation(crane_arm), states(crane_arm, 4, 4)
+    p = Parameters.of(crane_arm, payload_mass=PAYLOAD, payload_inertia=INERTIA).stacked()
+    found = crane_model.inverse_dynamics(np.hstack([q, rates]), a, p)  # type: ignore
+    for k in range(4):
+        expected = second.inverse_dynamics(q[k], rates[k], a[k])
+        np.testing.assert_allclose(found[k], expected, rtol=0,
+                                   atol=1e-11 * np.abs(expected).max())  # rounding

@@ -1,0 +1,215 @@
+"""Samples of a plan, as a controller gets them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from flex_planner.arms.arm import Arm
+from flex_planner.base.errors import InvalidTaskError, InvalidValueError, NotFiniteError
+from flex_planner.base.progress import Monitor, StoppedError
+from flex_planner.capacity.max_payload import find_max_payload
+from flex_planner.optimal_control.arm_model import ArmModel, Parameters
+from flex_planner.optimal_control.task import Task
+from flex_planner.planning.plan import Plan
+from flex_planner.planning.plan_path import plan_path
+from flex_planner.planning.sampling import (
+    HOLD_DELAY_NS,
+    Reference,
+    sample_reference,
+    SamplingSettings,
+)
+import numpy as np
+import pytest
+
+
+@pytest.fixture(scope='module')
+def flexible(ei50_model: ArmModel, ei50_arm: Arm, paper_task: Any) -> Plan:
+    return plan_path(paper_task(ei50_arm), model=ei50_model)
+
+
+@pytest.fixture(scope='module')
+def hanging(workshop_model: ArmModel, workshop_arm: Arm) -> Plan:
+    """Return a plan under gravity, with friction and unlike links."""
+    task = Task(arm=workshop_arm, start_positions=np.array([-1.5, 0.1]), duration=1.0,
+                goal_positions=np.array([-1.3, 0.3]), payload_mass=0.3)
+    return plan_path(task, model=workshop_model)
+
+
+@pytest.fixture(scope='module')
+def saturated(rigid_model: ArmModel, rigid_arm: Arm, paper_task: Any) -> Plan:
+    """Return the plan with the largest payload: motors change from limit to limit in 4 ms."""
+    plan = find_max_payload(paper_task(rigid_arm), model=rigid_model).plan
+    assert plan is not None
+    return plan
+
+
+@pytest.fixture(params=['flexible', 'hanging', 'saturated'])
+def plan(request: pytest.FixtureRequest) -> Plan:
+    plan: Plan = request.getfixturevalue(request.param)
+    assert plan.solved, plan.message
+    return plan
+
+
+def interpolation_error(plan: Plan, reference: Reference) -> float:
+    """Return the error of linear interpolation on a grid 32 times as fine as the samples."""
+    moving = reference.samples
+    shares = np.linspace(0, 1, 32, endpoint=False)
+    times = (moving.times[:-2, None] + np.diff(moving.times[:-1])[:, None] * shares).ravel()
+    exact = plan.sample(times).torques
+    lines = np.stack([np.interp(times, moving.times[:-1], column[:-1])
+                      for column in moving.torques.T], axis=1)
+    return float(np.abs(lines - exact).max())
+
+
+def test_times_are_integers_that_grow_from_0(plan: Plan) -> None:
+    times = sample_reference(plan, SamplingSettings()).times_ns
+    assert times.dtype == np.int64
+    assert times[0] == 0
+    assert (np.diff(times) > 0).all()
+    assert times[-2] == round(plan.task.duration * 1e9)
+    assert times[-1] - times[-2] == HOLD_DELAY_NS
+
+
+def test_samples_belong_to_their_times(plan: Plan) -> None:
+    reference = sample_reference(plan, SamplingSettings())
+    inner = slice(1, -2)
+    exact = plan.sample(reference.times_ns[inner] * 1e-9)
+    np.testing.assert_allclose(reference.samples.times, reference.times_ns * 1e-9, atol=1e-12)
+    for name in ('coordinates', 'rates', 'accelerations', 'torques', 'velocity_costates', 'tip'):
+        np.testing.assert_allclose(getattr(reference.samples, name)[inner], getattr(exact, name),
+                                   rtol=1e-6, atol=1e-6)
+
+
+def test_motion_starts_and_ends_exactly_at_rest(plan: Plan) -> None:
+    samples = sample_reference(plan, SamplingSettings()).samples
+    n_t = plan.arm.n_coordinates
+    for row, state in ((0, plan.problem.start), (-2, plan.problem.goal), (-1, plan.problem.goal)):
+        assert samples.coordinates[row].tolist() == state[:n_t].tolist()
+        assert not samples.rates[row].any()
+    assert not samples.accelerations[-1].any()
+
+
+def test_last_effort_holds_the_arm(plan: Plan) -> None:
+    samples = sample_reference(plan, SamplingSettings()).samples
+    n, n_t = plan.arm.n_joints, plan.arm.n_coordinates
+    p = Parameters.of(plan.arm, payload_mass=plan.task.payload_mass).stacked()
+    still = np.concatenate([samples.coordinates[-1], np.zeros(n_t)])[None]
+    force = plan.model.inverse_dynamics(still, np.zeros((1, n_t)), p)[0]
+    np.testing.assert_allclose(samples.torques[-1], force[:n], atol=1e-9)
+    # the joints bear the whole load: the links are bent as far as it bends them
+    np.testing.assert_allclose(force[n:], 0, atol=1e-9)
+    assert samples.torques[-1].any() == plan.arm.gravity.any()
+
+
+def test_last_effort_under_gravity_is_not_that_of_the_arrival(hanging: Plan) -> None:
+    torques = sample_reference(hanging, SamplingSettings()).samples.torques
+    assert np.abs(torques[-1] - torques[-2]).max() > 1
+
+
+@pytest.mark.parametrize('tolerance', [0.2, 0.02, 0.002])
+def test_torque_error_bounds_linear_interpolation(plan: Plan, tolerance: float) -> None:
+    reference = sample_reference(plan, SamplingSettings(torque_tolerance=tolerance))
+    assert 0 < reference.torque_error <= tolerance
+    # four probes a step, one of them in the middle, where a parabola is worst
+    assert interpolation_error(plan, reference) <= 1.02 * reference.torque_error
+
+
+def fewest_samples(plan: Plan, longest: float) -> int:
+    """Return the steps between switches, and two samples: where they end, and to hold the arm."""
+    ends = [0.0, *plan.switching_times, 1.0]
+    count = int(np.ceil(np.diff(ends) / longest).sum()) + 2
+    # without switches 102 of 10 ms, 36 of 30 ms
+    assert plan.switching_times.size or count == {0.01: 102, 0.03: 36}[longest]
+    return count
+
+
+def test_tighter_tolerance_gives_more_samples(plan: Plan) -> None:
+    counts = [sample_reference(plan, SamplingSettings(torque_tolerance=tolerance)).times_ns.size
+              for tolerance in (0.5, 0.02, 0.001)]
+    assert counts[0] < counts[1] < counts[2]
+    assert counts[0] == fewest_samples(plan, 0.01)
+
+
+def test_samples_lie_on_switches_and_are_dense_only_where_torques_bend(saturated: Plan) -> None:
+    reference = sample_reference(saturated, SamplingSettings())
+    switches = np.round(saturated.switching_times * 1e9).astype(np.int64)
+    assert switches.size == 6
+    assert np.isin(switches, reference.times_ns).all()
+    steps = np.diff(reference.times_ns)[:-1]
+    assert reference.torque_error <= 0.02
+    assert reference.times_ns.size <= 110
+    assert steps.min() < 2_000_000 < 9_000_000 < steps.max() <= 10_000_000
+    at_limits = reference.samples.torques[np.isin(reference.times_ns, switches)]
+    bounds = saturated.arm.torque_bounds(
+        reference.samples.rates[np.isin(reference.times_ns, switches), :2])
+    nearest = np.abs(np.stack(bounds) - at_limits).min(axis=(0, 2))
+    assert (nearest < 1e-3).all()
+
+
+def test_switches_nearer_than_the_shortest_step_are_one(flexible: Plan) -> None:
+    switches = np.array([1e-4, 0.5, 0.5001, 0.70017, 0.9999])
+    plan = replace(flexible, switching_times=switches)
+    reference = sample_reference(plan, SamplingSettings(torque_tolerance=1e3))
+    assert np.isin([500_000_000, 700_170_000], reference.times_ns).all()
+    assert np.diff(reference.times_ns)[:-1].min() >= 250_000
+
+
+def test_samples_that_are_too_many_are_spent_where_they_matter_most(
+        flexible: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('flex_planner.planning.sampling.MAX_SAMPLES', 130)
+    errors = [sample_reference(flexible, SamplingSettings(torque_tolerance=tolerance))
+              for tolerance in (1e3, 1e-6)]
+    assert [len(reference.times_ns) for reference in errors] == [102, 132]
+    assert errors[1].torque_error < 0.8 * errors[0].torque_error
+
+
+def test_longest_step_is_kept(plan: Plan) -> None:
+    reference = sample_reference(plan, SamplingSettings(longest_step=0.03, torque_tolerance=1e3))
+    assert np.diff(reference.times_ns).max() <= 30_000_000
+    assert reference.times_ns.size == fewest_samples(plan, 0.03)
+
+
+def test_steps_stay_above_a_quarter_of_a_millisecond(flexible: Plan) -> None:
+    reference = sample_reference(flexible, SamplingSettings(torque_tolerance=1e-12))
+    assert np.diff(reference.times_ns)[:-1].min() >= 250_000
+    assert reference.torque_error > 1e-12  # and the truth is told
+
+
+def test_plan_without_solution_has_no_samples(rigid_arm: Arm, rigid_model: ArmModel,
+                                              paper_task: Any) -> None:
+    failed = plan_path(paper_task(rigid_arm, payload_mass=200.0), model=rigid_model)
+    assert not failed.solved
+    with pytest.raises(ValueError, match='the plan has no solution'):
+        sample_reference(failed, SamplingSettings())
+
+
+@pytest.mark.parametrize(('values', 'error', 'text'), [
+    ({'longest_step': 1e-5}, InvalidValueError, 'longest_step is 1e-05'),
+    ({'longest_step': 2.0}, InvalidValueError, 'longest_step is 2.0'),
+    ({'torque_tolerance': 0.0}, InvalidValueError, 'torque_tolerance is 0.0'),
+    ({'torque_tolerance': np.nan}, NotFiniteError, 'torque_tolerance is nan')])
+def test_bad_sampling_settings_are_refused(values: dict[str, float], error: type[Exception],
+                                           text: str) -> None:
+    with pytest.raises(error, match=text):
+        SamplingSettings(**values)
+
+
+def test_more_samples_than_a_message_should_hold_are_refused(flexible: Plan) -> None:
+    task = replace(flexible.task, duration=6.0)
+    with pytest.raises(InvalidTaskError, match='has 24000 samples, but may have 20000'):
+        sample_reference(replace(flexible, task=task), SamplingSettings(longest_step=2.5e-4))
+
+
+def test_sampling_listens_to_the_monitor(flexible: Plan) -> None:
+    with pytest.raises(StoppedError):
+        sample_reference(flexible, SamplingSettings(), Monitor(canceled=lambda: True))
+
+
+@pytest.mark.parametrize('change', [
+    {'goal_velocities': [0.1, 0.0]}, {'goal_position_weights': [1.0, 1.0]}])
+def test_motion_that_does_not_end_at_rest_is_no_reference(flexible: Plan,
+                                                          change: dict[str, Any]) -> None:
+    with pytest.raises(InvalidTaskError, match='does not end at rest'):
+        sample_reference(replace(flexible, task=replace(flexible.task, **change)),
+                         SamplingSettings())

@@ -1,0 +1,261 @@
+"""From messages to tasks and from plans to messages, without a middleware."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import math
+from typing import Any
+
+from flex_planner.arms.arm import Arm, Joint, Link
+from flex_planner.arms.kinematics import tip_position
+from flex_planner.base.errors import (
+    FlexPlannerError,
+    InvalidSizeError,
+    InvalidTaskError,
+    InvalidValueError,
+    NotFiniteError,
+    RecordingError,
+    SingularError,
+    UnreachableError,
+)
+from flex_planner.base.progress import Monitor
+from flex_planner.collocation import Settings
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.planning.plan import Plan, PlanStatus
+from flex_planner.planning.plan_path import plan_path
+from flex_planner.planning.sampling import Reference, sample_reference, SamplingSettings
+from flex_planner.ros.messages.plans import (
+    add_reference,
+    duration_message,
+    error_code,
+    flexible_trajectory,
+    joint_trajectory,
+    planning_time_limit,
+    reference_state,
+    report_from_plan,
+    STATUS_CODES,
+    task_from_message,
+)
+from flex_planner.ros.planner.request_planner import busy, unknown_failure
+from flex_planner.ros.settings.planner import PlannerSettings
+from flex_planner_interfaces.msg import MotionTask, PlanReport
+from geometry_msgs.msg import Point
+import numpy as np
+import pytest
+from ros_support import task
+
+NAMES = ['joint1', 'joint2']
+JOINT_TASK = {'space': MotionTask.JOINT, 'start_positions': [0.1, 0.2],
+              'goal_positions': [0.3, 0.4]}
+NUMBERS = ('cost', 'effort', 'energy', 'collocation_residual', 'boundary_error',
+           'hamiltonian_drift', 'tip_error', 'residual_vibration', 'torque_interpolation_error')
+
+
+@pytest.fixture(scope='module')
+def settings(ei50_arm: Arm) -> PlannerSettings:
+    return replace(PlannerSettings.for_arm(ei50_arm), effort_weights=[0.25, 0.5], tolerance=2e-4,
+                   elbow=1, allowed_planning_time=7.0)
+
+
+@pytest.fixture(scope='module')
+def plan(ei50_arm: Arm, ei50_model: ArmModel, paper_task: Any) -> Plan:
+    return plan_path(paper_task(ei50_arm), model=ei50_model)
+
+
+@pytest.fixture(scope='module')
+def reference(plan: Plan) -> Reference:
+    return sample_reference(plan, SamplingSettings())
+
+
+# Messages to tasks
+
+
+def test_empty_fields_take_the_defaults_of_the_parameters(ei50_arm: Arm,
+                                                          settings: PlannerSettings) -> None:
+    message = MotionTask(**JOINT_TASK, duration=2.0)
+    made = task_from_message(message, ei50_arm, settings)
+    assert made.effort_weights.tolist() == [0.25, 0.5]
+    assert made.position_weights.tolist() == made.velocity_weights.tolist() == [0.0] * 6
+    assert made.tolerance == 2e-4
+    assert made.payload_mass == 0.0
+    assert planning_time_limit(message, settings) == 7.0
+
+
+def test_fields_that_are_given_count(ei50_arm: Arm, settings: PlannerSettings) -> None:
+    message = MotionTask(**JOINT_TASK, duration=2.0, payload_mass=0.7, effort_weights=[2.0, 3.0],
+                         position_weights=[1.0] * 6, velocity_weights=[4.0, 5.0],
+                         tolerance=1e-5, allowed_planning_time=0.5)
+    made = task_from_message(message, ei50_arm, settings)
+    assert made.start_positions.tolist() == [0.1, 0.2]
+    assert made.goal_positions.tolist() == [0.3, 0.4]
+    assert (made.duration, made.payload_mass, made.tolerance) == (2.0, 0.7, 1e-5)
+    assert made.effort_weights.tolist() == [2.0, 3.0]
+    assert made.position_weights.tolist() == [1.0] * 6
+    assert made.velocity_weights.tolist() == [4.0, 5.0, 0.0, 0.0, 0.0, 0.0]
+    assert planning_time_limit(message, settings) == 0.5
+
+
+@pytest.mark.parametrize(('elbow', 'sign'), [(-1, -1), (1, 1), (0, 1)])
+def test_points_become_joint_angles_of_the_branch(ei50_arm: Arm, settings: PlannerSettings,
+                                                  elbow: int, sign: int) -> None:
+    made = task_from_message(task(elbow=elbow), ei50_arm, settings)
+    assert np.sign([made.start_positions[1], made.goal_positions[1]]).tolist() == [sign, sign]
+
+
+@pytest.mark.parametrize(('fields', 'error', 'text'), [
+    ({'space': 7}, InvalidValueError, 'space is 7, but must be 0'),
+    ({'elbow': -2}, InvalidValueError, 'elbow is -2'),
+    ({'tolerance': 1.01}, InvalidValueError, 'tolerance is 1.01'),
+    ({'duration': math.inf}, NotFiniteError, 'duration is inf'),
+    ({'effort_weights': [1.0] * 3}, InvalidSizeError, 'effort_weights'),
+    ({'goal_point': Point(x=3.0)}, UnreachableError, 'goal_point: '),
+    ({'goal_point': Point(x=1.0)}, SingularError, 'goal_point: ')])
+def test_bad_message_raises_with_the_name_of_its_field(ei50_arm: Arm, text: str,
+                                                       settings: PlannerSettings,
+                                                       fields: dict[str, Any],
+                                                       error: type[FlexPlannerError]) -> None:
+    with pytest.raises(error, match=text) as caught:
+        task_from_message(task(**fields), ei50_arm, settings)
+    assert type(caught.value) is error
+
+
+def test_points_determine_the_postures_of_three_links_too() -> None:
+    link = Link(length=0.3, linear_density=1.0)
+    arm = Arm(name='three', links=(link,) * 3, joints=(Joint(),) * 3)
+    made = task_from_message(task(effort_weights=[]), arm, PlannerSettings.for_arm(arm))
+    tips = tip_position(arm, np.stack([made.start_positions, made.goal_positions]))
+    np.testing.assert_allclose(tips, [[0.5, 0.0], [0.5, 0.5]], atol=1e-9)  # of the search
+
+
+@pytest.mark.parametrize('value', [-1.0, 3601.0, math.nan])
+def test_bad_time_limit_is_refused(settings: PlannerSettings, value: float) -> None:
+    with pytest.raises(InvalidValueError, match='allowed_planning_time'):
+        planning_time_limit(task(allowed_planning_time=value), settings)
+
+
+# Errors and failed plans
+
+
+@pytest.mark.parametrize(('error', 'code'), [
+    (InvalidSizeError('a', 1, '2'), PlanReport.INVALID_SIZE),
+    (NotFiniteError('a', 1, '2'), PlanReport.NOT_FINITE),
+    (InvalidValueError('a', 1, '2'), PlanReport.OUT_OF_RANGE),
+    (InvalidTaskError('a'), PlanReport.INVALID_TASK),
+    (UnreachableError('a'), PlanReport.UNREACHABLE),
+    (SingularError('a'), PlanReport.SINGULAR),
+    (RecordingError('a'), PlanReport.UNKNOWN),
+    (FlexPlannerError('a'), PlanReport.UNKNOWN),
+    (ZeroDivisionError('a'), PlanReport.UNKNOWN)])
+def test_every_error_has_its_code(error: Exception, code: int) -> None:
+    assert error_code(error) == code
+
+
+def test_every_status_has_its_code() -> None:
+    assert set(STATUS_CODES) == set(PlanStatus)
+    assert len(set(STATUS_CODES.values())) == len(PlanStatus)
+
+
+def test_report_of_a_failed_plan_is_infinite_and_says_why(rigid_arm: Arm, rigid_model: ArmModel,
+                                                          paper_task: Any) -> None:
+    settings = Settings(stages=2, intervals=4, max_intervals=4, error_tolerance=1e-11)
+    failed = plan_path(paper_task(rigid_arm), model=rigid_model, settings=settings)
+    report = report_from_plan(failed)
+    assert report.error_code == PlanReport.NOT_CONVERGED
+    assert report.error_msg.startswith('not converged, which does not show that the motion is ')
+    assert {getattr(report, name) for name in NUMBERS} == {math.inf}
+    assert report.iterations == failed.iterations > 0
+    assert report.mesh_intervals == 0
+    assert not (report.peak_torques or report.peak_speeds or report.recording)
+
+
+def test_report_of_an_impossible_motion_names_the_limit(rigid_arm: Arm, rigid_model: ArmModel,
+                                                        paper_task: Any) -> None:
+    report = report_from_plan(plan_path(paper_task(rigid_arm, payload_mass=200.0),
+                                        model=rigid_model))
+    assert report.error_code == PlanReport.INFEASIBLE
+    assert 'carries at most 5.855 kg' in report.error_msg
+    assert report.cost == math.inf
+
+
+@pytest.mark.parametrize(('monitor', 'code', 'word'), [
+    (Monitor(time_limit=0.0), PlanReport.TIMEOUT, 'time limit'),
+    (Monitor(canceled=lambda: True), PlanReport.CANCELED, 'canceled')])
+def test_report_of_a_stopped_plan_has_its_own_code(rigid_arm: Arm, rigid_model: ArmModel,
+                                                   paper_task: Any, monitor: Monitor, code: int,
+                                                   word: str) -> None:
+    report = report_from_plan(plan_path(paper_task(rigid_arm), model=rigid_model,
+                                        monitor=monitor))
+    assert report.error_code == code
+    assert word in report.error_msg
+    assert report.cost == math.inf
+
+
+def test_outcomes_without_a_plan_are_not_publishable() -> None:
+    for outcome, code, word in (
+            (busy(3), PlanReport.BUSY, '3 requests are waiting'),
+            (unknown_failure(KeyError('x')), PlanReport.UNKNOWN, "KeyError: 'x'")):
+        assert not outcome.publishable
+        assert outcome.report.error_code == code
+        assert word in outcome.report.error_msg
+        assert {getattr(outcome.report, name) for name in NUMBERS} == {math.inf}
+
+
+# Plans to messages
+
+
+def test_report_of_a_plan_repeats_its_numbers(plan: Plan, reference: Reference) -> None:
+    report = report_from_plan(plan)
+    add_reference(report, plan, reference)
+    assert (report.error_code, report.error_msg) == (PlanReport.NONE, '')
+    assert (report.cost, report.effort, report.energy) == (plan.cost, plan.effort, plan.energy)
+    assert report.tip_error == plan.certificate.tip_error
+    assert report.residual_vibration == plan.certificate.residual_vibration
+    assert (report.iterations, report.mesh_intervals) == (plan.iterations, plan.mesh_intervals)
+    assert report.torque_interpolation_error == reference.torque_error
+    assert list(report.peak_torques) == np.abs(reference.samples.torques).max(axis=0).tolist()
+    assert all(0 < share < 1 for share in report.peak_torque_shares)
+
+
+def test_speed_shares_are_left_out_without_a_speed_limit(ei50_arm: Arm, paper_task: Any) -> None:
+    free = replace(ei50_arm, joints=(Joint(), Joint())).rigid()
+    free_plan = plan_path(paper_task(free))
+    report = report_from_plan(free_plan)
+    add_reference(report, free_plan, sample_reference(free_plan, SamplingSettings()))
+    assert len(report.peak_speeds) == 2
+    assert list(report.peak_speed_shares) == []
+    assert list(report.peak_torque_shares) == [0.0, 0.0]
+
+
+def test_messages_hold_the_samples(plan: Plan, reference: Reference) -> None:
+    joints = joint_trajectory(reference, NAMES)
+    message = flexible_trajectory(plan, reference, joints, 'base')
+    samples, k = reference.samples, 37
+    point, bend = joints.points[k], message.points[k]
+    assert point.time_from_start == bend.time_from_start
+    assert [*point.positions, *bend.modal_displacements] == samples.coordinates[k].tolist()
+    assert [*point.velocities, *bend.modal_rates] == samples.rates[k].tolist()
+    assert point.accelerations.tolist() == samples.accelerations[k, :2].tolist()
+    assert point.effort.tolist() == samples.torques[k].tolist()
+    assert bend.position_costates.tolist() == samples.position_costates[k].tolist()
+    assert bend.velocity_costates.tolist() == samples.velocity_costates[k].tolist()
+    assert (message.tip_path[k].x, message.tip_path[k].y) == tuple(samples.tip[k])
+    assert (message.header.frame_id, message.payload_mass) == ('base', 1.0)
+
+
+def test_reference_state_has_joints_and_modes(plan: Plan, reference: Reference) -> None:
+    names = [*NAMES, *plan.arm.modal_names]
+    state = reference_state(plan, reference.samples, 5, names, 1_700_000_000_123_456_789)
+    assert (state.header.stamp.sec, state.header.stamp.nanosec) == (1_700_000_000, 123_456_789)
+    assert state.name == names
+    assert state.position.tolist() == reference.samples.coordinates[5].tolist()
+    assert state.effort.tolist() == [*reference.samples.torques[5], 0, 0, 0, 0]
+
+
+@pytest.mark.parametrize(('nanoseconds', 'expected'), [
+    (0, (0, 0)), (1, (0, 1)), (999_999_999, (0, 999_999_999)), (10**9, (1, 0)),
+    (np.int64(1_000_000_001_000), (1000, 1000)), (-1, (-1, 999_999_999)),
+    ((2**31 - 1) * 10**9 + 999_999_999, (2**31 - 1, 999_999_999))])
+def test_durations_are_exact(nanoseconds: int, expected: tuple[int, int]) -> None:
+    message = duration_message(nanoseconds)
+    assert (message.sec, message.nanosec) == expected
+    assert type(message.sec) is type(message.nanosec) is int

@@ -1,0 +1,247 @@
+"""The part of the node that runs in its worker thread: searches, and work that is stopped."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import math
+from pathlib import Path
+import threading
+from typing import Any
+
+from flex_planner.arms.arm import Arm, Joint
+from flex_planner.base.progress import StoppedError, StopReason
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.ros.planner import request_planner
+from flex_planner.ros.planner.recorder import OutcomeRecorder
+from flex_planner.ros.planner.request_planner import Outcome, Planning
+from flex_planner.ros.planner.request_state import Ticket
+from flex_planner.ros.settings.planner import PlannerSettings
+from flex_planner_interfaces.msg import PayloadSearch, PlanReport
+import pytest
+from ros_support import search_request, task
+
+
+@pytest.fixture
+def worker(rigid_arm: Arm, rigid_model: ArmModel) -> Planning:
+    return Planning(rigid_model, OutcomeRecorder(rigid_arm, '/flex_planner'))
+
+
+@pytest.fixture
+def settings(rigid_arm: Arm, tmp_path: Path) -> PlannerSettings:
+    return replace(PlannerSettings.for_arm(rigid_arm), recording_folder=str(tmp_path))
+
+
+@pytest.mark.parametrize(('reason', 'code'), [
+    (StopReason.TIMEOUT, PlanReport.TIMEOUT), (StopReason.CANCELED, PlanReport.CANCELED)])
+def test_stop_after_the_solve_is_reported_without_a_trajectory(
+        worker: Planning, settings: PlannerSettings, monkeypatch: pytest.MonkeyPatch,
+        reason: StopReason, code: int) -> None:
+    def stopped(*arguments: Any) -> None:
+        raise StoppedError(reason)
+
+    monkeypatch.setattr(request_planner, 'sample_reference', stopped)
+    outcome = worker.plan(task(), Ticket(settings=settings))
+    assert (outcome.report.error_code, outcome.report.error_msg) == (code, reason.value)
+    assert not outcome.trajectory.points
+    assert not outcome.publishable
+
+
+def test_recording_that_is_told_to_stop_leaves_nothing_and_is_not_published(
+        worker: Planning, settings: PlannerSettings, tmp_path: Path,
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    told = []  # once the samples are made, everyone is told to stop
+    sample = request_planner.sample_reference
+
+    def sampled(*arguments: Any) -> Any:
+        reference = sample(*arguments)
+        told.append(True)
+        return reference
+
+    monkeypatch.setattr(request_planner, 'sample_reference', sampled)
+    outcome = worker.plan(task(), Ticket(settings=settings, stopping=lambda: bool(told)))
+    assert outcome.report.error_code == PlanReport.RECORDING_FAILED
+    assert 'writing stopped after 0 of' in outcome.report.error_msg
+    assert outcome.report.recording == ''
+    assert not outcome.publishable
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_recording_that_is_abandoned_leaves_nothing(
+        worker: Planning, settings: PlannerSettings, tmp_path: Path,
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    reached, go_on = threading.Event(), threading.Event()
+
+    def stuck(*arguments: Any) -> None:
+        reached.set()
+        go_on.wait(10)
+
+    monkeypatch.setattr(OutcomeRecorder, '_write_states', stuck)
+    thread = threading.Thread(target=worker.plan, args=(task(), Ticket(settings=settings)))
+    thread.start()
+    assert reached.wait(20)
+    (stage,) = tmp_path.iterdir()
+    assert stage.name.startswith('.plan_path_')
+    worker.abandon()
+    assert list(tmp_path.iterdir()) == []
+    go_on.set()
+    thread.join(10)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_client_that_gives_up_is_recorded_as_canceled(
+        worker: Planning, settings: PlannerSettings, tmp_path: Path) -> None:
+    outcome = worker.plan(task(), Ticket(settings=settings, withdrawn=True))
+    assert outcome.report.error_code == PlanReport.CANCELED
+    assert [str(path) for path in tmp_path.iterdir()] == [outcome.report.recording]
+
+
+def test_ticket_tells_how_far_a_plan_is(worker: Planning, settings: PlannerSettings) -> None:
+    ticket = Ticket(settings=replace(settings, record=False))
+    assert ticket.progress.iteration == 0
+    outcome = worker.plan(task(), ticket)
+    assert ticket.progress.iteration == outcome.report.iterations > 0
+    assert ticket.progress.payload == 1.0
+    assert ticket.progress.intervals == outcome.report.mesh_intervals
+
+
+# The maximum payload
+
+
+MOST = 5.855  # [kg], of the rigid arm in the paper's motion
+MOST_EI5 = 5.742  # [kg], with links of 5 N m^2
+ACCURACY = 2e-3  # [kg], of both, and twice the default of a request
+
+
+def search(worker: Planning, settings: PlannerSettings, **fields: Any) -> Outcome:
+    """Ask for the maximum payload of the motion of the paper with some fields changed."""
+    return worker.find_max_payload(search_request(**fields), Ticket(settings=settings))
+
+
+def check_failure(outcome: Outcome, code: int, text: str) -> None:
+    """Require that a search failed with a reason, and left nothing to go by."""
+    assert (outcome.report.error_code, outcome.publishable) == (code, False)
+    assert text in outcome.report.error_msg
+    assert outcome.search is not None
+    assert (outcome.search.payload, outcome.search.payload_upper) == (0.0, math.inf)
+    assert outcome.search.limiting_joint == -1
+    assert not outcome.trajectory.points
+    assert outcome.report.recording
+
+
+def test_direct_search_finds_the_maximum_payload_and_its_motion(
+        worker: Planning, settings: PlannerSettings) -> None:
+    outcome = search(worker, settings)
+    report, found = outcome.report, outcome.search
+    assert outcome.publishable
+    assert found is not None
+    assert found.payload == pytest.approx(MOST, abs=ACCURACY)
+    assert found.payload < found.payload_upper <= found.payload + settings.payload_accuracy
+    assert (found.method, found.limiting_joint, found.held) == (PayloadSearch.DIRECT, 0, False)
+    assert outcome.trajectory.payload_mass == found.payload
+    assert report.tip_error < 1e-5
+    assert max(report.peak_torque_shares) == pytest.approx(1, abs=1e-6)  # the limit is used up
+    assert report.saturation[0] > 0.9
+
+
+def test_flexible_arm_carries_less(ei5_model: ArmModel, settings: PlannerSettings) -> None:
+    worker = Planning(ei5_model, OutcomeRecorder(ei5_model.arm, '/flex_planner'))
+    outcome = search(worker, settings)
+    assert outcome.report.error_code == PlanReport.NONE
+    assert outcome.search is not None
+    assert outcome.search.payload == pytest.approx(MOST_EI5, abs=ACCURACY)
+    assert len(outcome.trajectory.modal_names) == 4
+
+
+def test_incremental_search_takes_the_steps_of_the_request(worker: Planning,
+                                                           settings: PlannerSettings) -> None:
+    outcome = search(worker, settings, method=PayloadSearch.INCREMENTAL, payload_mass=5.0,
+                     payload_accuracy=0.3, payload_step=0.5)
+    assert outcome.publishable
+    assert outcome.search is not None
+    assert outcome.search.tried_payloads.tolist() == [5.5, 6.0, 5.75]
+    assert outcome.search.tried_solved == [True, False, True]
+    assert (outcome.search.payload, outcome.search.payload_upper) == (5.75, 6.0)
+    assert outcome.trajectory.payload_mass == 5.75
+
+
+def test_parameters_decide_where_the_request_does_not(worker: Planning,
+                                                      settings: PlannerSettings) -> None:
+    coarse = replace(settings, payload_accuracy=0.1, payload_step=0.9, record=False)
+    found = search(worker, coarse).search
+    assert found is not None
+    assert (found.payload_accuracy, found.payload_step) == (0.1, 0.9)
+    assert 10 * settings.payload_accuracy < found.payload_upper - found.payload <= 0.1
+
+
+def test_search_from_more_than_the_maximum_is_infeasible(worker: Planning,
+                                                         settings: PlannerSettings) -> None:
+    outcome = search(worker, settings, payload_mass=7.0)
+    check_failure(outcome, PlanReport.INFEASIBLE,
+                  'the arm carries at most 5.855 kg from start to goal in 1 s, and 7 kg were ask')
+
+
+@pytest.mark.parametrize(('fields', 'code', 'text'), [
+    ({'method': 2}, PlanReport.OUT_OF_RANGE, 'method is 2, but must be'),
+    ({'payload_accuracy': 1e-7}, PlanReport.OUT_OF_RANGE, 'payload_accuracy is 1e-07, but must'),
+    ({'payload_accuracy': math.nan}, PlanReport.NOT_FINITE, 'payload_accuracy is nan, but must'),
+    ({'payload_step': 1e-4}, PlanReport.OUT_OF_RANGE, 'payload_step is 0.0001, but must be'),
+    ({'payload_step': math.inf}, PlanReport.NOT_FINITE, 'payload_step is inf, but must be'),
+    ({'payload_mass': math.nan}, PlanReport.NOT_FINITE, 'payload_mass is nan, but must be'),
+    ({'effort_weights': [1.0]}, PlanReport.INVALID_SIZE, 'effort_weights has 1 numbers, but'),
+    ({'allowed_planning_time': 1e-9}, PlanReport.TIMEOUT, 'time limit reached'),
+])
+def test_search_that_cannot_be_done_says_why(worker: Planning, settings: PlannerSettings,
+                                             fields: dict[str, Any], code: int,
+                                             text: str) -> None:
+    check_failure(search(worker, settings, **fields), code, text)
+
+
+@pytest.mark.parametrize('method', [PayloadSearch.DIRECT, PayloadSearch.INCREMENTAL])
+@pytest.mark.parametrize('looks', [0, 8])
+def test_search_is_canceled_before_and_while_it_is_at_work(
+        worker: Planning, settings: PlannerSettings, method: int, looks: int) -> None:
+    left = iter(range(looks))
+    ticket = Ticket(settings=replace(settings, record=False),
+                    stopping=lambda: next(left, None) is None)
+    outcome = worker.find_max_payload(search_request(method=method), ticket)
+    assert (outcome.report.error_code, outcome.publishable) == (PlanReport.CANCELED, False)
+    assert 0 <= outcome.report.iterations <= looks
+    assert bool(outcome.report.iterations) == bool(looks)
+    assert outcome.search is not None
+    assert outcome.search.payload == 0.0
+
+
+def test_arm_whose_motors_have_no_limit_has_no_maximum_payload(
+        rigid_arm: Arm, settings: PlannerSettings) -> None:
+    free = replace(rigid_arm, joints=(Joint(), Joint()))
+    outcome = search(Planning(ArmModel(free), OutcomeRecorder(free, '/flex_planner')), settings)
+    check_failure(outcome, PlanReport.INVALID_TASK, 'no motor of the arm has a stall torque')
+
+
+def test_search_that_is_stopped_after_the_solve_has_no_payload(
+        worker: Planning, settings: PlannerSettings, monkeypatch: pytest.MonkeyPatch) -> None:
+    def stopped(*arguments: Any) -> None:
+        raise StoppedError(StopReason.TIMEOUT)
+
+    monkeypatch.setattr(request_planner, 'sample_reference', stopped)
+    check_failure(search(worker, settings), PlanReport.TIMEOUT, StopReason.TIMEOUT.value)
+
+
+def test_search_that_breaks_is_reported_as_unknown(
+        worker: Planning, settings: PlannerSettings, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*arguments: Any, **options: Any) -> None:
+        raise ZeroDivisionError('somewhere')
+
+    monkeypatch.setattr(request_planner, 'find_max_payload', broken)
+    check_failure(search(worker, settings), PlanReport.UNKNOWN, 'ZeroDivisionError: somewhere')
+
+
+def test_payload_found_is_returned_but_not_published_if_it_cannot_be_recorded(
+        worker: Planning, settings: PlannerSettings, tmp_path: Path) -> None:
+    blocker = tmp_path / 'file'
+    blocker.write_text('no folder')
+    outcome = search(worker, replace(settings, recording_folder=str(blocker / 'recordings')))
+    assert (outcome.report.error_code, outcome.publishable) == (PlanReport.RECORDING_FAILED, False)
+    assert outcome.search is not None
+    assert outcome.search.payload == pytest.approx(MOST, abs=ACCURACY)
+    assert outcome.trajectory.points

@@ -1,0 +1,119 @@
+"""Requests between the node's executor and its worker thread."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import threading
+import time
+from typing import Any
+
+from flex_planner.base.progress import Progress
+from flex_planner.ros.planner.request_planner import Outcome, unknown_failure
+from flex_planner.ros.planner.request_queue import Desk
+from flex_planner.ros.planner.request_state import Ticket
+from flex_planner.ros.settings.planner import PlannerSettings
+from flex_planner_interfaces.msg import PlanReport
+import pytest
+
+
+class FakeExecutor:
+    """What a future needs of an executor, and a count of the times it was woken."""
+
+    def __init__(self) -> None:
+        self.woken = 0
+
+    def create_task(self, callback: Any, *arguments: Any) -> None:
+        callback(*arguments)
+
+    def wake(self) -> None:
+        self.woken += 1
+
+
+@pytest.fixture
+def desk() -> Iterator[Desk]:
+    desk = Desk(1)
+    yield desk
+    assert desk.close(5)
+
+
+@pytest.fixture
+def settings() -> PlannerSettings:
+    return PlannerSettings()
+
+
+def wait(done: Any) -> None:
+    end = time.monotonic() + 5
+    while not done():
+        assert time.monotonic() < end
+        time.sleep(0.001)
+
+
+def until_canceled(ticket: Ticket) -> Outcome:
+    ticket.report(Progress(phase='test', iteration=3, residual=0.5, intervals=7))
+    wait(ticket.canceled)
+    return unknown_failure(ValueError('too late'))
+
+
+def code(pending: Any) -> int:
+    return int(pending.future.result().report.error_code)
+
+
+def test_outcome_wakes_the_executor(desk: Desk, settings: PlannerSettings) -> None:
+    executor = FakeExecutor()
+    pending = desk.submit(lambda ticket: unknown_failure(ValueError('x')), settings, executor)
+    wait(pending.future.done)
+    wait(lambda: executor.woken)
+    assert pending.future.result().report.error_msg == 'ValueError: x'
+
+
+def test_exception_of_the_work_is_an_outcome(desk: Desk, settings: PlannerSettings) -> None:
+    def fail(ticket: Ticket) -> Outcome:
+        raise KeyError('nobody foresaw this')
+
+    pending = desk.submit(fail, settings, FakeExecutor())
+    wait(pending.future.done)
+    assert code(pending) == PlanReport.UNKNOWN
+    assert desk.active is None
+
+
+def test_one_works_one_waits_and_the_third_is_refused(desk: Desk,
+                                                      settings: PlannerSettings) -> None:
+    executor = FakeExecutor()
+    first = desk.submit(until_canceled, settings, executor)
+    wait(lambda: desk.active is not None and desk.active.progress.iteration == 3)
+    second = desk.submit(until_canceled, settings, executor)
+    assert desk.waiting == 1
+    assert code(desk.submit(until_canceled, settings, executor)) == PlanReport.BUSY
+    desk.withdraw(second)
+    assert desk.waiting == 0
+    assert code(second) == PlanReport.CANCELED
+    assert not first.future.done()
+    desk.withdraw(first)
+
+
+def test_withdrawn_request_has_its_outcome_at_once_and_keeps_it(
+        desk: Desk, settings: PlannerSettings) -> None:
+    ended = threading.Event()
+
+    def slow(ticket: Ticket) -> Outcome:
+        until_canceled(ticket)
+        time.sleep(0.05)
+        ended.set()
+        return unknown_failure(ValueError('too late'))
+
+    pending = desk.submit(slow, settings, FakeExecutor())
+    wait(lambda: desk.active)
+    desk.withdraw(pending)
+    assert not ended.is_set()
+    assert code(pending) == PlanReport.CANCELED
+    wait(lambda: desk.active is None)
+    assert ended.is_set()
+    assert code(pending) == PlanReport.CANCELED
+
+
+def test_desk_that_closes_tells_the_work_and_takes_no_more(settings: PlannerSettings) -> None:
+    desk = Desk(1)
+    desk.submit(until_canceled, settings, FakeExecutor())
+    wait(lambda: desk.active)
+    assert desk.close(5)
+    assert code(desk.submit(until_canceled, settings, FakeExecutor())) == PlanReport.BUSY

@@ -1,0 +1,32 @@
+"""The planner node, where 13 kg, 17 kg, and publishing 2 s raise what nobody foresaw."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from flex_planner.optimal_control.task import Task
+from flex_planner.planning.plan import Plan
+from flex_planner.planning.sampling import Reference
+from flex_planner.ros.planner import node, request_planner
+
+plan_path, motion_markers = request_planner.plan_path, node.motion_markers
+
+
+def faulty_plan(task: Task, **options: Any) -> Plan:
+    if task.payload_mass == 13:
+        raise ZeroDivisionError('while planning')
+    if task.payload_mass == 17:
+        raise MemoryError
+    return plan_path(task, **options)
+
+
+def faulty_markers(arm: Any, reference: Reference, frame: str) -> Any:
+    if reference.times_ns[-1] > 1.5e9:
+        raise KeyError('while publishing')
+    return motion_markers(arm, reference, frame)
+
+
+if __name__ == '__main__':
+    request_planner.plan_path = faulty_plan
+    node.motion_markers = faulty_markers
+    node.main()

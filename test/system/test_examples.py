@@ -1,0 +1,104 @@
+"""Every script of the gallery runs, says what it should, and stays short."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+import re
+import subprocess
+import sys
+import time
+
+from flex_planner.ros.runtime.processes import NodeProcess
+from flex_planner_interfaces.srv import PlanPath
+import pytest
+from ros_support import Planner
+
+FOLDER = Path(__file__).resolve().parents[2] / 'examples'
+SCRIPTS = {path.name: path for path in sorted(FOLDER.glob('*.py'))}
+WITH_ROS = {name for name, path in SCRIPTS.items() if 'import rclpy' in path.read_text()}
+LIMIT = 60.0  # [s], of a script on a machine that is busy
+LONGEST = 80  # lines
+
+# what must be among the lines of a script; a new one needs no entry
+EXPECTED = {
+    'call_the_node.py': ('service: J = 0.6', 'action: canceled'),
+    'controller.py': ('followed: at most 0.',),
+    'find_the_payload.py': ('between 5.85', 'dJ/dm_p'),
+    'keep_a_speed.py': ('w_2 = 4.2', 'an objective cannot be met'),
+    'map_the_payload.py': ('49 solved', '5.85    6.18', 'from the map: '),
+    'minimum_time.py': ('shortest time with 1 kg: 0.642', 'in 1.00 s: 5.85'),
+    'minimum_vibration.py': ('minimum vibration: ',),
+    'plan_a_path.py': ('solved and certified by a cold start', 'J = 0.647'),
+    'replay_and_report.py': ('/flex_planner/motion_task', 'the check of the recording passed'),
+    'your_own_arm.py': ('dampingratio', 'joints locked: 2.803', 'solved and certified'),
+}
+
+
+@pytest.fixture(scope='module', autouse=True)
+def planner(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Planner]:
+    """Start a planner, which takes its time while scripts run that need none."""
+    folder = tmp_path_factory.mktemp('examples')
+    with Planner(folder, 'korayem_ei50', effort_weights=[0.125, 0.125]) as planner:
+        yield planner
+        assert 'Traceback' not in planner.log()
+
+
+def run(name: str, folder: Path, meanwhile: Callable[[], None]) -> str:
+    """Run a script in a folder, doing something else again and again; return what it says."""
+    output, end = folder / 'said.txt', time.monotonic() + LIMIT
+    # rclpy imports what uses a deprecated module
+    strict = [] if name in WITH_ROS else ['-W', 'error']
+    command = [sys.executable, *strict, SCRIPTS[name]]
+    with output.open('w') as file, subprocess.Popen(command, cwd=folder, stdout=file,
+                                                    stderr=subprocess.STDOUT) as script:
+        while script.poll() is None:
+            meanwhile()
+            if time.monotonic() > end:
+                script.kill()
+    assert script.returncode == 0, output.read_text()
+    return output.read_text()
+
+
+def check(name: str, output: str) -> None:
+    assert output.strip()
+    assert [text for text in EXPECTED.get(name, ()) if text not in output] == [], output
+
+
+def test_gallery_is_complete() -> None:
+    assert EXPECTED.keys() <= SCRIPTS.keys()
+    table = (FOLDER / 'README.md').read_text()
+    assert [name for name in SCRIPTS if f'[{name}]({name})' not in table] == []
+
+
+@pytest.mark.parametrize('name', SCRIPTS)
+def test_example_is_short_and_says_how_to_run_it(name: str) -> None:
+    text = SCRIPTS[name].read_text()
+    assert len(text.splitlines()) <= LONGEST
+    assert f'\n    tools/run python examples/{name}\n' in text
+
+
+@pytest.mark.parametrize('name', sorted(SCRIPTS.keys() - WITH_ROS))
+def test_example_runs(name: str, tmp_path: Path) -> None:
+    check(name, run(name, tmp_path, lambda: time.sleep(0.05)))
+    written = {path.name for path in tmp_path.glob('output/*') if path.stat().st_size > 10_000}
+    assert set(re.findall(r'\w+\.(?:png|html)', SCRIPTS[name].read_text())) <= written
+
+
+@pytest.mark.parametrize('name', sorted(WITH_ROS))
+def test_example_with_a_planner_runs(name: str, planner: Planner, tmp_path: Path) -> None:
+    trajectories, answers = '/flex_planner/joint_trajectory', list[PlanPath.Response]()
+    simulator = NodeProcess(
+        'flex_planner.ros.arm_simulator',
+        {'arm': 'korayem_ei50', 'payload_mass': 1.0, 'initial_positions': [1.0472, -2.0944]},
+        {'joint_trajectory': trajectories}, tmp_path / 'simulator.log')
+
+    def answer() -> None:
+        """Give a script that listens, as the simulator does, something to listen to."""
+        planner.spin(0.1)
+        listeners = planner.node.get_subscriptions_info_by_topic(trajectories)
+        if not answers and len({info.node_name for info in listeners}) == 2:
+            answers.append(planner.plan(publish=True))
+
+    with simulator:
+        check(name, run(name, tmp_path, answer))

@@ -1,0 +1,161 @@
+"""Package descriptions, entry points and installed files agree with one another."""
+
+import ast
+from dataclasses import replace
+from importlib import metadata
+import math
+from pathlib import Path
+import re
+import sys
+import xml.etree.ElementTree as ElementTree
+
+from ament_index_python.packages import get_package_share_directory
+from catkin_pkg.package import parse_package
+import flex_planner
+from flex_planner.arms.arm_files import load_arm
+from flex_planner.ros.runtime.parameters import as_mapping
+from flex_planner.ros.settings.planner import PlannerSettings
+from flex_planner.ros.settings.simulator import SimulatorSettings
+from packaging.requirements import Requirement
+import pytest
+import yaml
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGES = [ROOT, ROOT / 'flex_planner_interfaces']
+LAUNCH_FILES = sorted(ROOT.glob('launch/*.launch.py'))
+each_launch_file = pytest.mark.parametrize('path', LAUNCH_FILES, ids=lambda path: path.name)
+
+
+def setup_keyword(name):
+    """Return a literal keyword argument of the call of ``setup``."""
+    for node in ast.walk(ast.parse((ROOT / 'setup.py').read_text())):
+        if isinstance(node, ast.keyword) and node.arg == name:
+            return ast.literal_eval(node.value)
+    raise LookupError(name)
+
+
+def console_scripts():
+    return dict(re.split(r'\s*=\s*', line)
+                for line in setup_keyword('entry_points')['console_scripts'])
+
+
+def imported_modules():
+    """Return the top-level modules that the package and its launch files import."""
+    modules = set()
+    for path in [*ROOT.glob('flex_planner/**/*.py'), *LAUNCH_FILES]:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Import):
+                modules |= {alias.name for alias in node.names}
+            elif isinstance(node, ast.ImportFrom):
+                modules.add(node.module)
+    return {module.partition('.')[0] for module in modules}
+
+
+def launch_calls(path, function):
+    """Return the keyword arguments and first literal of every call of a function."""
+    calls = []
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Call) and getattr(node.func, 'id', None) == function:
+            literals = [a.value for a in node.args if isinstance(a, ast.Constant)]
+            keywords = {k.arg: k.value.value for k in node.keywords
+                        if isinstance(k.value, ast.Constant)}
+            calls.append((literals, keywords))
+    return calls
+
+
+@pytest.mark.parametrize('folder', PACKAGES, ids=lambda folder: folder.name)
+def test_package_xml_is_valid(folder):
+    warnings = []
+    package = parse_package(str(folder / 'package.xml'), warnings=warnings)
+    package.validate(warnings=warnings)
+    assert not warnings
+
+
+def test_versions_agree():
+    versions = {ElementTree.parse(folder / 'package.xml').findtext('version')
+                for folder in PACKAGES}
+    versions |= {flex_planner.__version__, setup_keyword('version'),
+                 metadata.version('flex_planner')}
+    assert len(versions) == 1
+
+
+def test_pinned_versions_satisfy_setup():
+    lines = (ROOT / 'requirements' / 'runtime.txt').read_text().splitlines()
+    pinned = dict(line.split('==') for line in lines if not line.startswith('#'))
+    wanted = {r.name: r.specifier for r in map(Requirement, setup_keyword('install_requires'))}
+    assert pinned.keys() == wanted.keys()
+    assert [name for name in pinned if pinned[name] not in wanted[name]] == []
+
+
+def test_what_is_imported_is_declared():
+    ros = {depend.name for depend in parse_package(str(ROOT / 'package.xml')).exec_depends}
+    lines = [*setup_keyword('install_requires'), *setup_keyword('extras_require')['maps']]
+    pip = {Requirement(line).name for line in lines}
+    imported = imported_modules() - sys.stdlib_module_names - {'flex_planner'}
+    declared = {'yaml' if name == 'pyyaml' else name for name in ros | pip}
+    assert imported - declared == set()
+    assert {name for name in declared - imported if not name.startswith('python3-')} == set()
+
+
+def test_interfaces_are_all_built():
+    folder = ROOT / 'flex_planner_interfaces'
+    names = {str(path.relative_to(folder)) for kind in ('msg', 'srv', 'action')
+             for path in folder.glob(f'{kind}/*.{kind}')}
+    listed = re.findall(r'\b(?:msg|srv|action)/\w+\.\w+', (folder / 'CMakeLists.txt').read_text())
+    assert set(listed) == names
+
+
+@pytest.mark.parametrize('name', console_scripts())
+def test_entry_point_can_be_called(name):
+    (entry_point,) = metadata.entry_points(group='console_scripts', name=name)
+    assert entry_point.value == console_scripts()[name]
+    assert callable(entry_point.load())
+
+
+def test_parameter_and_launch_files_are_installed():
+    share = Path(get_package_share_directory('flex_planner'))
+    for pattern in ('config/*.yaml', 'config/arms/*.yaml', 'launch/*.py'):
+        wanted = {path.name: path.read_text() for path in ROOT.glob(pattern)}
+        installed = {path.name: path.read_text() for path in share.glob(pattern)}
+        assert installed == wanted
+        assert wanted
+
+
+@pytest.mark.parametrize(('node', 'settings', 'chosen'), [
+    ('flex_planner', PlannerSettings, {'effort_weights': [1 / 8, 1 / 8]}),
+    ('arm_simulator', SimulatorSettings, {
+        'initial_positions': pytest.approx([math.pi / 3, -2 * math.pi / 3])})])
+def test_parameter_file_lists_every_parameter_with_its_default(node, settings, chosen):
+    text = (ROOT / 'config' / 'planner.yaml').read_text()
+    written = yaml.safe_load(text)[node]['ros__parameters']
+    defaults = as_mapping(settings.for_arm(load_arm(written.pop('arm'))))
+    assert written == {**defaults, **chosen}
+    # ROS does not take 3 for 3.0
+    kinds = {name: type(value) for name, value in defaults.items()}
+    assert {name: type(value) for name, value in written.items()} == kinds
+    replace(settings(**defaults), **written)
+
+
+def test_launch_files_are_those_of_the_planner_alone_with_an_arm_and_with_ros2_control():
+    started = {path.name: [keywords['executable'] for _, keywords in launch_calls(path, 'Node')]
+               for path in LAUNCH_FILES}
+    assert started == {'planner.launch.py': ['planner'], 'ros2_control.launch.py': ['planner'],
+                       'simulation.launch.py': ['planner', 'arm_simulator']}
+
+
+@each_launch_file
+def test_launch_file_starts_executables_of_this_package(path):
+    nodes = [keywords for _, keywords in launch_calls(path, 'Node')]
+    assert {node['package'] for node in nodes} == {'flex_planner'}
+    assert {node['executable'] for node in nodes} <= console_scripts().keys()
+
+
+@each_launch_file
+def test_launch_file_offers_an_arm_that_exists(path):
+    arguments = {names[0]: keywords
+                 for names, keywords in launch_calls(path, 'DeclareLaunchArgument')}
+    assert {'arm', 'params_file'} <= arguments.keys()
+    assert (ROOT / 'config' / 'arms' / f'{arguments["arm"]["default_value"]}.yaml').is_file()
+    functions = [node.name for node in ast.parse(path.read_text()).body
+                 if isinstance(node, ast.FunctionDef)]
+    assert functions == ['generate_launch_description']
