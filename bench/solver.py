@@ -24,7 +24,7 @@ from bench.rivals import (
 )
 from flex_planner.arms.arm_files import load_arm
 from flex_planner.base.progress import Monitor
-from flex_planner.collocation import CollocationResult, Settings, solve
+from flex_planner.collocation import CollocationResult, solve, SolverSettings
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
 from flex_planner.optimal_control.task import postures_from_points, Task
@@ -95,7 +95,8 @@ def paper_problem(payload: float, arm: str = 'korayem_ei50') -> MotionProblem:
 def measure(payload: float) -> list[Row]:
     """Return the rows of one payload."""
     problem = paper_problem(payload)
-    exact = plan_path(problem.task, model=problem.model, settings=Settings(error_tolerance=1e-10))
+    exact = plan_path(problem.task, model=problem.model,
+                      settings=SolverSettings(error_tolerance=1e-10))
     reference = Reference.of(exact)
     rows = _rows('flex_planner', problem, reference, _cold, _warm, OURS, repeats=9)
     for name, (cold, warm, levels) in RIVALS.items():
@@ -140,12 +141,12 @@ def _searched(problem: MotionProblem, reference: Reference, cold: Runner,
 
 def _cold(problem: MotionProblem, tolerance: float, monitor: Monitor) -> Run:
     began = time.perf_counter()
-    result = cold_start(problem, Settings(error_tolerance=tolerance), monitor).result
+    result = cold_start(problem, SolverSettings(error_tolerance=tolerance), monitor).result
     return _run(problem, tolerance, result, time.perf_counter() - began)
 
 
 def _warm(problem: MotionProblem, tolerance: float, monitor: Monitor) -> Run:
-    settings = Settings(error_tolerance=tolerance)
+    settings = SolverSettings(error_tolerance=tolerance)
     first = cold_start(neighbour(problem), settings, monitor).result.solution
     began = time.perf_counter()
     result = solve(problem, first, settings, monitor, expected_error=tolerance)

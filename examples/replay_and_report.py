@@ -20,7 +20,7 @@ from flex_planner.cli.recorder import RequestRecorder
 from flex_planner.cli.request import Request
 from flex_planner.optimal_control.task import postures_from_points, Task
 from flex_planner.planning.plan_path import plan_path
-from flex_planner.planning.sampling import sample_reference
+from flex_planner.planning.sampling import sample_plan
 from flex_planner.recording import definition_folder, MessageTypes, read_recording
 from flex_planner.reports.recording import check_motion, RecordedRequest, verdict, write_report
 import numpy as np
@@ -39,7 +39,7 @@ def recorded() -> Path:
     if not plan.solved:
         sys.exit(plan.message)
     recorder = RequestRecorder(request, FOLDER / 'recordings')
-    return recorder.record_plan(plan, sample_reference(plan, request.sampling))
+    return recorder.record_plan(plan, sample_plan(plan, request.sampling))
 
 
 def main() -> None:

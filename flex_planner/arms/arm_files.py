@@ -12,7 +12,7 @@ from typing import Any
 
 from flex_planner.arms.arm import Arm, Joint, Link, Motor, Node
 from flex_planner.base.errors import FlexPlannerError, InvalidValueError
-from flex_planner.base.yaml_files import read_yaml, Section, YamlFileError
+from flex_planner.base.yaml_files import read_yaml, YamlFileError, YamlSection
 
 _UNITS = {'length': 'm', 'mass': 'kg', 'linear_density': 'kg/m', 'density': 'kg/m^3',
           'flexural_rigidity': 'N m^2', 'youngs_modulus': 'N/m^2', 'width': 'm',
@@ -102,7 +102,7 @@ def arm_from_mapping(content: object, path: str = '') -> Arm:
         Naming the field by its path in the file, e.g. ``links[1].length``.
 
     """
-    top = Section(path, content)
+    top = YamlSection(path, content)
     arm: Arm = top.build(
         Arm, name=top.text('name'), source=top.text('source', ''),
         links=tuple(_link(section) for section in top.sections('links')),
@@ -123,7 +123,7 @@ def plain_arm(arm: Arm) -> dict[str, Any]:
     return {**asdict(arm), 'gravity': arm.gravity.tolist()}
 
 
-def _link(section: Section) -> Link:
+def _link(section: YamlSection) -> Link:
     length = _number(section, 'length')
     area, second_moment = _cross_section(section)
     density = _one_of(section, {
@@ -144,12 +144,12 @@ def _link(section: Section) -> Link:
     return link
 
 
-def _number(section: Section, key: str, above: float = 0.0) -> float:
+def _number(section: YamlSection, key: str, above: float = 0.0) -> float:
     """Return a quantity in its unit."""
     return section.number(key, above=above, unit=_UNITS[key])
 
 
-def _cross_section(section: Section) -> tuple[float, float]:
+def _cross_section(section: YamlSection) -> tuple[float, float]:
     """Return area [m^2] and second moment [m^4] of the section; NaN where they are not given."""
     if section.has('section'):
         part = section.section('section')
@@ -161,7 +161,7 @@ def _cross_section(section: Section) -> tuple[float, float]:
     return math.nan, math.nan
 
 
-def _one_of(section: Section, ways: Mapping[str, Callable[[float], float]]) -> float:
+def _one_of(section: YamlSection, ways: Mapping[str, Callable[[float], float]]) -> float:
     """Return a quantity that may be given in several ways, but has to be given in one."""
     given = [name for name in ways if section.has(name)]
     if len(given) != 1:
@@ -174,7 +174,7 @@ def _one_of(section: Section, ways: Mapping[str, Callable[[float], float]]) -> f
     return result
 
 
-def _joint(section: Section) -> Joint:
+def _joint(section: YamlSection) -> Joint:
     motor = Motor()
     if section.has('motor'):
         part = section.section('motor')
@@ -187,7 +187,7 @@ def _joint(section: Section) -> Joint:
     return joint
 
 
-def _node(section: Section) -> Node:
+def _node(section: YamlSection) -> Node:
     node: Node = section.build(Node, mass=section.take('mass', 0.0),
                                inertia=section.take('inertia', 0.0))
     return node

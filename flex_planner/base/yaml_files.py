@@ -63,7 +63,7 @@ _StrictLoader.add_implicit_resolver(
     list('-+.0123456789'))
 
 
-class Section:
+class YamlSection:
     """
     A mapping of a file that knows its path and which keys were read.
 
@@ -125,16 +125,16 @@ class Section:
             raise InvalidValueError(self.name(key), value, 'true or false')
         return value
 
-    def section(self, key: str, default: object = None) -> Section:
+    def section(self, key: str, default: object = None) -> YamlSection:
         """Return a mapping inside this one."""
-        return Section(self.name(key), self.take(key, default))
+        return YamlSection(self.name(key), self.take(key, default))
 
-    def sections(self, key: str, optional: bool = False) -> Iterator[Section]:
+    def sections(self, key: str, optional: bool = False) -> Iterator[YamlSection]:
         """Return the entries of a list of mappings."""
         entries = self.take(key, () if optional else None)
         if not isinstance(entries, Sequence) or isinstance(entries, str):
             raise InvalidValueError(self.name(key), entries, 'a list')
-        return (Section(f'{self.name(key)}[{i}]', entry) for i, entry in enumerate(entries))
+        return (YamlSection(f'{self.name(key)}[{i}]', entry) for i, entry in enumerate(entries))
 
     def finish(self) -> None:
         """Refuse fields that nobody read."""

@@ -18,14 +18,14 @@ from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array, number
 from flex_planner.capacity.limit_search import collected, is_near, way_to, width
-from flex_planner.collocation import CollocationSolution, Settings
+from flex_planner.collocation import CollocationSolution, SolverSettings
 from flex_planner.collocation.mesh import defects, levelled
 from flex_planner.optimal_control.motion_problem import Indices, MotionProblem
 from flex_planner.planning.strategies.price_continuation import (
     changed,
     durations,
+    Extremal,
     payloads,
-    Stop,
     worth,
     worth_time,
 )
@@ -50,9 +50,9 @@ def step_ratio(far: float, near: float, here: float) -> float:
     return float(np.clip((here - near) / (near - far), -_MOST_RATIO, _MOST_RATIO))
 
 
-def continued_stops(problem: MotionProblem, before: Sequence[Stop], here: Sequence[Stop],
-                    ratio: float, accuracy: float, settings: Settings, monitor: Monitor, *,
-                    payload: bool) -> list[Stop]:
+def continued_stops(problem: MotionProblem, before: Sequence[Extremal], here: Sequence[Extremal],
+                    ratio: float, accuracy: float, settings: SolverSettings, monitor: Monitor, *,
+                    payload: bool) -> list[Extremal]:
     """
     Return the motions up to a limit, from the one that two searches lead to; else none.
 
@@ -60,7 +60,7 @@ def continued_stops(problem: MotionProblem, before: Sequence[Stop], here: Sequen
     ----------
     problem, ratio, settings, monitor, payload
         As of `foreseen`.
-    before, here : sequence of Stop
+    before, here : sequence of Extremal
         Of the two searches, ending near the limits of their tasks.
     accuracy : float
         To which the limit is wanted [kg, s].
@@ -79,8 +79,9 @@ def continued_stops(problem: MotionProblem, before: Sequence[Stop], here: Sequen
     return stops if stops[-1].stopped or is_near(stops, accuracy) else []
 
 
-def foreseen(problem: MotionProblem, before: Stop, here: Stop, ratio: float, settings: Settings,
-             monitor: Monitor, *, payload: bool) -> Stop | None:
+def foreseen(problem: MotionProblem, before: Extremal, here: Extremal, ratio: float,
+             settings: SolverSettings,
+             monitor: Monitor, *, payload: bool) -> Extremal | None:
     """
     Return the motion at a limit that those of two tasks on a line lead to, or None.
 
@@ -90,7 +91,7 @@ def foreseen(problem: MotionProblem, before: Stop, here: Stop, ratio: float, set
     ----------
     problem : MotionProblem
         With the least payload, or the longest duration, that is of interest.
-    before, here : Stop
+    before, here : Extremal
         Near the limits of the two tasks.
     ratio : float
         Of the step to come to the step between them.
@@ -119,7 +120,7 @@ def foreseen(problem: MotionProblem, before: Stop, here: Stop, ratio: float, set
     return found if beyond else None
 
 
-def thinned(stop: Stop, settings: Settings) -> Switched:
+def thinned(stop: Extremal, settings: SolverSettings) -> Switched:
     """Return a motion on as few intervals as its exactness needs: else meshes only grow."""
     solution, result = stop.result.solution, stop.result
     error = float(result.errors.max()) / (_MARGIN * settings.error_tolerance)

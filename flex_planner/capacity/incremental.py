@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.progress import Monitor
-from flex_planner.collocation import CollocationResult, CollocationSolution, Settings
+from flex_planner.collocation import CollocationResult, CollocationSolution, SolverSettings
 from flex_planner.collocation.homotopy import STOPPED
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.planning.certificate import final_state
@@ -56,7 +56,7 @@ class PayloadTrial:
 
 
 def raised_payload(problem: MotionProblem, first: CollocationSolution, *, step: float,
-                   accuracy: float, settings: Settings,
+                   accuracy: float, settings: SolverSettings,
                    monitor: Monitor) -> Iterator[PayloadTrial]:
     """
     Yield the payloads tried, loop (i) raising them and loop (k) halving the step.
@@ -100,7 +100,7 @@ def raised_payload(problem: MotionProblem, first: CollocationSolution, *, step: 
 
 
 def _trial(problem: MotionProblem, start: CollocationSolution, payload: float, step: float,
-           settings: Settings, monitor: Monitor) -> PayloadTrial | None:
+           settings: SolverSettings, monitor: Monitor) -> PayloadTrial | None:
     """Try a payload from the motion of a lighter one, then from nothing; None if absurd."""
     monitor.payload = payload
     try:

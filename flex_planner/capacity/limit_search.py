@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.progress import Monitor
-from flex_planner.collocation import CollocationSolution, Settings
+from flex_planner.collocation import CollocationSolution, SolverSettings
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_problem import planned
@@ -21,8 +21,8 @@ from flex_planner.planning.strategies.initial_guesses import (
 from flex_planner.planning.strategies.limit_strategies import steady
 from flex_planner.planning.strategies.price_continuation import (
     changed,
+    Extremal,
     on_the_way,
-    Stop,
     worth,
     worth_time,
 )
@@ -36,20 +36,20 @@ _EXACTNESS = 10.0
 _MIDDLE = 0.01
 
 
-def way_to(accuracy: float, settings: Settings) -> Settings:
+def way_to(accuracy: float, settings: SolverSettings) -> SolverSettings:
     """Return settings for motions on the way to a limit that is wanted to an accuracy."""
     return on_the_way(settings, _EXACTNESS * accuracy)
 
 
-def middle(stops: Sequence[Stop]) -> Stop | None:
+def middle(stops: Sequence[Extremal]) -> Extremal | None:
     """Return the last motion that leaves some room: a start for searches of its kind."""
     roomy = [stop for stop in stops if stop.room >= _MIDDLE * stop.value]
     return roomy[-1] if roomy else next(iter(stops), None)
 
 
-def collected(stops: Iterable[Stop], accuracy: float) -> list[Stop]:
+def collected(stops: Iterable[Extremal], accuracy: float) -> list[Extremal]:
     """Return the stops up to one that is near the limit, or fails, or the last."""
-    met: list[Stop] = []
+    met: list[Extremal] = []
     for stop in stops:
         met.append(stop)
         if not stop.result.converged or len(met) == _MOST_STOPS or is_near(met, accuracy):
@@ -57,7 +57,7 @@ def collected(stops: Iterable[Stop], accuracy: float) -> list[Stop]:
     return met
 
 
-def is_near(stops: list[Stop], accuracy: float) -> bool:
+def is_near(stops: list[Extremal], accuracy: float) -> bool:
     """Return whether the last value is the limit, to an accuracy."""
     last = stops[-1]
     if not last.price:
@@ -73,13 +73,14 @@ def width(accuracy: float, value: float) -> float:
     return max(accuracy, _FINEST * value)
 
 
-def plan_near(problem: MotionProblem, start: CollocationSolution, settings: Settings,
+def plan_near(problem: MotionProblem, start: CollocationSolution, settings: SolverSettings,
               monitor: Monitor) -> Plan:
     """Return the plan of a problem from a motion nearly its own."""
     return planned(problem, (_found(start), *QUICK), settings, monitor)
 
 
-def plan_at(stops: list[Stop], problem: MotionProblem, settings: Settings, monitor: Monitor, *,
+def plan_at(stops: list[Extremal], problem: MotionProblem, settings: SolverSettings,
+            monitor: Monitor, *,
             payload: bool, exact: bool) -> Plan:
     """
     Return the plan with the value of the last stop of a search.
@@ -89,7 +90,7 @@ def plan_at(stops: list[Stop], problem: MotionProblem, settings: Settings, monit
 
     Parameters
     ----------
-    stops : list of Stop
+    stops : list of Extremal
         The last one near the limit.
     problem : MotionProblem
         That was searched, with its weights.
@@ -103,7 +104,7 @@ def plan_at(stops: list[Stop], problem: MotionProblem, settings: Settings, monit
     """
     stop = stops[-1]
 
-    def there(stop: Stop) -> MotionProblem:
+    def there(stop: Extremal) -> MotionProblem:
         return (changed(problem, payload_mass=stop.value) if payload
                 else changed(problem, duration=stop.value))
 
@@ -123,9 +124,9 @@ def plan_at(stops: list[Stop], problem: MotionProblem, settings: Settings, monit
     return found
 
 
-def _found(start: CollocationSolution, stop: Stop | None = None) -> tuple[str, Strategy]:
+def _found(start: CollocationSolution, stop: Extremal | None = None) -> tuple[str, Strategy]:
     """Return the strategy that starts from a motion; that of a stop may be the solution."""
-    def found(problem: MotionProblem, settings: Settings, monitor: Monitor) -> Attempt:
+    def found(problem: MotionProblem, settings: SolverSettings, monitor: Monitor) -> Attempt:
         if stop is not None and _is_solution(stop, problem, settings):
             return Attempt(result=stop.result)
         return Attempt(result=weights_raised(problem, start, settings, monitor))
@@ -133,8 +134,8 @@ def _found(start: CollocationSolution, stop: Stop | None = None) -> tuple[str, S
     return 'limit found', found
 
 
-def _more_exact(stop: Stop, settings: Settings, monitor: Monitor, *,
-                payload: bool) -> Stop | None:
+def _more_exact(stop: Extremal, settings: SolverSettings, monitor: Monitor, *,
+                payload: bool) -> Extremal | None:
     """Return the motion of a stop as exact as a plan has to be, None without success."""
     if not stop.price:
         return None
@@ -146,7 +147,7 @@ def _more_exact(stop: Stop, settings: Settings, monitor: Monitor, *,
     return found if found is not None and found.result.converged else None
 
 
-def _is_solution(stop: Stop, problem: MotionProblem, settings: Settings) -> bool:
+def _is_solution(stop: Extremal, problem: MotionProblem, settings: SolverSettings) -> bool:
     """Return whether a stop is the solution of a problem, as exact as it has to be."""
     one, other = stop.problem.task, problem.task
     return (not has_weights(problem) and one.payload_mass == other.payload_mass

@@ -27,7 +27,7 @@ from flex_planner.capacity.limit_search import (
     way_to,
     width,
 )
-from flex_planner.collocation import CollocationSolution, Settings, solve
+from flex_planner.collocation import CollocationSolution, solve, SolverSettings
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import (
     holding_limit,
@@ -40,7 +40,12 @@ from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_problem import LADDER, planned, STATUSES, STOPPED
 from flex_planner.planning.strategies.first_extremals import heaviest, taken_over
 from flex_planner.planning.strategies.initial_guesses import without_weights
-from flex_planner.planning.strategies.price_continuation import changed, payloads, Start, Stop
+from flex_planner.planning.strategies.price_continuation import (
+    changed,
+    Extremal,
+    payloads,
+    SearchStart,
+)
 import numpy as np
 
 _MIN_ACCURACY, _MAX_ACCURACY = 1e-6, 1e3
@@ -98,7 +103,8 @@ class MaxPayload:
         Lower end of the bracket: the largest payload with a certified plan; 0 if there is
         none [kg].
     upper : float
-        Upper end: too much, see `Stop.room`, or what was tried in vain; ``inf`` if unknown [kg].
+        Upper end: too much, see `Extremal.room`, or without a solution; ``inf`` if unknown
+        [kg].
     plan : Plan or None
         The motion with `payload`.
     limiting_joint : int or None
@@ -110,7 +116,7 @@ class MaxPayload:
         Payloads and their cost; empty if not searched by the direct method.
     trials : tuple of PayloadTrial
         Payloads tried; empty if not searched by the incremental method.
-    stops : tuple of Stop
+    stops : tuple of Extremal
         The motions of the front.
     warm : bool
         Whether it went on from the motion that it was given to start from.
@@ -132,7 +138,7 @@ class MaxPayload:
     held: bool = False
     front: PayloadFront = field(default_factory=PayloadFront)
     trials: tuple[PayloadTrial, ...] = ()
-    stops: tuple[Stop, ...] = field(default=(), repr=False)
+    stops: tuple[Extremal, ...] = field(default=(), repr=False)
     warm: bool = False
     iterations: int = 0
     planning_time: float = 0.0
@@ -143,16 +149,16 @@ class MaxPayload:
         return self.status is PlanStatus.SOLVED
 
     @property
-    def middle(self) -> Stop | None:
+    def middle(self) -> Extremal | None:
         """Return the last motion that leaves some room: a start for searches of its kind."""
         return middle(self.stops)
 
 
 def find_max_payload(task: Task, *, model: ArmModel | None = None,
-                     settings: Settings | None = None, monitor: Monitor | None = None,
+                     settings: SolverSettings | None = None, monitor: Monitor | None = None,
                      method: PayloadMethod = PayloadMethod.DIRECT, accuracy: float = 1e-3,
                      step: float | None = None,
-                     start_from: MaxPayload | Start | None = None,
+                     start_from: MaxPayload | SearchStart | None = None,
                      before: MaxPayload | None = None, ratio: float = 1.0) -> MaxPayload:
     """
     Find the largest payload that the arm can carry from start to goal in the task's duration.
@@ -163,7 +169,7 @@ def find_max_payload(task: Task, *, model: ArmModel | None = None,
         The motion; the search starts at its payload.
     model : ArmModel, optional
         Of the task's arm; compiled or read from disk if not given.
-    settings : Settings, optional
+    settings : SolverSettings, optional
         Of the boundary-value solver.
     monitor : Monitor, optional
         Receives progress, and may cancel or limit the time.
@@ -175,7 +181,7 @@ def find_max_payload(task: Task, *, model: ArmModel | None = None,
     step : float, optional
         First step of the incremental method, `accuracy` to 1e6; 1 or `accuracy` if that is more
         [kg].
-    start_from : MaxPayload or Start, optional
+    start_from : MaxPayload or SearchStart, optional
         A search of a similar task by the direct method, or a motion of one, tried first.
     before : MaxPayload, optional
         The search before `start_from` on a line of tasks: the motion is continued along that line,
@@ -206,7 +212,7 @@ def find_max_payload(task: Task, *, model: ArmModel | None = None,
     monitor = monitor or Monitor()
     began = monitor.iteration, monitor.elapsed
     search = _Search(MotionProblem(model or ArmModel(task.arm), task, task_parameters(task)),
-                     settings or Settings(), monitor, accuracy)
+                     settings or SolverSettings(), monitor, accuracy)
     try:
         if method is PayloadMethod.DIRECT:
             found = search.direct(start_from, before, ratio)
@@ -239,11 +245,11 @@ def _check(task: Task) -> None:
 class _Search:
     """What both methods share."""
 
-    def __init__(self, problem: MotionProblem, settings: Settings, monitor: Monitor,
+    def __init__(self, problem: MotionProblem, settings: SolverSettings, monitor: Monitor,
                  accuracy: float) -> None:
         self._problem, self._settings, self._monitor = problem, settings, monitor
         self._accuracy = accuracy
-        self._stops: list[Stop] = []
+        self._stops: list[Extremal] = []
         self._warm = False
 
     def failed(self, method: PayloadMethod, status: PlanStatus, message: str,
@@ -253,7 +259,7 @@ class _Search:
                           front=_front(self._stops), stops=_priced(self._stops),
                           trials=tuple(trials), warm=self._warm)
 
-    def direct(self, start: MaxPayload | Start | None, before: MaxPayload | None,
+    def direct(self, start: MaxPayload | SearchStart | None, before: MaxPayload | None,
                ratio: float) -> MaxPayload:
         """Follow the price to the limit, then plan there."""
         exact = isinstance(start, MaxPayload) and self._continued(start, before, ratio)
@@ -290,7 +296,7 @@ class _Search:
             self._accuracy, self._settings, self._monitor, payload=True)
         return bool(self._stops)
 
-    def _follow_price(self, start: Start | None) -> MaxPayload | None:
+    def _follow_price(self, start: SearchStart | None) -> MaxPayload | None:
         """Collect stops up to the limit; return the failure if there is no first motion."""
         bare, monitor = without_weights(self._problem), self._monitor
         way = way_to(self._accuracy, self._settings)
@@ -305,7 +311,8 @@ class _Search:
         if plan.solution is None or not plan.solved:
             return self.failed(PayloadMethod.DIRECT, plan.status, plan.message)
         first = solve(bare, plan.solution, way, monitor)
-        self._stops = [Stop(value=bare.task.payload_mass, price=0.0, result=first, problem=bare)]
+        self._stops = [Extremal(value=bare.task.payload_mass, price=0.0, result=first,
+                                problem=bare)]
         monitor.phase = 'payload at a rising price'
         self._stops += collected(payloads(bare, first, way, monitor, self._enough),
                                  self._accuracy)
@@ -315,7 +322,7 @@ class _Search:
         """Return the room that is near enough."""
         return width(self._accuracy, payload)
 
-    def _held(self, last: Stop, found: MaxPayload) -> MaxPayload:
+    def _held(self, last: Extremal, found: MaxPayload) -> MaxPayload:
         """Return the outcome where the goal is what the motors can just hold, if it is."""
         limit, joint = holding_limit(self._problem)
         if not np.isfinite(limit) or limit * _HELD <= last.value:
@@ -360,19 +367,19 @@ class _Search:
         return _described(found) if plan.solved else found
 
 
-def _start(given: MaxPayload | Start | None) -> Start | None:
+def _start(given: MaxPayload | SearchStart | None) -> SearchStart | None:
     """Return the motion that a search starts from, if there is one."""
     if not isinstance(given, MaxPayload):
         return given
-    return None if given.middle is None else Start.of(given.middle)
+    return None if given.middle is None else SearchStart.of(given.middle)
 
 
-def _priced(stops: list[Stop]) -> tuple[Stop, ...]:
+def _priced(stops: list[Extremal]) -> tuple[Extremal, ...]:
     """Return the stops that are motions of least effort."""
     return tuple(stop for stop in stops if stop.price and stop.result.converged)
 
 
-def _front(stops: list[Stop]) -> PayloadFront:
+def _front(stops: list[Extremal]) -> PayloadFront:
     """Return what the payloads cost."""
     priced = _priced(stops)
     efforts = [totals(stop.problem, stop.result.solution).cost for stop in priced]

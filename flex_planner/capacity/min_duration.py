@@ -16,7 +16,7 @@ from flex_planner.base.validation import number, vector
 from flex_planner.capacity.extrapolation import check_ratio, continued_stops, step_ratio
 from flex_planner.capacity.limit_search import collected, is_near, middle, plan_at, way_to, width
 from flex_planner.capacity.max_payload import find_max_payload, MaxPayload
-from flex_planner.collocation import CollocationSolution, Settings, solve
+from flex_planner.collocation import CollocationSolution, solve, SolverSettings
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
 from flex_planner.optimal_control.task import MAX_DURATION, Task
@@ -24,7 +24,12 @@ from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_problem import LADDER, planned, STATUSES, STOPPED
 from flex_planner.planning.strategies.first_extremals import quickest, taken_over
 from flex_planner.planning.strategies.initial_guesses import without_weights
-from flex_planner.planning.strategies.price_continuation import changed, durations, Start, Stop
+from flex_planner.planning.strategies.price_continuation import (
+    changed,
+    durations,
+    Extremal,
+    SearchStart,
+)
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -50,10 +55,10 @@ class MinDuration:
         Upper end of the bracket: the shortest with a certified plan; ``inf`` if there is
         none [s].
     lower : float
-        Lower end: too short, see `Stop.room`; 0 if unknown [s].
+        Lower end: too short, see `Extremal.room`; 0 if unknown [s].
     plan : Plan or None
         The motion in `duration`.
-    stops : tuple of Stop
+    stops : tuple of Extremal
         Shorter and shorter durations on the way, with their prices -dJ/dt_f.
     iterations : int
         Newton iterations.
@@ -68,7 +73,7 @@ class MinDuration:
     duration: float = np.inf
     lower: float = 0.0
     plan: Plan | None = None
-    stops: tuple[Stop, ...] = field(default=(), repr=False)
+    stops: tuple[Extremal, ...] = field(default=(), repr=False)
     iterations: int = 0
     planning_time: float = 0.0
 
@@ -78,13 +83,13 @@ class MinDuration:
         return self.status is PlanStatus.SOLVED
 
     @property
-    def middle(self) -> Stop | None:
+    def middle(self) -> Extremal | None:
         """Return the last motion that leaves some room: a start for searches of its kind."""
         return middle(self.stops)
 
 
 def find_min_duration(task: Task, *, model: ArmModel | None = None,
-                      settings: Settings | None = None, monitor: Monitor | None = None,
+                      settings: SolverSettings | None = None, monitor: Monitor | None = None,
                       accuracy: float = 1e-4, start_from: MinDuration | None = None,
                       before: MinDuration | None = None, ratio: float = 1.0) -> MinDuration:
     """
@@ -131,7 +136,7 @@ def find_min_duration(task: Task, *, model: ArmModel | None = None,
     fixed = replace(task, time_weight=0.0)
     problem = MotionProblem(model or ArmModel(task.arm), fixed, task_parameters(fixed))
     try:
-        found = _found(task, problem, settings or Settings(), monitor, accuracy, start_from,
+        found = _found(task, problem, settings or SolverSettings(), monitor, accuracy, start_from,
                        before, ratio)
     except StoppedError as stop:
         found = MinDuration(task=task, status=STATUSES[stop.reason], message=str(stop))
@@ -139,7 +144,7 @@ def find_min_duration(task: Task, *, model: ArmModel | None = None,
                    planning_time=monitor.elapsed - began[1])
 
 
-def _found(task: Task, problem: MotionProblem, settings: Settings, monitor: Monitor,
+def _found(task: Task, problem: MotionProblem, settings: SolverSettings, monitor: Monitor,
            accuracy: float, start: MinDuration | None, before: MinDuration | None,
            ratio: float) -> MinDuration:
     """Follow the price of time to the limit, then plan there."""
@@ -173,23 +178,23 @@ def _found(task: Task, problem: MotionProblem, settings: Settings, monitor: Moni
     return replace(found, message=f'{last.value:.6g} s are enough, {lower:.6g} s are not{kind}')
 
 
-def _stops_from(problem: MotionProblem, solution: CollocationSolution, settings: Settings,
-                monitor: Monitor, accuracy: float) -> list[Stop]:
+def _stops_from(problem: MotionProblem, solution: CollocationSolution, settings: SolverSettings,
+                monitor: Monitor, accuracy: float) -> list[Extremal]:
     """Return the motions on the way from one that took all strategies to find."""
     way = way_to(accuracy, settings)
     first = solve(problem, solution, way, monitor)
-    stop = Stop(value=problem.task.duration, price=0.0, result=first, problem=problem)
+    stop = Extremal(value=problem.task.duration, price=0.0, result=first, problem=problem)
     family = durations(problem, first, way, monitor, lambda duration: width(accuracy, duration))
     return [stop, *(each for each in collected(family, accuracy) if each.result.converged)]
 
 
-def _stops(problem: MotionProblem, settings: Settings, monitor: Monitor, accuracy: float,
-           start: Stop | None) -> list[Stop]:
+def _stops(problem: MotionProblem, settings: SolverSettings, monitor: Monitor, accuracy: float,
+           start: Extremal | None) -> list[Extremal]:
     """Return the motions on the way to the shortest duration."""
     way, bare = way_to(accuracy, settings), without_weights(problem)
     for factor in _LONGER:
         slow = changed(bare, duration=min(factor * problem.task.duration, MAX_DURATION))
-        first = None if start is None else taken_over(slow, Start.of(start), way, monitor,
+        first = None if start is None else taken_over(slow, SearchStart.of(start), way, monitor,
                                                       payload=False)
         stops = collected(quickest(slow, way, monitor, first=first,
                                    enough=lambda duration: width(accuracy, duration)), accuracy)
@@ -199,7 +204,8 @@ def _stops(problem: MotionProblem, settings: Settings, monitor: Monitor, accurac
 
 
 def payload_against_duration(task: Task, durations: ArrayLike, *, model: ArmModel | None = None,
-                             settings: Settings | None = None, monitor: Monitor | None = None,
+                             settings: SolverSettings | None = None,
+                             monitor: Monitor | None = None,
                              accuracy: float = 1e-3) -> Iterator[MaxPayload]:
     """
     Yield the maximum payload for each duration, each search starting from the one before.
@@ -228,7 +234,7 @@ def payload_against_duration(task: Task, durations: ArrayLike, *, model: ArmMode
                              accuracy)
 
 
-def _against_duration(tasks: list[Task], model: ArmModel, settings: Settings | None,
+def _against_duration(tasks: list[Task], model: ArmModel, settings: SolverSettings | None,
                       monitor: Monitor, accuracy: float) -> Iterator[MaxPayload]:
     near: MaxPayload | None = None
     far: MaxPayload | None = None

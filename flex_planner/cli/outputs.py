@@ -15,7 +15,7 @@ from flex_planner.base.errors import InvalidValueError, RecordingError
 from flex_planner.capacity.max_payload import MaxPayload
 from flex_planner.cli.request import Request
 from flex_planner.planning.plan import Plan
-from flex_planner.planning.sampling import Reference
+from flex_planner.planning.sampling import SampledPlan
 from flex_planner.reports.motion import Row
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ class Outputs:
         return cls(folder=options.output, stem=Path(options.arm).stem, draws=draws,
                    recorder=_recorder(request, options.output) if records else None)
 
-    def write_plan(self, plan: Plan, reference: Reference | None) -> Iterator[Row]:
+    def write_plan(self, plan: Plan, reference: SampledPlan | None) -> Iterator[Row]:
         """Write what came of a plan; yield names and paths, one by one as they are written."""
         if self.draws and plan.solved:
             yield self._motion(plan)
@@ -73,7 +73,7 @@ class Outputs:
             yield 'recording', str(self.recorder.record_plan(plan, reference))
 
     def write_search(self, found: MaxPayload, accuracy: float, step: float,
-                     reference: Reference | None) -> Iterator[Row]:
+                     reference: SampledPlan | None) -> Iterator[Row]:
         """Write what came of a search, see `write_plan`."""
         solved = found.plan if found.plan is not None and found.plan.solved else None
         if self.draws and (solved or found.front.payloads.size or found.trials):

@@ -9,7 +9,7 @@ import time
 from flex_planner.capacity.max_payload import MaxPayload
 from flex_planner.cli.request import Request
 from flex_planner.planning.plan import Plan
-from flex_planner.planning.sampling import Reference
+from flex_planner.planning.sampling import SampledPlan
 from flex_planner.ros.messages.payload_searches import (
     report_from_search,
     search_message,
@@ -63,18 +63,18 @@ class RequestRecorder:
             torque_tolerance=request.sampling.torque_tolerance)
         self._recorder = OutcomeRecorder(task.arm, _NODE)
 
-    def record_plan(self, plan: Plan, reference: Reference | None) -> Path:
+    def record_plan(self, plan: Plan, reference: SampledPlan | None) -> Path:
         """Record a plan and return the folder; `reference` only if it is solved."""
         return self._record(report_from_plan(plan), plan, reference, plan.planning_time, None)
 
     def record_search(self, found: MaxPayload, accuracy: float, step: float,
-                      reference: Reference | None) -> Path:
+                      reference: SampledPlan | None) -> Path:
         """Record a search for the maximum payload, see `record_plan`."""
         options = SearchOptions(method=found.method, accuracy=accuracy, step=step)
         return self._record(report_from_search(found), found.plan, reference,
                             found.planning_time, search_message(found, options))
 
-    def _record(self, report: PlanReport, plan: Plan | None, reference: Reference | None,
+    def _record(self, report: PlanReport, plan: Plan | None, reference: SampledPlan | None,
                 seconds: float, search: PayloadSearch | None) -> Path:
         """Write a recording; the request is said to have come when planning began."""
         trajectory, took = FlexibleTrajectory(), int(seconds * 1e9)

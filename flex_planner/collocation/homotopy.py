@@ -10,9 +10,9 @@ from flex_planner.collocation import (
     BoundaryValueProblem,
     CollocationResult,
     CollocationSolution,
-    Settings,
     solve,
-    Status,
+    SolverSettings,
+    SolverStatus,
 )
 from flex_planner.collocation.mesh import coarsened
 import numpy as np
@@ -25,11 +25,11 @@ _SMALLEST_STEP = 1 / 256
 # so few iterations show that the step may grow
 _EASY = 6
 
-STOPPED = (Status.CANCELED, Status.TIMEOUT)
+STOPPED = (SolverStatus.CANCELED, SolverStatus.TIMEOUT)
 
 
 def walk(problem_at: Callable[[float], BoundaryValueProblem], start: CollocationSolution,
-         settings: Settings, monitor: Monitor, first_step: float) -> CollocationResult:
+         settings: SolverSettings, monitor: Monitor, first_step: float) -> CollocationResult:
     """
     Follow the solutions of a family of problems from 0 to 1.
 
@@ -39,7 +39,7 @@ def walk(problem_at: Callable[[float], BoundaryValueProblem], start: Collocation
         The problem at a share of the way.
     start : CollocationSolution
         Solves the problem at 0, at least nearly.
-    settings : Settings
+    settings : SolverSettings
         Of the solution at 1.
     monitor : Monitor
         Watches and may stop it.
@@ -77,11 +77,11 @@ def _refined(point: CollocationSolution, most: int) -> CollocationSolution:
     return point.on_mesh(np.interp(places, np.arange(before + 1), point.mesh))
 
 
-def loose(settings: Settings) -> Settings:
+def loose(settings: SolverSettings) -> SolverSettings:
     """Return settings for a problem on the way."""
     return replace(settings, error_tolerance=max(_TOLERANCE, settings.error_tolerance))
 
 
-def _cheap(settings: Settings) -> Settings:
+def _cheap(settings: SolverSettings) -> SolverSettings:
     """Return settings for a step that may fail."""
     return replace(loose(settings), max_iterations=min(_ITERATIONS, settings.max_iterations))

@@ -32,7 +32,7 @@ _NEAR, _MOST_RESCUES = 0.2, 4
 _RESOLVED, _MOST_PLACEMENTS = 1e-2, 4
 
 
-class Status(Enum):
+class SolverStatus(Enum):
     """How a solve ended; the value is shown to people."""
 
     CONVERGED = 'converged'
@@ -43,7 +43,7 @@ class Status(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Settings:
+class SolverSettings:
     """
     How a boundary-value problem is solved.
 
@@ -101,7 +101,7 @@ class CollocationResult:
     ----------
     solution : CollocationSolution
         The last point accepted; if solved, improved by its error estimate.
-    status : Status
+    status : SolverStatus
         Only ``CONVERGED`` is a solution.
     errors : numpy.ndarray, shape (m,)
         Estimated error of each unknown at the nodes relative to its magnitude; ``inf`` unless
@@ -121,7 +121,7 @@ class CollocationResult:
     """
 
     solution: CollocationSolution
-    status: Status
+    status: SolverStatus
     errors: Array
     residual: float
     switches: Array
@@ -132,10 +132,10 @@ class CollocationResult:
     @property
     def converged(self) -> bool:
         """Whether this is a solution."""
-        return self.status is Status.CONVERGED
+        return self.status is SolverStatus.CONVERGED
 
 
-def solve(problem: BoundaryValueProblem, guess: CollocationSolution, settings: Settings,
+def solve(problem: BoundaryValueProblem, guess: CollocationSolution, settings: SolverSettings,
           monitor: Monitor | None = None, *, expected_error: float = 1.0) -> CollocationResult:
     """
     Solve a two-point boundary-value problem.
@@ -146,7 +146,7 @@ def solve(problem: BoundaryValueProblem, guess: CollocationSolution, settings: S
         z' = F(t, z) with separated boundary conditions.
     guess : CollocationSolution
         Start; its mesh is the first mesh, its rule is replaced by that of the settings.
-    settings : Settings
+    settings : SolverSettings
         Tolerances and limits.
     monitor : Monitor, optional
         Watches the iterations and may stop them.
@@ -164,7 +164,7 @@ class _Solver:
     """The state of one call of `solve`."""
 
     def __init__(self, problem: BoundaryValueProblem, guess: CollocationSolution,
-                 settings: Settings, monitor: Monitor, expected: float) -> None:
+                 settings: SolverSettings, monitor: Monitor, expected: float) -> None:
         self._problem, self._point, self._settings = problem, guess, settings
         self._monitor = monitor
         self._iterations, self._meshes, self._rescues = 0, 1, 0
@@ -191,7 +191,7 @@ class _Solver:
                 self._expected = estimate.worst  # the mesh deserves a better solution
                 continue
             if estimate.worst <= settings.error_tolerance:
-                return self._result(estimate.improved, Status.CONVERGED, estimate, switches)
+                return self._result(estimate.improved, SolverStatus.CONVERGED, estimate, switches)
             if not self._refine(estimate, switches):
                 return self._mesh_limit(estimate, switches)
 
@@ -282,7 +282,7 @@ class _Solver:
         self._meshes += 1
         return True
 
-    def _result(self, solution: CollocationSolution, status: Status, estimate: Estimate,
+    def _result(self, solution: CollocationSolution, status: SolverStatus, estimate: Estimate,
                 switches: Array, message: str = '') -> CollocationResult:
         return CollocationResult(
             solution=solution, status=status, errors=estimate.errors,
@@ -290,8 +290,9 @@ class _Solver:
             iterations=self._iterations, meshes=self._meshes, message=message or status.value)
 
     def _failed(self, outcome: NewtonOutcome) -> CollocationResult:
-        stops = {StopReason.CANCELED: Status.CANCELED, StopReason.TIMEOUT: Status.TIMEOUT}
-        status = stops[outcome.stopped] if outcome.stopped else Status.NEWTON_FAILED
+        stops = {StopReason.CANCELED: SolverStatus.CANCELED,
+                 StopReason.TIMEOUT: SolverStatus.TIMEOUT}
+        status = stops[outcome.stopped] if outcome.stopped else SolverStatus.NEWTON_FAILED
         return CollocationResult(
             solution=outcome.solution, status=status,
             errors=np.full(self._problem.size, np.inf), residual=np.inf, switches=np.zeros(0),
@@ -300,4 +301,4 @@ class _Solver:
     def _mesh_limit(self, estimate: Estimate, switches: Array) -> CollocationResult:
         message = (f'an error of {estimate.worst:.1e} is left on {self._point.intervals} '
                    f'intervals, {self._settings.error_tolerance:.1e} was asked for')
-        return self._result(self._point, Status.MESH_LIMIT, estimate, switches, message)
+        return self._result(self._point, SolverStatus.MESH_LIMIT, estimate, switches, message)

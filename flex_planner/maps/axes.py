@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.validation import Array, integer, number
-from flex_planner.base.yaml_files import Section
+from flex_planner.base.yaml_files import YamlSection
 from flex_planner.optimal_control.task import MAX_DURATION, MAX_PAYLOAD
 import numpy as np
 
@@ -134,7 +134,7 @@ def _rising(field: str, values: object) -> Array:
     return array
 
 
-def read_axes(section: Section) -> tuple[Axis, ...]:
+def read_axes(section: YamlSection) -> tuple[Axis, ...]:
     """
     Return the axes of a study file, in its order.
 
@@ -158,14 +158,14 @@ def check_cells(cells: int) -> None:
         raise InvalidValueError('number of cells', cells, f'at most {MAX_CELLS}')
 
 
-def _read_axis(section: Section, name: str, cells: int) -> Axis:
+def _read_axis(section: YamlSection, name: str, cells: int) -> Axis:
     """Return an axis given as a list or as a range, after others with so many cells."""
     if name not in AXES:
         raise InvalidValueError(section.name(str(name)), 'given', f'one of {list(AXES)}')
     content = section.take(name)
     if not isinstance(content, Mapping):
         return Axis(name=name, values=content)
-    part, unit = Section(section.name(name), content), AXES[name].unit
+    part, unit = YamlSection(section.name(name), content), AXES[name].unit
     low = part.number('from', unit=unit)
     high = part.number('to', above=low, unit=unit)
     count = integer(part.name('count'), part.take('count'), at_least=2, at_most=MAX_CELLS)

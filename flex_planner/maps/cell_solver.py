@@ -11,7 +11,7 @@ from flex_planner.base.progress import Monitor
 from flex_planner.capacity.extrapolation import thinned
 from flex_planner.capacity.max_payload import find_max_payload, MaxPayload
 from flex_planner.capacity.min_duration import find_min_duration, MinDuration
-from flex_planner.collocation import Settings
+from flex_planner.collocation import SolverSettings
 from flex_planner.dynamics.arm_dynamics import PlantModel
 from flex_planner.maps.cell_results import CellCode, CellResult
 from flex_planner.maps.kept_motions import KeptMotion
@@ -25,7 +25,7 @@ from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.strategies.first_extremals import first_motion
 from flex_planner.planning.strategies.price_continuation import on_the_way
 from flex_planner.simulation.comparison import finely_sampled
-from flex_planner.simulation.execution import carried_out, Setting, Way
+from flex_planner.simulation.execution import execute_plan, ExecutionMode, Setting
 from flex_planner.simulation.joint_control import Gains
 import numpy as np
 
@@ -89,7 +89,8 @@ class Solver:
             return plan
         return self._shaken(index, task, plan, monitor)
 
-    def _payload(self, problem: MotionProblem, settings: Settings, monitor: Monitor, near: Any,
+    def _payload(self, problem: MotionProblem, settings: SolverSettings, monitor: Monitor,
+                 near: Any,
                  far: Any, ratio: float) -> Found:
         """
         Return the largest payload, or the shortest duration where that is too long.
@@ -129,8 +130,8 @@ class Solver:
         goal = tip_position(task.arm, plan.problem.goal[:task.arm.n_coordinates])
         setting = Setting(model=PlantModel(arm), gains=gains, rate=_RATE, payload_mass=carried,
                           goal=goal, settling=study.settling, monitor=monitor)
-        way = Way.FLEXIBLE if study.gains else Way.FLEXIBLE_OPEN
-        outcome = carried_out(way, plan, finely_sampled(plan, monitor), setting)
+        way = ExecutionMode.FLEXIBLE if study.gains else ExecutionMode.FLEXIBLE_OPEN
+        outcome = execute_plan(way, plan, finely_sampled(plan, monitor), setting)
         return Vibration(plan=plan, peak_to_peak=outcome.residual.tip)
 
     def result(self, index: tuple[int, ...], found: Found) -> CellResult:
@@ -150,15 +151,15 @@ class Solver:
                           motion=_kept(found, plan) if self._study.keeps_motions else None)
 
 
-def _settings(problem: MotionProblem) -> Settings:
+def _settings(problem: MotionProblem) -> SolverSettings:
     """Return the settings of a cell, so that none takes much more memory than others."""
-    settings = Settings()
+    settings = SolverSettings()
     fewest = problem.fewest_intervals(settings.stages)
     most = min(max(_INTERVALS, _LARGEST * fewest), settings.max_intervals)
     return replace(settings, max_intervals=most)
 
 
-def _may_be_none(problem: MotionProblem, settings: Settings, near: MaxPayload | None,
+def _may_be_none(problem: MotionProblem, settings: SolverSettings, near: MaxPayload | None,
                  far: MaxPayload | None, ratio: float, monitor: Monitor) -> bool:
     """Return whether neighbours, or a first trial, let expect that nothing can be carried."""
     if near is None:
@@ -171,7 +172,7 @@ def _kept(found: Found, plan: Plan) -> KeptMotion | None:
     """Return what others may start from: near a limit, the last motion but one on the way."""
     if isinstance(found, MaxPayload) and found.stops:
         stop = found.stops[-2:][0]
-        motion = thinned(stop, on_the_way(Settings()))
+        motion = thinned(stop, on_the_way(SolverSettings()))
         return KeptMotion.of(stop.problem, motion.solution, stop.price)
     return None if plan.solution is None else KeptMotion.of(plan.problem, plan.solution)
 

@@ -15,7 +15,7 @@ from flex_planner.collocation import CollocationSolution, GaussRule
 from flex_planner.optimal_control.arm_model import Parameters
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
 from flex_planner.optimal_control.task import Task
-from flex_planner.planning.strategies.price_continuation import Start
+from flex_planner.planning.strategies.price_continuation import SearchStart
 import numpy as np
 from numpy.typing import NDArray
 
@@ -121,9 +121,9 @@ class KeptMotion:
         return cls(signature=own, payload=payload, price=price, mesh=values[:count],
                    nodes=values[count:].reshape(count, -1))
 
-    def start(self) -> Start:
+    def start(self) -> SearchStart:
         """Return it as the start of a search for the largest payload."""
-        return Start(value=self.payload, price=self.price, solution=self.solution())
+        return SearchStart(value=self.payload, price=self.price, solution=self.solution())
 
     def solution(self) -> CollocationSolution:
         """Return it as a guess, linear between the nodes."""

@@ -18,7 +18,7 @@ from flex_planner.base.errors import (
     UnreachableError,
 )
 from flex_planner.base.validation import Array, integer, number, vector
-from flex_planner.base.yaml_files import read_yaml, Section, YamlFileError
+from flex_planner.base.yaml_files import read_yaml, YamlFileError, YamlSection
 from flex_planner.maps.axes import Axis, tiles
 from flex_planner.maps.cell_results import CellCode, CellResult
 from flex_planner.maps.end_points import End, middle_posture
@@ -297,7 +297,7 @@ def load_study(path: str | os.PathLike[str]) -> Study:
     file = Path(path)
     try:
         text, content = read_yaml(file)
-        top = Section('', content)
+        top = YamlSection('', content)
         study: Study = top.build(Study, text=text, **read_fields(top, file.parent))
     except YamlFileError as error:
         raise StudyError(str(error)) from None

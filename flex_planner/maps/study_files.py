@@ -11,7 +11,7 @@ from flex_planner.arms.arm import Arm, MAX_MODES
 from flex_planner.arms.arm_files import arm_from_mapping, ArmFileError, load_arm
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.validation import Array, integer, number, vector
-from flex_planner.base.yaml_files import Section
+from flex_planner.base.yaml_files import YamlSection
 from flex_planner.maps.axes import Axis, read_axes
 from flex_planner.maps.end_points import End
 from flex_planner.maps.quantities import Quantity
@@ -25,7 +25,7 @@ _GIVEN_BY = {'duration': 'duration', 'payload_mass': 'payload_mass',
              'velocity_weights': 'velocity_weight'}
 
 
-def read_fields(top: Section, folder: Path) -> dict[str, Any]:
+def read_fields(top: YamlSection, folder: Path) -> dict[str, Any]:
     """
     Return the arguments of `Study` that a file gives; paths are relative to its folder.
 
@@ -52,7 +52,7 @@ def read_fields(top: Section, folder: Path) -> dict[str, Any]:
             **_simulated(top, quantity, arm.n_joints)}
 
 
-def _quantity(top: Section) -> Quantity:
+def _quantity(top: YamlSection) -> Quantity:
     """Return the quantity by its key."""
     given = top.text('quantity')
     kinds = {quantity.key: quantity for quantity in Quantity}
@@ -61,7 +61,7 @@ def _quantity(top: Section) -> Quantity:
     return kinds[given]
 
 
-def _arm(top: Section, folder: Path) -> Arm:
+def _arm(top: YamlSection, folder: Path) -> Arm:
     """Return the arm: a preset, a file or a mapping, with another number of modes if given."""
     given = top.take('arm')
     if isinstance(given, str):
@@ -80,7 +80,7 @@ def _arm(top: Section, folder: Path) -> Arm:
     return Mismatch(modes=modes).applied(arm)
 
 
-def _refuse_given_twice(top: Section, axes: tuple[Axis, ...]) -> None:
+def _refuse_given_twice(top: YamlSection, axes: tuple[Axis, ...]) -> None:
     """Refuse a field whose value an axis gives."""
     names = {axis.name for axis in axes}
     for key, axis in _GIVEN_BY.items():
@@ -92,7 +92,7 @@ def _refuse_given_twice(top: Section, axes: tuple[Axis, ...]) -> None:
                                     f'left out: the axes {key}_x and {key}_y give it')
 
 
-def _end(top: Section, name: str, axes: tuple[Axis, ...]) -> End:
+def _end(top: YamlSection, name: str, axes: tuple[Axis, ...]) -> End:
     """Return the start or the goal, given as a point, as angles or by axes."""
     angles = f'{name}_angles'
     if top.has(angles):
@@ -117,7 +117,7 @@ def _numbers(field: str, values: object) -> Array:
     return np.array(values, dtype=np.float64)
 
 
-def _block_shape(top: Section, axes: tuple[Axis, ...]) -> tuple[int, ...]:
+def _block_shape(top: YamlSection, axes: tuple[Axis, ...]) -> tuple[int, ...]:
     """Return the sizes of blocks, 1 along axes that are left out; empty if none are given."""
     if not top.has('block'):
         return ()
@@ -128,7 +128,7 @@ def _block_shape(top: Section, axes: tuple[Axis, ...]) -> tuple[int, ...]:
     return shape
 
 
-def _simulated(top: Section, quantity: Quantity, joints: int) -> dict[str, Any]:
+def _simulated(top: YamlSection, quantity: Quantity, joints: int) -> dict[str, Any]:
     """Return what is said about the simulated arm."""
     if quantity is not Quantity.RESIDUAL_VIBRATION:
         for key in ('mismatch', 'gains', 'settling'):
@@ -148,7 +148,7 @@ def _simulated(top: Section, quantity: Quantity, joints: int) -> dict[str, Any]:
     return fields
 
 
-def _mismatch(part: Section, joints: int) -> dict[str, Any]:
+def _mismatch(part: YamlSection, joints: int) -> dict[str, Any]:
     """Return how the simulated arm and its payload differ."""
     fields: dict[str, Any] = {}
     if part.has('payload_mass'):
@@ -161,7 +161,7 @@ def _mismatch(part: Section, joints: int) -> dict[str, Any]:
     return fields
 
 
-def _per_joint(part: Section, key: str, joints: int) -> Array:
+def _per_joint(part: YamlSection, key: str, joints: int) -> Array:
     """Return a list with an entry a joint; a number stands for all of them."""
     given, field = part.take(key), part.name(key)
     if not isinstance(given, list):

@@ -24,7 +24,7 @@ from flex_planner.paper.sections import (
 )
 
 
-class Study(Protocol):
+class SectionStudy(Protocol):
     """Computes a section; `reduced` leaves out what takes long."""
 
     def __call__(self, *, reduced: bool = False) -> Section:
@@ -32,7 +32,7 @@ class Study(Protocol):
 
 
 # in the order of the page
-STUDIES: dict[str, Study] = {
+STUDIES: dict[str, SectionStudy] = {
     '5.1': hanging.study, '5.2': effort_speed.study, '5.3': max_payload.study,
     '5.4': minimum_effort.study, '5.5': minimum_vibration.study, '6.1': beyond.front,
     '6.2': beyond.clamped, '6.3': beyond.feedforward, '6.4': beyond.modes, '7': slips.study}

@@ -8,7 +8,7 @@ Optimal paths for a given payload: Korayem et al. 2009, section 4.1.
 from __future__ import annotations
 
 from flex_planner.base.progress import Monitor
-from flex_planner.collocation import CollocationSolution, Settings
+from flex_planner.collocation import CollocationSolution, SolverSettings
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
 from flex_planner.optimal_control.task import Task
@@ -21,7 +21,7 @@ from flex_planner.planning.weight_search import adapted
 WARM_START = 'warm start'
 
 
-def plan_path(task: Task, *, model: ArmModel | None = None, settings: Settings | None = None,
+def plan_path(task: Task, *, model: ArmModel | None = None, settings: SolverSettings | None = None,
               monitor: Monitor | None = None,
               start_from: Plan | CollocationSolution | None = None,
               objectives: Objectives | None = None) -> Plan:
@@ -34,7 +34,7 @@ def plan_path(task: Task, *, model: ArmModel | None = None, settings: Settings |
         The motion.
     model : ArmModel, optional
         Of the task's arm; compiled or read from disk if not given.
-    settings : Settings, optional
+    settings : SolverSettings, optional
         Of the boundary-value solver.
     monitor : Monitor, optional
         Receives progress, and may cancel or limit the time.
@@ -57,7 +57,7 @@ def plan_path(task: Task, *, model: ArmModel | None = None, settings: Settings |
         task.
 
     """
-    settings, monitor = settings or Settings(), monitor or Monitor()
+    settings, monitor = settings or SolverSettings(), monitor or Monitor()
     model = model or ArmModel(task.arm)
     problem = MotionProblem(model, task, task_parameters(task))
     start = start_from.solution if isinstance(start_from, Plan) else start_from

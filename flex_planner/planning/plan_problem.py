@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from flex_planner.base.progress import Monitor, StoppedError, StopReason
-from flex_planner.collocation import CollocationResult, Settings, solve, Status
+from flex_planner.collocation import CollocationResult, solve, SolverSettings, SolverStatus
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import MAX_DURATION
 from flex_planner.planning.certificate import CertificateLimits, certify, totals
@@ -27,7 +27,7 @@ LADDER: Rungs = (
     *THOROUGH,
 )
 
-STOPPED = {Status.TIMEOUT: PlanStatus.TIMEOUT, Status.CANCELED: PlanStatus.CANCELED}
+STOPPED = {SolverStatus.TIMEOUT: PlanStatus.TIMEOUT, SolverStatus.CANCELED: PlanStatus.CANCELED}
 STATUSES = {StopReason.TIMEOUT: PlanStatus.TIMEOUT, StopReason.CANCELED: PlanStatus.CANCELED}
 _REFINEMENTS = 2
 _REFINEMENT_FACTOR = 10.0
@@ -36,7 +36,7 @@ _STRICTER = 100.0
 _FEW, _GUESSES = 4, (2.0, 4.0, 8.0)
 
 
-def planned(problem: MotionProblem, rungs: Rungs, settings: Settings,
+def planned(problem: MotionProblem, rungs: Rungs, settings: SolverSettings,
             monitor: Monitor) -> Plan:
     """Return the certified plan of a problem by the first strategy that solves it."""
     try:
@@ -48,7 +48,7 @@ def planned(problem: MotionProblem, rungs: Rungs, settings: Settings,
 
 
 def _planned(problem: MotionProblem, rungs: Rungs,
-             settings: Settings, monitor: Monitor) -> Plan:
+             settings: SolverSettings, monitor: Monitor) -> Plan:
     """Solve and certify."""
     if problem.task.time_weight:
         return _planned_in_any_time(problem, rungs, settings, monitor)
@@ -57,20 +57,20 @@ def _planned(problem: MotionProblem, rungs: Rungs,
 
 
 def _planned_in_any_time(problem: MotionProblem, rungs: Rungs,
-                         settings: Settings, monitor: Monitor) -> Plan:
+                         settings: SolverSettings, monitor: Monitor) -> Plan:
     """Solve for the duration of the task or a longer one, then free it."""
     limits = {walked_payload, walked_duration}  # what the guess forbids is no limit of the task
     rungs = tuple(rung for rung in rungs if rung[1] not in limits)
     strategy, attempt = _first_solution(problem, rungs[:_FEW], settings, monitor)
     for factor in _GUESSES:
         longer = factor * problem.task.duration
-        if attempt.result.status is not Status.NEWTON_FAILED or longer > MAX_DURATION:
+        if attempt.result.status is not SolverStatus.NEWTON_FAILED or longer > MAX_DURATION:
             break
         slow = MotionProblem(problem.model, replace(problem.task, duration=longer),
                              problem.parameters)
         strategy, attempt = _first_solution(slow, rungs[:_FEW], settings, monitor)
         problem = slow if attempt.result.converged else problem
-    if attempt.result.status is Status.NEWTON_FAILED:
+    if attempt.result.status is SolverStatus.NEWTON_FAILED:
         strategy, attempt = _first_solution(problem, rungs[_FEW:], settings, monitor)
     if attempt.result.converged:
         monitor.phase = 'duration freed'
@@ -79,7 +79,7 @@ def _planned_in_any_time(problem: MotionProblem, rungs: Rungs,
     return _concluded(problem, strategy, attempt, settings, monitor)
 
 
-def _concluded(problem: MotionProblem, strategy: str, attempt: Attempt, settings: Settings,
+def _concluded(problem: MotionProblem, strategy: str, attempt: Attempt, settings: SolverSettings,
                monitor: Monitor) -> Plan:
     """Return the plan of an attempt, certified if it solved the task."""
     result = attempt.result
@@ -93,7 +93,7 @@ def _concluded(problem: MotionProblem, strategy: str, attempt: Attempt, settings
 
 
 def _first_solution(problem: MotionProblem, rungs: Rungs,
-                    settings: Settings, monitor: Monitor) -> tuple[str, Attempt]:
+                    settings: SolverSettings, monitor: Monitor) -> tuple[str, Attempt]:
     """Try the strategies in order; report the first that decides it, or all failures."""
     failures, names = [], []
     for name, strategy in rungs:
@@ -109,7 +109,7 @@ def _first_solution(problem: MotionProblem, rungs: Rungs,
     return ', '.join(names), Attempt(result=replace(last.result, message='; '.join(failures)))
 
 
-def _certified(plan: Plan, result: CollocationResult, settings: Settings,
+def _certified(plan: Plan, result: CollocationResult, settings: SolverSettings,
                monitor: Monitor) -> Plan:
     """Certify a solution; where the certificate fails, solve more exactly."""
     limits = CertificateLimits(boundary_error=plan.task.tolerance)

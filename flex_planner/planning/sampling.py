@@ -32,7 +32,7 @@ _FEW = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Reference:
+class SampledPlan:
     """
     A sampled plan.
 
@@ -82,8 +82,8 @@ class SamplingSettings:
         number('torque_tolerance', self.torque_tolerance, above=0, unit='N m')
 
 
-def sample_reference(plan: Plan, settings: SamplingSettings,
-                     monitor: Monitor | None = None) -> Reference:
+def sample_plan(plan: Plan, settings: SamplingSettings,
+                monitor: Monitor | None = None) -> SampledPlan:
     """
     Return samples of a solved plan, and one more that holds the arm.
 
@@ -111,8 +111,8 @@ def sample_reference(plan: Plan, settings: SamplingSettings,
     times, error = _fitting(plan, settings, watch)
     times_ns = np.round(times * 1e9).astype(np.int64)
     moving = _at_rest_at_the_ends(plan, plan.sample(np.minimum(times_ns * 1e-9, duration)))
-    return Reference(times_ns=np.append(times_ns, times_ns[-1] + HOLD_DELAY_NS),
-                     samples=_with_hold(plan, moving), torque_error=error)
+    return SampledPlan(times_ns=np.append(times_ns, times_ns[-1] + HOLD_DELAY_NS),
+                       samples=_with_hold(plan, moving), torque_error=error)
 
 
 def _fitting(plan: Plan, settings: SamplingSettings, watch: Monitor) -> tuple[Array, float]:

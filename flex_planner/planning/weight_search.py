@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 from flex_planner.base.progress import Monitor, StoppedError
 from flex_planner.base.validation import Array
-from flex_planner.collocation import CollocationResult, CollocationSolution, Settings, solve
+from flex_planner.collocation import CollocationResult, CollocationSolution, solve, SolverSettings
 from flex_planner.collocation.homotopy import STOPPED, walk
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
 from flex_planner.planning.certificate import totals
@@ -44,7 +44,8 @@ _IDLE, _IDLE_TURNS, _MOST_TURNS = 0.9, 2, 30
 _INSIDE, _NEARLY = 0.1, 0.9
 
 
-def adapted(plan: Plan, objectives: Objectives, settings: Settings, monitor: Monitor) -> Plan:
+def adapted(plan: Plan, objectives: Objectives, settings: SolverSettings,
+            monitor: Monitor) -> Plan:
     """
     Return the plan with the smallest weights that meet the objectives.
 
@@ -108,7 +109,7 @@ class _Search:
     """Weights tried, and the motions that they led to."""
 
     def __init__(self, problem: MotionProblem, solution: CollocationSolution,
-                 objectives: Objectives, settings: Settings, monitor: Monitor) -> None:
+                 objectives: Objectives, settings: SolverSettings, monitor: Monitor) -> None:
         self._base, self._objectives = problem, objectives
         self._settings, self._monitor = settings, monitor
         self._limited = objectives.limited(problem.model.arm)

@@ -7,14 +7,15 @@ from pathlib import Path
 from flex_planner.base.validation import Array
 from flex_planner.plotting.figures import finish, save, say
 from flex_planner.simulation.comparison import Comparison
-from flex_planner.simulation.execution import Outcome, Way
+from flex_planner.simulation.execution import ExecutionMode, ExecutionResult
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 import numpy as np
 
 _MILLI = 1e3
-_STYLES = {Way.FLEXIBLE_OPEN: ('C0', '--'), Way.RIGID_OPEN: ('C3', '--'),
-           Way.FLEXIBLE: ('C0', '-'), Way.RIGID: ('C3', '-'), Way.PD_ONLY: ('C1', '-')}
+_STYLES = {ExecutionMode.FLEXIBLE_OPEN: ('C0', '--'), ExecutionMode.RIGID_OPEN: ('C3', '--'),
+           ExecutionMode.FLEXIBLE: ('C0', '-'), ExecutionMode.RIGID: ('C3', '-'),
+           ExecutionMode.PD_ONLY: ('C1', '-')}
 # of the tip's distance from the goal: less is rounding and sampling
 _FLOOR = 1e-6  # [mm]
 _MARGIN = 0.15
@@ -69,7 +70,7 @@ def _draw_distance(axes: Axes, comparison: Comparison) -> None:
 
 def _draw_paths(axes: Axes, comparison: Comparison) -> None:
     """Draw the path of the tip near the goal, from the arrival on."""
-    near = [outcome for outcome in comparison.outcomes if outcome.way is not Way.PD_ONLY]
+    near = [outcome for outcome in comparison.outcomes if outcome.way is not ExecutionMode.PD_ONLY]
     reach = 0.0
     for outcome in comparison.outcomes:
         color, style = _STYLES[outcome.way]
@@ -106,7 +107,7 @@ def _draw_torques(axes: Axes, comparison: Comparison, joint: int) -> None:
     finish(axes, f'torque of joint {joint + 1}', 'torque [N m]')
 
 
-def _after_arrival(outcome: Outcome) -> tuple[Array, Array]:
+def _after_arrival(outcome: ExecutionResult) -> tuple[Array, Array]:
     """Return times since the arrival, and the tip."""
     times = outcome.execution.times - outcome.arrival
     after = times >= -1e-9

@@ -5,7 +5,7 @@ from __future__ import annotations
 from flex_planner.planning.plan import Plan
 from flex_planner.reports.motion import columns, planning_row, Row
 from flex_planner.simulation.comparison import Comparison
-from flex_planner.simulation.execution import Outcome
+from flex_planner.simulation.execution import ExecutionResult
 
 _MILLI = 1e3
 
@@ -49,7 +49,7 @@ def _planning(plan: Plan) -> str:
     return ': '.join(dict.fromkeys([plan.status.value, plan.message]))
 
 
-def _cells(outcome: Outcome) -> list[str]:
+def _cells(outcome: ExecutionResult) -> list[str]:
     values = (outcome.arrival_error, outcome.final_error, outcome.residual.tip, outcome.bending,
               outcome.tracking_error)
     return [outcome.way.value, *(f'{value * _MILLI:.3g}' for value in values)]

@@ -16,7 +16,7 @@ from flex_planner.ros.runtime.running import run_node
 from flex_planner.ros.settings.simulator import SimulatorSettings
 from flex_planner.simulation.joint_control import JointReference
 from flex_planner.simulation.plant import Plant
-from flex_planner.simulation.settling import ArrivalWatch, Residual
+from flex_planner.simulation.settling import ArrivalWatch, ResidualVibration
 from geometry_msgs.msg import PointStamped
 import numpy as np
 from rclpy.node import Node
@@ -145,7 +145,7 @@ class ArmSimulator(Node):  # type: ignore[misc]
         if residual is not None:
             self._publish_residual(residual)
 
-    def _publish_residual(self, residual: Residual) -> None:
+    def _publish_residual(self, residual: ResidualVibration) -> None:
         """Publish what was left after an arrival."""
         self._vibration.publish(Float64(data=residual.tip))
         self._bending.publish(Float64(data=residual.bending))

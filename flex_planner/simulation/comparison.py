@@ -21,12 +21,12 @@ from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.sampling import (
     MAX_SAMPLES,
-    Reference,
-    sample_reference,
+    sample_plan,
+    SampledPlan,
     SamplingSettings,
 )
 from flex_planner.planning.strategies.initial_guesses import rigid_problem
-from flex_planner.simulation.execution import carried_out, Outcome, Setting, Way
+from flex_planner.simulation.execution import execute_plan, ExecutionMode, ExecutionResult, Setting
 from flex_planner.simulation.joint_control import Gains
 from flex_planner.simulation.mismatch import Mismatch
 from flex_planner.simulation.plant import Control
@@ -53,8 +53,8 @@ class Comparison:
         Where the tip is to go [m].
     settling : float
         How long the arm is watched after its arrival [s].
-    outcomes : tuple of Outcome
-        In the order of `Way`; without those of a plan that failed.
+    outcomes : tuple of ExecutionResult
+        In the order of `ExecutionMode`; without those of a plan that failed.
 
     """
 
@@ -64,14 +64,14 @@ class Comparison:
     payload_mass: float
     goal: Array
     settling: float
-    outcomes: tuple[Outcome, ...]
+    outcomes: tuple[ExecutionResult, ...]
 
     @property
     def solved(self) -> bool:
         """Return whether there is a plan for every way."""
         return self.flexible.solved and self.rigid.solved
 
-    def of(self, way: Way) -> Outcome:
+    def of(self, way: ExecutionMode) -> ExecutionResult:
         """Return one outcome; KeyError if its plan failed."""
         return {outcome.way: outcome for outcome in self.outcomes}[way]
 
@@ -135,21 +135,21 @@ def compare(task: Task, *, model: ArmModel | None = None, mismatch: Mismatch | N
                       outcomes=_outcomes(flexible, rigid, setting))
 
 
-def _outcomes(flexible: Plan, rigid: Plan, setting: Setting) -> tuple[Outcome, ...]:
+def _outcomes(flexible: Plan, rigid: Plan, setting: Setting) -> tuple[ExecutionResult, ...]:
     """Carry out every way whose plan is solved."""
     references = {plan is rigid: finely_sampled(plan, setting.monitor)
                   for plan in (flexible, rigid) if plan.solved}
     plans = {False: flexible, True: rigid}
     found = []
-    for way in Way:
+    for way in ExecutionMode:
         if way.rigid in references:
             setting.monitor.phase = way.value
-            found.append(carried_out(way, plans[way.rigid], references[way.rigid], setting))
+            found.append(execute_plan(way, plans[way.rigid], references[way.rigid], setting))
     return tuple(found)
 
 
-def finely_sampled(plan: Plan, monitor: Monitor) -> Reference:
+def finely_sampled(plan: Plan, monitor: Monitor) -> SampledPlan:
     """Return samples as close as they may be."""
     step = max(_STEP, plan.task.duration / (MAX_SAMPLES - 1))
     settings = SamplingSettings(longest_step=step, torque_tolerance=_TORQUE_TOLERANCE)
-    return sample_reference(plan, settings, monitor)
+    return sample_plan(plan, settings, monitor)

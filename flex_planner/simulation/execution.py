@@ -11,16 +11,16 @@ from flex_planner.base.validation import Array
 from flex_planner.dynamics.arm_dynamics import PlantModel
 from flex_planner.dynamics.statics import equilibrium, residual_vibration
 from flex_planner.planning.plan import Plan
-from flex_planner.planning.sampling import Reference
+from flex_planner.planning.sampling import SampledPlan
 from flex_planner.simulation.joint_control import Gains, JointReference
 from flex_planner.simulation.plant import Control, Plant
-from flex_planner.simulation.settling import Residual
+from flex_planner.simulation.settling import ResidualVibration
 import numpy as np
 
 _SETTLED = 0.1  # of the time after arrival
 
 
-class Way(Enum):
+class ExecutionMode(Enum):
     """How a task is planned and carried out; the value is shown to people."""
 
     FLEXIBLE_OPEN = 'flexible plan, torque only'
@@ -32,16 +32,16 @@ class Way(Enum):
     @property
     def rigid(self) -> bool:
         """Return whether the plan takes the links as rigid."""
-        return self in (Way.RIGID_OPEN, Way.RIGID)
+        return self in (ExecutionMode.RIGID_OPEN, ExecutionMode.RIGID)
 
     @property
     def feedback(self) -> bool:
         """Return whether the joints are under PD."""
-        return self not in (Way.FLEXIBLE_OPEN, Way.RIGID_OPEN)
+        return self not in (ExecutionMode.FLEXIBLE_OPEN, ExecutionMode.RIGID_OPEN)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Execution:
+class SimulatedMotion:
     """
     What the arm did, at every period of the controller from 0.
 
@@ -65,13 +65,13 @@ class Execution:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Outcome:
+class ExecutionResult:
     """
     What came of one way.
 
     Attributes
     ----------
-    way : Way
+    way : ExecutionMode
         Which.
     arrival : float
         Planned duration [s].
@@ -81,24 +81,24 @@ class Outcome:
         The same after settling: the largest over the last tenth of the time [m].
     bending : float
         Largest deflection of the links if the joints were locked on arrival [m].
-    residual : Residual
+    residual : ResidualVibration
         Peak-to-peak motion from the arrival to the end; under torque alone nothing stops the
         joints, and this is mostly how far the arm drifts.
     tracking_error : float
         Largest distance of a joint from its own reference up to the arrival [rad].
-    execution : Execution
+    execution : SimulatedMotion
         All of it.
 
     """
 
-    way: Way
+    way: ExecutionMode
     arrival: float
     arrival_error: float
     final_error: float
     bending: float
-    residual: Residual
+    residual: ResidualVibration
     tracking_error: float
-    execution: Execution
+    execution: SimulatedMotion
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -134,7 +134,8 @@ class Setting:
     monitor: Monitor
 
 
-def carried_out(way: Way, plan: Plan, sampled: Reference, setting: Setting) -> Outcome:
+def execute_plan(way: ExecutionMode, plan: Plan, sampled: SampledPlan,
+                 setting: Setting) -> ExecutionResult:
     """
     Follow a sampled plan in one way.
 
@@ -150,7 +151,7 @@ def carried_out(way: Way, plan: Plan, sampled: Reference, setting: Setting) -> O
     gains = setting.gains if way.feedback else Gains.of(n, 0.0, 0.0)
     plant = Plant(
         setting.model, Control(gains=gains, rate=setting.rate,
-                               feedforward=way is not Way.PD_ONLY),
+                               feedforward=way is not ExecutionMode.PD_ONLY),
         payload_mass=setting.payload_mass, payload_inertia=plan.task.payload_inertia,
         positions=plan.task.start_positions)
     plant.follow(reference)
@@ -161,14 +162,14 @@ def carried_out(way: Way, plan: Plan, sampled: Reference, setting: Setting) -> O
     end = execution.times[-1] - _SETTLED * setting.settling
     demanded = np.array([reference.motion(time)[0] for time in execution.times[:after + 1]])
     tracking = np.abs(execution.coordinates[:after + 1, :n] - demanded).max()
-    return Outcome(
+    return ExecutionResult(
         way=way, arrival=arrival, arrival_error=float(error[after]),
         final_error=float(error[execution.times >= end].max()), bending=bending,
-        residual=Residual.of(plant.model.arm, execution.coordinates[after:]),
+        residual=ResidualVibration.of(plant.model.arm, execution.coordinates[after:]),
         tracking_error=float(tracking), execution=execution)
 
 
-def _watched(plant: Plant, arrival: float, setting: Setting) -> tuple[Execution, float]:
+def _watched(plant: Plant, arrival: float, setting: Setting) -> tuple[SimulatedMotion, float]:
     """Let an arm go; return what it did, and its bending with the joints locked on arrival."""
     n_t = plant.model.arm.n_coordinates
     times, states, torques = [0.0], [plant.state], [plant.torque]
@@ -184,8 +185,9 @@ def _watched(plant: Plant, arrival: float, setting: Setting) -> tuple[Execution,
     plant.advance(arrival + setting.settling, note)
     coordinates = np.array(states)[:, :n_t]
     torques[0] = torques[1]
-    return Execution(times=np.array(times), coordinates=coordinates, torques=np.array(torques),
-                     tip=tip_position(plant.model.arm, coordinates)), bending
+    return SimulatedMotion(times=np.array(times), coordinates=coordinates,
+                           torques=np.array(torques),
+                           tip=tip_position(plant.model.arm, coordinates)), bending
 
 
 def _bending(plant: Plant) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from flex_planner.base.validation import Array, integer, number, vector
-from flex_planner.planning.sampling import Reference
+from flex_planner.planning.sampling import SampledPlan
 import numpy as np
 
 MAX_RATE = 1e5
@@ -66,7 +66,7 @@ class JointReference:
                    torques=torques[None])
 
     @classmethod
-    def of(cls, sampled: Reference) -> JointReference:
+    def of(cls, sampled: SampledPlan) -> JointReference:
         """Return the joints of a sampled plan."""
         samples, n = sampled.samples, sampled.samples.torques.shape[1]
         times = np.multiply(sampled.times_ns, 1e-9, dtype=np.float64)

@@ -37,7 +37,7 @@ def bending_peak_to_peak(arm: Arm, coordinates: Array) -> float:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Residual:
+class ResidualVibration:
     """
     What is left after an arrival.
 
@@ -54,7 +54,7 @@ class Residual:
     bending: float
 
     @classmethod
-    def of(cls, arm: Arm, coordinates: Array) -> Residual:
+    def of(cls, arm: Arm, coordinates: Array) -> ResidualVibration:
         """Return it for coordinates (k, n_t) over a time after the arrival."""
         return cls(tip=peak_to_peak(tip_position(arm, coordinates)),
                    bending=bending_peak_to_peak(arm, coordinates))
@@ -86,10 +86,10 @@ class ArrivalWatch:
         if self._arrival <= time + 1e-9 <= self._arrival + self._window + 2e-9:
             self._seen.append(state[:self._arm.n_coordinates])
 
-    def result(self, time: float) -> Residual | None:
+    def result(self, time: float) -> ResidualVibration | None:
         """Return what was left, once for each arrival, when the window is over."""
         if time < self._arrival + self._window or not self._seen:
             return None
-        residual = Residual.of(self._arm, np.stack(self._seen))
+        residual = ResidualVibration.of(self._arm, np.stack(self._seen))
         self.expect(np.inf)
         return residual

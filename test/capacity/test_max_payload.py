@@ -13,7 +13,7 @@ from flex_planner.base.errors import InvalidTaskError, InvalidValueError
 from flex_planner.base.progress import Monitor, Progress
 from flex_planner.base.validation import Array
 from flex_planner.capacity.max_payload import find_max_payload, MaxPayload, PayloadMethod
-from flex_planner.collocation import Settings
+from flex_planner.collocation import SolverSettings
 from flex_planner.dynamics.integration import PiecewisePolynomial, simulate
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectResult, DirectSettings
@@ -32,7 +32,7 @@ Search = Callable[[Monitor], MaxPayload]
 inf, nan = math.inf, math.nan
 # of section 5.3's motion in 1 s, enclosed within 1e-6 kg by prices of 1e4 to 1e5 a kilogram
 LIMITS = {'rigid': 5.855140, 'ei5': 5.741828}
-EXACT = Settings(error_tolerance=1e-8)
+EXACT = SolverSettings(error_tolerance=1e-8)
 every_arm = pytest.mark.parametrize('name', LIMITS)
 g = 9.81
 

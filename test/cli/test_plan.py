@@ -296,7 +296,7 @@ def test_lists_may_begin_with_a_minus_sign() -> None:
 
 
 def start_long_search(folder: Path) -> subprocess.Popen[str]:
-    """Start a search that takes many seconds, and wait until it is under way."""
+    """SearchStart a search that takes many seconds, and wait until it is under way."""
     process = subprocess.Popen(
         [sys.executable, '-m', 'flex_planner.cli', 'payload', 'korayem_ei50', *MOTION,
          '--method', 'incremental', '--accuracy', '1e-6', '--output', str(folder / 'new')],

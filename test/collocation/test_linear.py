@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from math import factorial
 
 from bvp_problems import bratu, Case, CASES, second_order, solved_on
-from flex_planner.collocation import GaussRule, Settings, solve, Status
+from flex_planner.collocation import GaussRule, solve, SolverSettings, SolverStatus
 from flex_planner.collocation.linear import NewtonSystem, Residual, SingularSystemError
 import numpy as np
 from numpy.typing import NDArray
@@ -212,7 +212,7 @@ def test_stage_equations_without_solution_are_refused() -> None:
 
 
 def test_positions_may_be_declared_explicit() -> None:
-    case, settings = bratu(upper=True), Settings(intervals=10)
+    case, settings = bratu(upper=True), SolverSettings(intervals=10)
     plain = solve(case.problem, case.start(settings), settings)
     explicit = replace(case.problem, explicit=np.array([0]))
     result = solve(explicit, case.start(settings), settings)
@@ -224,17 +224,17 @@ def test_positions_may_be_declared_explicit() -> None:
 @pytest.mark.parametrize('name', ['linear', 'bratu, lower', 'bratu, upper'])
 def test_wrong_claim_of_explicit_unknowns_is_survived(name: str, explicit: list[int]) -> None:
     # the rate of v depends on y and that of y on v: J_EE^2 is not zero
-    case, settings = CASES[name], Settings(intervals=10, stages=3, error_tolerance=1e-7)
+    case, settings = CASES[name], SolverSettings(intervals=10, stages=3, error_tolerance=1e-7)
     claimed = replace(case.problem, explicit=np.array(explicit))
     result = solve(claimed, case.start(settings), settings)
-    assert result.status is Status.CONVERGED, result.message
+    assert result.status is SolverStatus.CONVERGED, result.message
     assert case.error(result.solution) <= 1e-7
 
 
 @pytest.mark.parametrize('name', ['MC 2, layer', 'MC 3, nonautonomous', 'MC 6, shock',
                                   'MC 20, corner', 'kink', 'third order', 'Sturm-Liouville'])
 def test_wrong_claim_of_explicit_unknowns_falsifies_nothing(name: str) -> None:
-    case, settings = CASES[name], Settings(intervals=40, stages=3)
+    case, settings = CASES[name], SolverSettings(intervals=40, stages=3)
     problem = replace(case.problem, explicit=np.arange(case.problem.size))
     result = solve(problem, case.start(settings), settings)
     assert not result.converged or case.error(result.solution) <= 1e-6

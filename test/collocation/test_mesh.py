@@ -13,7 +13,7 @@ from bvp_problems import (
     second_order,
     solved_on,
 )
-from flex_planner.collocation import CollocationSolution, Settings, solve
+from flex_planner.collocation import CollocationSolution, solve, SolverSettings
 from flex_planner.collocation.estimate import Estimate, estimated
 from flex_planner.collocation.mesh import coarsened, defects, levelled
 import numpy as np
@@ -94,7 +94,7 @@ def test_estimate_has_the_size_of_the_error(case: Case, stages: int) -> None:
 @pytest.mark.parametrize('name', ['long interval', 'MC 14, thin layers', 'MC 6, shock'])
 def test_solution_is_continuous_after_its_improvement(name: str) -> None:
     for tolerance in (1e-4, 1e-6, 1e-8):
-        settings = Settings(error_tolerance=tolerance)
+        settings = SolverSettings(error_tolerance=tolerance)
         solution = solve(CASES[name].problem, CASES[name].start(settings), settings).solution
         ends = solution.values_at(np.ones(1))[:, 0]
         np.testing.assert_allclose(ends, solution.nodes[1:], rtol=0,
@@ -116,7 +116,7 @@ def test_levelled_mesh_puts_nodes_where_the_defect_is() -> None:
     assert max(steps[0], steps[-1]) < 1.01 * steps.min()
     assert steps.max() > 2 * steps.min()
     finer = solve(case.problem, solution.on_mesh(mesh),
-                  Settings(stages=3, error_tolerance=1, max_meshes=1)).solution
+                  SolverSettings(stages=3, error_tolerance=1, max_meshes=1)).solution
     spread = defects(case.problem, finer)
     assert spread.max() < 0.1 * defects(case.problem, solution).max()
 
@@ -162,14 +162,15 @@ def test_overrefined_mesh_is_coarsened_for_the_next_problem() -> None:
     coarse = coarsened(case.problem, solution, 1e-2, fewest=10)
     assert 10 <= coarse.intervals <= 40
     # less than the defect that was asked for, but not much less
-    outcome = solve(case.problem, coarse, Settings(stages=4, error_tolerance=1, max_meshes=1))
+    outcome = solve(case.problem, coarse,
+                    SolverSettings(stages=4, error_tolerance=1, max_meshes=1))
     assert 1e-4 <= outcome.residual <= 3e-2
     assert coarsened(case.problem, solution, 1e-30, fewest=10).intervals == 200
 
 
 def test_badly_distributed_mesh_is_coarsened_and_levelled() -> None:
     # 400 intervals, 380 of them where nothing happens
-    case, settings = mc_14(1e-6), Settings()
+    case, settings = mc_14(1e-6), SolverSettings()
     mesh = np.concatenate([np.linspace(-1, -0.5, 11), np.linspace(-0.5, 0.5, 381)[1:-1],
                            np.linspace(0.5, 1, 11)])
     guess = CollocationSolution.from_values(mesh, np.zeros((mesh.size, 2)), settings.rule)

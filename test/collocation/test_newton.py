@@ -9,7 +9,13 @@ from typing import Any
 from bvp_problems import bratu, Case, CASES, mc_14, second_order, System
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.progress import Monitor, Progress
-from flex_planner.collocation import CollocationSolution, GaussRule, Settings, solve, Status
+from flex_planner.collocation import (
+    CollocationSolution,
+    GaussRule,
+    solve,
+    SolverSettings,
+    SolverStatus,
+)
 from flex_planner.collocation.newton import newton, NewtonOutcome
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +28,7 @@ LINEAR = CASES['linear']
 
 def newton_of(case: Case, shift: float = 0.0, tolerance: float = 1e-9,
               monitor: Monitor | None = None) -> NewtonOutcome:
-    """Start on 10 intervals from the closed form and a shift."""
+    """SearchStart on 10 intervals from the closed form and a shift."""
     mesh = np.linspace(*case.span, 11)
     values = np.stack([case.exact(mesh) + shift, np.gradient(case.exact(mesh), mesh)], axis=1)
     guess = CollocationSolution.from_values(mesh, values, GaussRule.of(3))
@@ -96,7 +102,7 @@ def test_matrix_is_renewed_where_it_does_not_pay() -> None:
 
 def test_monitor_hears_of_every_iteration() -> None:
     lines: list[Progress] = []
-    case, settings = CASES['MC 14, two layers'], Settings(intervals=10)
+    case, settings = CASES['MC 14, two layers'], SolverSettings(intervals=10)
     monitor = Monitor(report=lines.append, phase='testing')
     result = solve(case.problem, case.start(settings), settings, monitor)
     assert [line.iteration for line in lines] == list(range(1, result.iterations + 1))
@@ -109,16 +115,16 @@ def test_monitor_hears_of_every_iteration() -> None:
 # Failures are statuses
 
 
-def failing(problem: System, settings: Settings | None = None,
-            monitor: Monitor | None = None) -> tuple[Status, float, str]:
+def failing(problem: System, settings: SolverSettings | None = None,
+            monitor: Monitor | None = None) -> tuple[SolverStatus, float, str]:
     """Solve from zero on 10 intervals; return status, residual and message."""
-    settings = settings or Settings(intervals=10)
+    settings = settings or SolverSettings(intervals=10)
     mesh = np.linspace(0, 1, settings.intervals + 1)
     guess = CollocationSolution.from_values(mesh, np.zeros((mesh.size, problem.size)),
                                             settings.rule)
     result = solve(problem, guess, settings, monitor)
     assert not result.converged
-    assert np.isinf(result.errors).all() or result.status is Status.MESH_LIMIT
+    assert np.isinf(result.errors).all() or result.status is SolverStatus.MESH_LIMIT
     return result.status, result.residual, result.message
 
 
@@ -127,26 +133,27 @@ def test_singular_problem_is_a_status() -> None:
     problem = System(size=2, rate_of=lambda t, z: [z[1], 0 * z[0]], left_of=lambda z: [z[1]],
                      right_of=lambda z: [z[1] - 1])
     status, residual, message = failing(problem)
-    assert (status, residual) == (Status.NEWTON_FAILED, np.inf)
+    assert (status, residual) == (SolverStatus.NEWTON_FAILED, np.inf)
     assert 'singular' in message
 
 
 def test_resonant_problem_does_not_converge() -> None:
     # y'' = -pi^2 y + sin(pi t): singular, which the mesh hides behind amplitudes of 1e7 and more
     problem = second_order(lambda t, y, v: -pi**2 * y + np.sin(pi * t), 0, 0)
-    assert failing(problem, Settings(intervals=10, stages=3))[0] is not Status.CONVERGED
+    assert failing(problem,
+                   SolverSettings(intervals=10, stages=3))[0] is not SolverStatus.CONVERGED
 
 
 def test_boundary_row_of_zeros_is_a_status() -> None:
     status, residual, message = failing(replace(LINEAR.problem, left_of=lambda z: [0 * z[0]]))
-    assert (status, residual) == (Status.NEWTON_FAILED, np.inf)
+    assert (status, residual) == (SolverStatus.NEWTON_FAILED, np.inf)
     assert 'boundary row is zero' in message
 
 
 @pytest.mark.parametrize('bad', [np.nan, np.inf])
 def test_right_hand_side_that_is_not_finite_is_a_status(bad: float) -> None:
     problem = second_order(lambda t, y, v: bad + y, 0, 1)
-    assert failing(problem) == (Status.NEWTON_FAILED, np.inf,
+    assert failing(problem) == (SolverStatus.NEWTON_FAILED, np.inf,
                                 'the right-hand side is not finite at the current point')
 
 
@@ -155,21 +162,21 @@ def test_right_hand_side_that_ends_on_the_way_is_a_status() -> None:
     problem = second_order(lambda t, y, v: np.where(np.real(y) > 0, -np.abs(y)**-0.5, np.nan),
                            1, -1)
     case = Case(problem=problem, guess=np.ones_like)
-    result = solve(problem, case.start(Settings()), Settings(max_intervals=100))
-    assert (result.status, result.residual) == (Status.NEWTON_FAILED, np.inf)
+    result = solve(problem, case.start(SolverSettings()), SolverSettings(max_intervals=100))
+    assert (result.status, result.residual) == (SolverStatus.NEWTON_FAILED, np.inf)
 
 
 def test_problem_without_solution_does_not_converge() -> None:
     # Bratu's problem has none beyond lambda = 3.5138
     status, residual, message = failing(second_order(lambda t, y, v: -4 * np.exp(y), 0, 0))
-    assert (status, residual) == (Status.NEWTON_FAILED, np.inf)
+    assert (status, residual) == (SolverStatus.NEWTON_FAILED, np.inf)
     assert 'no step' in message or 'not converged after' in message
 
 
 def test_iteration_limit_is_a_status() -> None:
-    case, settings = CASES['MC 20, corner'], Settings(max_iterations=5)
+    case, settings = CASES['MC 20, corner'], SolverSettings(max_iterations=5)
     result = solve(case.problem, case.start(settings), settings)
-    assert (result.status, result.residual) == (Status.NEWTON_FAILED, np.inf)
+    assert (result.status, result.residual) == (SolverStatus.NEWTON_FAILED, np.inf)
     assert result.message == 'not converged after 5 iterations'
 
 
@@ -177,9 +184,9 @@ def test_iteration_limit_is_a_status() -> None:
     ({'max_intervals': 12}, 12), ({'max_meshes': 1}, 10)])
 def test_mesh_limit_is_a_status_with_the_error_that_is_left(limits: dict[str, int],
                                                             intervals: int) -> None:
-    case, settings = mc_14(1e-8), Settings(intervals=10, stages=3, **limits)
+    case, settings = mc_14(1e-8), SolverSettings(intervals=10, stages=3, **limits)
     result = solve(case.problem, case.start(settings), settings)
-    assert result.status is Status.MESH_LIMIT
+    assert result.status is SolverStatus.MESH_LIMIT
     assert result.solution.intervals == intervals
     assert result.solution.rule.stages == 3  # not the improved one
     assert 1e-6 < result.errors.max() < np.inf
@@ -193,16 +200,16 @@ def test_mesh_limit_is_a_status_with_the_error_that_is_left(limits: dict[str, in
 
 def test_cancel_is_obeyed_before_the_first_iteration() -> None:
     monitor = Monitor(canceled=lambda: True)
-    assert failing(LINEAR.problem, monitor=monitor) == (Status.CANCELED, np.inf, 'canceled')
+    assert failing(LINEAR.problem, monitor=monitor) == (SolverStatus.CANCELED, np.inf, 'canceled')
     assert monitor.iteration == 0
 
 
 def test_cancel_is_obeyed_between_iterations() -> None:
     monitor = Monitor()
     monitor.canceled = lambda: monitor.iteration >= 2
-    case, settings = mc_14(1e-8), Settings()
+    case, settings = mc_14(1e-8), SolverSettings()
     result = solve(case.problem, case.start(settings), settings, monitor)
-    assert (result.status, result.iterations) == (Status.CANCELED, 2)
+    assert (result.status, result.iterations) == (SolverStatus.CANCELED, 2)
     assert np.isinf(result.errors).all()
 
 
@@ -228,8 +235,8 @@ def laborious() -> tuple[Laborious, CollocationSolution]:
 def test_cancel_is_obeyed_inside_a_long_jacobian() -> None:
     problem, guess = laborious()
     monitor = Monitor(canceled=lambda: problem.clock[0] >= 0.3)
-    result = solve(problem, guess, Settings(), monitor)
-    assert (result.status, result.iterations) == (Status.CANCELED, 0)
+    result = solve(problem, guess, SolverSettings(), monitor)
+    assert (result.status, result.iterations) == (SolverStatus.CANCELED, 0)
     assert problem.clock[0] - 0.3 <= 0.05
 
 
@@ -237,8 +244,8 @@ def test_time_limit_is_obeyed_inside_a_long_jacobian(monkeypatch: pytest.MonkeyP
     problem, guess = laborious()
     clock = SimpleNamespace(monotonic=lambda: problem.clock[0])
     monkeypatch.setattr('flex_planner.base.progress.time', clock)
-    result = solve(problem, guess, Settings(), Monitor(time_limit=0.3, started=0.0))
-    assert (result.status, result.message) == (Status.TIMEOUT, 'time limit reached')
+    result = solve(problem, guess, SolverSettings(), Monitor(time_limit=0.3, started=0.0))
+    assert (result.status, result.message) == (SolverStatus.TIMEOUT, 'time limit reached')
     assert problem.clock[0] - 0.3 <= 0.05
 
 
@@ -252,19 +259,20 @@ def test_time_limit_is_obeyed_inside_a_long_jacobian(monkeypatch: pytest.MonkeyP
 def test_settings_out_of_bounds_are_refused_by_name(name: str, values: list[Any]) -> None:
     for value in values:
         with pytest.raises(InvalidValueError, match=f'^{name} is '):
-            Settings(**{name: value})
+            SolverSettings(**{name: value})
 
 
 def test_settings_on_their_bounds_are_taken() -> None:
     for stages in (2, 11):
-        settings = Settings(stages=stages, intervals=4, max_intervals=4, max_iterations=1,
-                            max_meshes=1, error_tolerance=1e-11)
+        settings = SolverSettings(stages=stages, intervals=4, max_intervals=4, max_iterations=1,
+                                  max_meshes=1, error_tolerance=1e-11)
         assert settings.rule is GaussRule.of(stages)
-    assert Settings(intervals=20000, max_intervals=20000, error_tolerance=1).intervals == 20000
+    assert SolverSettings(intervals=20000, max_intervals=20000,
+                          error_tolerance=1).intervals == 20000
 
 
 def test_guess_of_another_rule_is_taken_over() -> None:
-    case, settings = bratu(upper=True), Settings(stages=5)
-    result = solve(case.problem, case.start(Settings(stages=3, intervals=10)), settings)
+    case, settings = bratu(upper=True), SolverSettings(stages=5)
+    result = solve(case.problem, case.start(SolverSettings(stages=3, intervals=10)), settings)
     assert result.converged
     assert result.solution.rule.stages == 6

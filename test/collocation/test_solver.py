@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from bvp_problems import Case, CASES, emden, mc_03, mc_06, mc_07, mc_09, mc_14, OPEN, TABULATED
-from flex_planner.collocation import CollocationResult, Settings, solve, Status
+from flex_planner.collocation import CollocationResult, solve, SolverSettings, SolverStatus
 import numpy as np
 from numpy.typing import NDArray
 import pytest
@@ -52,9 +52,9 @@ cases = pytest.mark.parametrize('name', CASES)
 
 
 def solved(case: Case, **settings: Any) -> CollocationResult:
-    chosen = Settings(**settings)
+    chosen = SolverSettings(**settings)
     result = solve(case.problem, case.start(chosen), chosen)
-    assert result.status is Status.CONVERGED, result.message
+    assert result.status is SolverStatus.CONVERGED, result.message
     assert result.message == 'converged'
     assert result.errors.max() <= chosen.error_tolerance
     assert result.solution.rule.stages == chosen.stages + 1
@@ -98,7 +98,7 @@ def test_problem_without_closed_form_agrees_with_scipy(name: str) -> None:
     other = solve_bvp(
         lambda t, z: problem.rate(t, z.T).T,
         lambda a, b: np.concatenate([problem.left(a)[0], problem.right(b)[0]]),
-        times, OPEN[name].start(Settings(intervals=40)).nodes.T, tol=1e-6, max_nodes=20000,
+        times, OPEN[name].start(SolverSettings(intervals=40)).nodes.T, tol=1e-6, max_nodes=20000,
         fun_jac=lambda t, z: np.moveaxis(problem.rate_jacobian(t, z.T)[1], 0, -1))
     assert other.success
     size = np.abs(other.y).max(axis=1)

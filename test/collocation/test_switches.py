@@ -11,9 +11,9 @@ from flex_planner.collocation import (
     CollocationResult,
     CollocationSolution,
     GaussRule,
-    Settings,
     solve,
-    Status,
+    SolverSettings,
+    SolverStatus,
 )
 from flex_planner.collocation.mesh import switching_times
 from flex_planner.collocation.newton import newton
@@ -105,7 +105,7 @@ def test_node_on_a_kink_keeps_the_order(stages: int) -> None:
 @pytest.mark.parametrize('tolerance', [1e-4, 1e-6, 1e-8, 1e-10])
 @pytest.mark.parametrize('intervals', [4, 10, 20])
 def test_kink_is_met_by_a_node(tolerance: float, intervals: int) -> None:
-    settings = Settings(intervals=intervals, error_tolerance=tolerance)
+    settings = SolverSettings(intervals=intervals, error_tolerance=tolerance)
     result = solve(KINK.problem, KINK.start(settings), settings)
     assert result.converged
     assert KINK.error(result.solution) <= 0.1 * tolerance
@@ -148,8 +148,8 @@ def unbounded(intervals: int, stages: int = 8) -> CollocationSolution:
 
 
 def solved(problem: System, guess: CollocationSolution, **settings: Any) -> CollocationResult:
-    result = solve(problem, guess, Settings(**settings))
-    assert result.status is Status.CONVERGED, result.message
+    result = solve(problem, guess, SolverSettings(**settings))
+    assert result.status is SolverStatus.CONVERGED, result.message
     return result
 
 
@@ -175,7 +175,7 @@ def test_same_intervals_are_orders_worse_without_switches() -> None:
     result = solved(least_effort(BOUND), unbounded(20), error_tolerance=1e-10)
     count = result.solution.intervals
     other = solve(least_effort(BOUND, switches=False), unbounded(count),
-                  Settings(error_tolerance=1e-11, max_meshes=1))
+                  SolverSettings(error_tolerance=1e-11, max_meshes=1))
     assert count <= 21
     assert costate_error(result.solution) <= 1e-13
     assert costate_error(other.solution) >= 5e-6

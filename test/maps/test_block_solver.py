@@ -16,7 +16,7 @@ from flex_planner.maps.cell_solver import Solver
 from flex_planner.maps.study import load_study, Study
 from flex_planner.planning.plan_path import plan_path
 from flex_planner.simulation.comparison import compare
-from flex_planner.simulation.execution import Way
+from flex_planner.simulation.execution import ExecutionMode
 from flex_planner.simulation.mismatch import Mismatch
 import pytest
 
@@ -144,7 +144,7 @@ def test_vibration_is_that_of_the_comparison(tmp_path: Path) -> None:
                            payload_mass=carried, settling=0.3)
         assert result.code is CellCode.SOLVED
         assert result.value == pytest.approx(
-            expected.of(Way.FLEXIBLE_OPEN).residual.tip, rel=1e-3)
+            expected.of(ExecutionMode.FLEXIBLE_OPEN).residual.tip, rel=1e-3)
     assert results[1].value > results[0].value > 1e-5
 
 

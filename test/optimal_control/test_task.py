@@ -10,7 +10,7 @@ from typing import Any
 from flex_planner.arms.arm import Arm, Joint, Link, Motor
 from flex_planner.base.errors import InvalidSizeError, InvalidValueError, NotFiniteError
 from flex_planner.base.validation import Array
-from flex_planner.collocation import Settings
+from flex_planner.collocation import SolverSettings
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import Plan, PlanStatus
@@ -295,7 +295,7 @@ def test_derivative_of_the_cost_by_the_payload_is_the_integral_of_its_share(
         request: pytest.FixtureRequest, paper_task: TaskFactory, name: str,
         price: float | None) -> None:
     model, h = request.getfixturevalue(f'{name}_model'), 4e-3
-    settings = Settings(error_tolerance=1e-8)
+    settings = SolverSettings(error_tolerance=1e-8)
     plan = plan_path(paper_task(model.arm, 5.5), model=model, settings=settings)
     assert plan.saturation.min() > 0.2
     costs = [plan_path(paper_task(model.arm, 5.5 + k * h), model=model, settings=settings,

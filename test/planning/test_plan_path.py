@@ -13,8 +13,8 @@ from flex_planner.base.progress import Monitor
 from flex_planner.collocation import (
     CollocationResult,
     CollocationSolution,
-    Settings,
-    Status,
+    SolverSettings,
+    SolverStatus,
 )
 from flex_planner.dynamics.integration import simulate
 from flex_planner.dynamics.statics import residual_vibration
@@ -176,7 +176,7 @@ def test_hamiltonian_is_constant_on_the_extremal(plan_of: PlanFactory, case: Cas
 def test_hamiltonian_of_a_saturated_motion_is_constant_to_rounding_on_a_finer_mesh(
         rigid_model: ArmModel, paper_task: TaskFactory) -> None:
     plan = plan_path(paper_task(rigid_model.arm, 5.5), model=rigid_model,
-                     settings=Settings(error_tolerance=1e-8))
+                     settings=SolverSettings(error_tolerance=1e-8))
     assert plan.certificate.hamiltonian_drift < 1e-14
 
 
@@ -296,7 +296,7 @@ def test_motion_about_an_unstable_posture_is_simulated_as_exactly_as_it_was_plan
     arm = Arm(name='upright', links=(Link(length=0.8, linear_density=2.0),), joints=(Joint(),),
               gravity=[0.0, -9.81])
     task = Task(arm=arm, start_positions=[1.2], goal_positions=[1.9], duration=4.0)
-    plan = plan_path(task, settings=Settings(stages=6, max_intervals=60))
+    plan = plan_path(task, settings=SolverSettings(stages=6, max_intervals=60))
     assert plan.solved, plan.message
     assert plan.certificate.tip_error <= 1e-5
 
@@ -320,7 +320,7 @@ def altered(plan: Plan, factor: float) -> CollocationResult:
     stages[..., half:] *= factor
     return CollocationResult(
         solution=CollocationSolution(solution.mesh, nodes, stages, solution.rule),
-        status=Status.CONVERGED, residual=1e-9, errors=np.zeros(plan.problem.size),
+        status=SolverStatus.CONVERGED, residual=1e-9, errors=np.zeros(plan.problem.size),
         switches=np.zeros(0), iterations=1, meshes=1, message='')
 
 

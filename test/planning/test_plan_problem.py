@@ -9,7 +9,7 @@ import time
 from typing import Any
 
 from flex_planner.base.progress import Monitor, Progress
-from flex_planner.collocation import CollocationResult, Settings, Status
+from flex_planner.collocation import CollocationResult, SolverSettings, SolverStatus
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import Task
@@ -25,7 +25,7 @@ TaskFactory = Callable[..., Task]
 
 def failed(result: CollocationResult, message: str, evidence: str = '') -> Strategy:
     """Return a strategy that fails."""
-    attempt = Attempt(result=replace(result, status=Status.NEWTON_FAILED, message=message),
+    attempt = Attempt(result=replace(result, status=SolverStatus.NEWTON_FAILED, message=message),
                       evidence=evidence)
     return lambda problem, settings, monitor: attempt
 
@@ -33,7 +33,7 @@ def failed(result: CollocationResult, message: str, evidence: str = '') -> Strat
 @pytest.fixture
 def result(rigid_model: ArmModel, paper_task: TaskFactory) -> CollocationResult:
     problem = problem_of(rigid_model, paper_task(rigid_model.arm))
-    return cold_start(problem, Settings(), Monitor()).result
+    return cold_start(problem, SolverSettings(), Monitor()).result
 
 
 def planned(monkeypatch: pytest.MonkeyPatch, model: ArmModel, task: Task,
@@ -87,7 +87,7 @@ def test_monitor_hears_the_name_of_each_strategy(
         monkeypatch: pytest.MonkeyPatch, rigid_model: ArmModel, paper_task: TaskFactory) -> None:
     lines: list[Progress] = []
 
-    def hasty(problem: MotionProblem, settings: Settings, monitor: Monitor) -> Attempt:
+    def hasty(problem: MotionProblem, settings: SolverSettings, monitor: Monitor) -> Attempt:
         return cold_start(problem, replace(settings, max_iterations=1), monitor)
 
     plan = planned(monkeypatch, rigid_model, paper_task(rigid_model.arm, 5.8), ('first', hasty),
@@ -150,7 +150,7 @@ def test_mesh_limit_is_told(monkeypatch: pytest.MonkeyPatch, ei50_model: ArmMode
                             paper_task: TaskFactory) -> None:
     # 114 intervals are needed
     plan = planned(monkeypatch, ei50_model, paper_task(ei50_model.arm),
-                   ('cold start', cold_start), settings=Settings(max_intervals=60))
+                   ('cold start', cold_start), settings=SolverSettings(max_intervals=60))
     assert plan.status is PlanStatus.NOT_CONVERGED
     assert unsolved(plan)
     assert plan.message.startswith('cold start: an error of ')
@@ -160,7 +160,7 @@ def test_mesh_limit_is_told(monkeypatch: pytest.MonkeyPatch, ei50_model: ArmMode
 def test_solution_within_its_tolerance_needs_no_more_intervals(
         rigid_model: ArmModel, paper_task: TaskFactory) -> None:
     problem = problem_of(rigid_model, paper_task(rigid_model.arm, 5.5))
-    result = cold_start(problem, Settings(max_intervals=20, error_tolerance=0.05),
+    result = cold_start(problem, SolverSettings(max_intervals=20, error_tolerance=0.05),
                         Monitor()).result
     assert result.errors.max() < 0.05
     assert result.converged, result.message
@@ -169,7 +169,7 @@ def test_solution_within_its_tolerance_needs_no_more_intervals(
 def test_no_mesh_is_larger_than_its_limit(ei50_model: ArmModel, paper_task: TaskFactory) -> None:
     lines: list[Progress] = []
     plan_path(paper_task(ei50_model.arm), model=ei50_model,
-              settings=Settings(intervals=20, max_intervals=20),
+              settings=SolverSettings(intervals=20, max_intervals=20),
               monitor=Monitor(report=lines.append))
     assert max(line.intervals for line in lines) <= 20
 
@@ -190,7 +190,7 @@ def test_tolerance_that_no_motion_meets_fails_the_certificate(
 @pytest.mark.parametrize('tolerance', [1e-3, 1.0])
 def test_mesh_too_coarse_for_the_certificate_is_refined(
         rigid_model: ArmModel, paper_task: TaskFactory, tolerance: float) -> None:
-    settings = Settings(stages=2, intervals=4, error_tolerance=tolerance)
+    settings = SolverSettings(stages=2, intervals=4, error_tolerance=tolerance)
     plan = plan_path(paper_task(rigid_model.arm), model=rigid_model, settings=settings)
     assert plan.solved, plan.message
     assert 4 <= plan.mesh_intervals < 60

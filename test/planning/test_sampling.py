@@ -15,8 +15,8 @@ from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.sampling import (
     HOLD_DELAY_NS,
-    Reference,
-    sample_reference,
+    sample_plan,
+    SampledPlan,
     SamplingSettings,
 )
 import numpy as np
@@ -51,7 +51,7 @@ def plan(request: pytest.FixtureRequest) -> Plan:
     return plan
 
 
-def interpolation_error(plan: Plan, reference: Reference) -> float:
+def interpolation_error(plan: Plan, reference: SampledPlan) -> float:
     """Return the error of linear interpolation on a grid 32 times as fine as the samples."""
     moving = reference.samples
     shares = np.linspace(0, 1, 32, endpoint=False)
@@ -63,7 +63,7 @@ def interpolation_error(plan: Plan, reference: Reference) -> float:
 
 
 def test_times_are_integers_that_grow_from_0(plan: Plan) -> None:
-    times = sample_reference(plan, SamplingSettings()).times_ns
+    times = sample_plan(plan, SamplingSettings()).times_ns
     assert times.dtype == np.int64
     assert times[0] == 0
     assert (np.diff(times) > 0).all()
@@ -72,7 +72,7 @@ def test_times_are_integers_that_grow_from_0(plan: Plan) -> None:
 
 
 def test_samples_belong_to_their_times(plan: Plan) -> None:
-    reference = sample_reference(plan, SamplingSettings())
+    reference = sample_plan(plan, SamplingSettings())
     inner = slice(1, -2)
     exact = plan.sample(reference.times_ns[inner] * 1e-9)
     np.testing.assert_allclose(reference.samples.times, reference.times_ns * 1e-9, atol=1e-12)
@@ -82,7 +82,7 @@ def test_samples_belong_to_their_times(plan: Plan) -> None:
 
 
 def test_motion_starts_and_ends_exactly_at_rest(plan: Plan) -> None:
-    samples = sample_reference(plan, SamplingSettings()).samples
+    samples = sample_plan(plan, SamplingSettings()).samples
     n_t = plan.arm.n_coordinates
     for row, state in ((0, plan.problem.start), (-2, plan.problem.goal), (-1, plan.problem.goal)):
         assert samples.coordinates[row].tolist() == state[:n_t].tolist()
@@ -91,7 +91,7 @@ def test_motion_starts_and_ends_exactly_at_rest(plan: Plan) -> None:
 
 
 def test_last_effort_holds_the_arm(plan: Plan) -> None:
-    samples = sample_reference(plan, SamplingSettings()).samples
+    samples = sample_plan(plan, SamplingSettings()).samples
     n, n_t = plan.arm.n_joints, plan.arm.n_coordinates
     p = Parameters.of(plan.arm, payload_mass=plan.task.payload_mass).stacked()
     still = np.concatenate([samples.coordinates[-1], np.zeros(n_t)])[None]
@@ -103,13 +103,13 @@ def test_last_effort_holds_the_arm(plan: Plan) -> None:
 
 
 def test_last_effort_under_gravity_is_not_that_of_the_arrival(hanging: Plan) -> None:
-    torques = sample_reference(hanging, SamplingSettings()).samples.torques
+    torques = sample_plan(hanging, SamplingSettings()).samples.torques
     assert np.abs(torques[-1] - torques[-2]).max() > 1
 
 
 @pytest.mark.parametrize('tolerance', [0.2, 0.02, 0.002])
 def test_torque_error_bounds_linear_interpolation(plan: Plan, tolerance: float) -> None:
-    reference = sample_reference(plan, SamplingSettings(torque_tolerance=tolerance))
+    reference = sample_plan(plan, SamplingSettings(torque_tolerance=tolerance))
     assert 0 < reference.torque_error <= tolerance
     # four probes a step, one of them in the middle, where a parabola is worst
     assert interpolation_error(plan, reference) <= 1.02 * reference.torque_error
@@ -125,14 +125,14 @@ def fewest_samples(plan: Plan, longest: float) -> int:
 
 
 def test_tighter_tolerance_gives_more_samples(plan: Plan) -> None:
-    counts = [sample_reference(plan, SamplingSettings(torque_tolerance=tolerance)).times_ns.size
+    counts = [sample_plan(plan, SamplingSettings(torque_tolerance=tolerance)).times_ns.size
               for tolerance in (0.5, 0.02, 0.001)]
     assert counts[0] < counts[1] < counts[2]
     assert counts[0] == fewest_samples(plan, 0.01)
 
 
 def test_samples_lie_on_switches_and_are_dense_only_where_torques_bend(saturated: Plan) -> None:
-    reference = sample_reference(saturated, SamplingSettings())
+    reference = sample_plan(saturated, SamplingSettings())
     switches = np.round(saturated.switching_times * 1e9).astype(np.int64)
     assert switches.size == 6
     assert np.isin(switches, reference.times_ns).all()
@@ -150,7 +150,7 @@ def test_samples_lie_on_switches_and_are_dense_only_where_torques_bend(saturated
 def test_switches_nearer_than_the_shortest_step_are_one(flexible: Plan) -> None:
     switches = np.array([1e-4, 0.5, 0.5001, 0.70017, 0.9999])
     plan = replace(flexible, switching_times=switches)
-    reference = sample_reference(plan, SamplingSettings(torque_tolerance=1e3))
+    reference = sample_plan(plan, SamplingSettings(torque_tolerance=1e3))
     assert np.isin([500_000_000, 700_170_000], reference.times_ns).all()
     assert np.diff(reference.times_ns)[:-1].min() >= 250_000
 
@@ -158,20 +158,20 @@ def test_switches_nearer_than_the_shortest_step_are_one(flexible: Plan) -> None:
 def test_samples_that_are_too_many_are_spent_where_they_matter_most(
         flexible: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('flex_planner.planning.sampling.MAX_SAMPLES', 130)
-    errors = [sample_reference(flexible, SamplingSettings(torque_tolerance=tolerance))
+    errors = [sample_plan(flexible, SamplingSettings(torque_tolerance=tolerance))
               for tolerance in (1e3, 1e-6)]
     assert [len(reference.times_ns) for reference in errors] == [102, 132]
     assert errors[1].torque_error < 0.8 * errors[0].torque_error
 
 
 def test_longest_step_is_kept(plan: Plan) -> None:
-    reference = sample_reference(plan, SamplingSettings(longest_step=0.03, torque_tolerance=1e3))
+    reference = sample_plan(plan, SamplingSettings(longest_step=0.03, torque_tolerance=1e3))
     assert np.diff(reference.times_ns).max() <= 30_000_000
     assert reference.times_ns.size == fewest_samples(plan, 0.03)
 
 
 def test_steps_stay_above_a_quarter_of_a_millisecond(flexible: Plan) -> None:
-    reference = sample_reference(flexible, SamplingSettings(torque_tolerance=1e-12))
+    reference = sample_plan(flexible, SamplingSettings(torque_tolerance=1e-12))
     assert np.diff(reference.times_ns)[:-1].min() >= 250_000
     assert reference.torque_error > 1e-12  # and the truth is told
 
@@ -181,7 +181,7 @@ def test_plan_without_solution_has_no_samples(rigid_arm: Arm, rigid_model: ArmMo
     failed = plan_path(paper_task(rigid_arm, payload_mass=200.0), model=rigid_model)
     assert not failed.solved
     with pytest.raises(ValueError, match='the plan has no solution'):
-        sample_reference(failed, SamplingSettings())
+        sample_plan(failed, SamplingSettings())
 
 
 @pytest.mark.parametrize(('values', 'error', 'text'), [
@@ -198,12 +198,12 @@ def test_bad_sampling_settings_are_refused(values: dict[str, float], error: type
 def test_more_samples_than_a_message_should_hold_are_refused(flexible: Plan) -> None:
     task = replace(flexible.task, duration=6.0)
     with pytest.raises(InvalidTaskError, match='has 24000 samples, but may have 20000'):
-        sample_reference(replace(flexible, task=task), SamplingSettings(longest_step=2.5e-4))
+        sample_plan(replace(flexible, task=task), SamplingSettings(longest_step=2.5e-4))
 
 
 def test_sampling_listens_to_the_monitor(flexible: Plan) -> None:
     with pytest.raises(StoppedError):
-        sample_reference(flexible, SamplingSettings(), Monitor(canceled=lambda: True))
+        sample_plan(flexible, SamplingSettings(), Monitor(canceled=lambda: True))
 
 
 @pytest.mark.parametrize('change', [
@@ -211,5 +211,5 @@ def test_sampling_listens_to_the_monitor(flexible: Plan) -> None:
 def test_motion_that_does_not_end_at_rest_is_no_reference(flexible: Plan,
                                                           change: dict[str, Any]) -> None:
     with pytest.raises(InvalidTaskError, match='does not end at rest'):
-        sample_reference(replace(flexible, task=replace(flexible.task, **change)),
-                         SamplingSettings())
+        sample_plan(replace(flexible, task=replace(flexible.task, **change)),
+                    SamplingSettings())

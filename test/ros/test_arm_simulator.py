@@ -14,7 +14,7 @@ from flex_planner.arms.arm import Arm
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.planning.plan_path import plan_path
-from flex_planner.planning.sampling import sample_reference, SamplingSettings
+from flex_planner.planning.sampling import sample_plan, SamplingSettings
 from flex_planner.ros.messages.plans import joint_trajectory
 from flex_planner.ros.runtime.processes import NodeProcess
 from flex_planner.ros.settings.simulator import SimulatorSettings
@@ -87,7 +87,7 @@ def simulator(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Simulator]:
 def planned(ei50_arm: Arm, ei50_model: ArmModel, paper_task: Any) -> JointTrajectory:
     """Return the motion of the paper as a controller gets it."""
     plan = plan_path(paper_task(ei50_arm), model=ei50_model)
-    reference = sample_reference(plan, SamplingSettings(torque_tolerance=2e-3))
+    reference = sample_plan(plan, SamplingSettings(torque_tolerance=2e-3))
     return joint_trajectory(reference, ['joint1', 'joint2'])
 
 

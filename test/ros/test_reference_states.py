@@ -1,4 +1,4 @@
-"""Reference states along a published plan: their values, and when they come."""
+"""SampledPlan states along a published plan: their values, and when they come."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from factories import PlanFactory
-from flex_planner.planning.sampling import Reference, sample_reference, SamplingSettings
+from flex_planner.planning.sampling import sample_plan, SampledPlan, SamplingSettings
 from flex_planner.ros.planner.streamer import Streamer
 from flex_planner.ros.reference_states import ReferenceStates, Stream, StreamedPlan
 from flex_planner.ros.settings.planner import PlannerSettings
@@ -77,7 +77,7 @@ def heard(planner: Planner) -> list[Heard]:
     return states
 
 
-def streamed(reference: Reference, rate: float) -> StreamedPlan:
+def streamed(reference: SampledPlan, rate: float) -> StreamedPlan:
     samples = reference.samples
     return StreamedPlan(
         names=NAMES, rate=rate, stamp_ns=10**18, began_ns=0, times_ns=reference.times_ns,
@@ -160,7 +160,7 @@ def gone(pid: int) -> bool:
 def test_states_between_the_samples_are_those_of_the_plan(plan_of: PlanFactory,
                                                           rate: float) -> None:
     plan = plan_of('ei50')
-    states = ReferenceStates(streamed(sample_reference(plan, SamplingSettings()), rate))
+    states = ReferenceStates(streamed(sample_plan(plan, SamplingSettings()), rate))
     messages = list(states.messages())
     exact = plan.sample(states.times_ns[:-1] * 1e-9)
     assert len(messages) == rate + 1
@@ -172,7 +172,7 @@ def test_states_between_the_samples_are_those_of_the_plan(plan_of: PlanFactory,
 
 
 def test_last_state_is_the_last_sample(plan_of: PlanFactory) -> None:
-    reference = sample_reference(plan_of('ei50'), SamplingSettings())
+    reference = sample_plan(plan_of('ei50'), SamplingSettings())
     for rate in (1.0, 7.0, 100.0, 1000.0):
         states = ReferenceStates(streamed(reference, rate))
         *_, last = states.messages()
@@ -254,7 +254,7 @@ def test_process_that_spins_while_it_leaves_is_ended_by_force() -> None:
 
 
 def test_states_that_were_due_before_a_plan_came_are_left_out(plan_of: PlanFactory) -> None:
-    plan = streamed(sample_reference(plan_of('ei50'), SamplingSettings()), 100.0)
+    plan = streamed(sample_plan(plan_of('ei50'), SamplingSettings()), 100.0)
     heard: list[JointState] = []
     stream, began = Stream(heard.append), time.monotonic_ns()
     stream.start(replace(plan, began_ns=began))
@@ -317,7 +317,7 @@ def streamer_of(monkeypatch: pytest.MonkeyPatch, node: FakeNode,
 def test_plan_is_not_lost_where_the_process_is_gone_or_dies_just_then(
         monkeypatch: pytest.MonkeyPatch, plan_of: PlanFactory, dead: FakeProcess) -> None:
     sent, node, plan = io.BytesIO(), FakeNode(), plan_of('ei50')
-    reference = sample_reference(plan, SamplingSettings())
+    reference = sample_plan(plan, SamplingSettings())
     streamer = streamer_of(monkeypatch, node, dead, FakeProcess(sent))
     streamer.start(plan, reference, PlannerSettings.for_arm(plan.arm))
     assert pickle.loads(sent.getvalue()).times_ns.tolist() == reference.times_ns.tolist()
@@ -329,7 +329,7 @@ def test_process_that_dies_again_does_not_spoil_the_plan(monkeypatch: pytest.Mon
     node, plan = FakeNode(), plan_of('ei50')
     dead = [FakeProcess(BrokenPipe()) for _ in range(2)]
     streamer = streamer_of(monkeypatch, node, *dead)
-    streamer.start(plan, sample_reference(plan, SamplingSettings()),
+    streamer.start(plan, sample_plan(plan, SamplingSettings()),
                    PlannerSettings.for_arm(plan.arm))
     assert node.said == [AGAIN, 'the plan is not streamed: Broken pipe']
 

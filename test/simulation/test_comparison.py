@@ -20,7 +20,7 @@ from flex_planner.planning.plan import PlanStatus
 from flex_planner.plotting.comparison import draw_comparison
 from flex_planner.reports.comparison import comparison_rows, comparison_table
 from flex_planner.simulation.comparison import compare, Comparison
-from flex_planner.simulation.execution import Way
+from flex_planner.simulation.execution import ExecutionMode
 from flex_planner.simulation.joint_control import Gains
 from flex_planner.simulation.mismatch import Mismatch
 import matplotlib.image
@@ -38,7 +38,8 @@ def compared(ei5_arm: Arm, ei5_model: ArmModel, paper_task: Any) -> Comparison:
 def test_rigid_plan_leaves_a_millimetre_and_a_flexible_plan_nothing(
         compared: Comparison) -> None:
     # the headline: 0.9 mm and about 1 mm against less than 0.001 mm, torques alone
-    rigid, flexible = compared.of(Way.RIGID_OPEN), compared.of(Way.FLEXIBLE_OPEN)
+    rigid = compared.of(ExecutionMode.RIGID_OPEN)
+    flexible = compared.of(ExecutionMode.FLEXIBLE_OPEN)
     assert rigid.arrival_error == pytest.approx(0.912 * MM, abs=0.005 * MM)
     assert rigid.bending == pytest.approx(1.068 * MM, abs=0.005 * MM)
     # held for 0.25 ms; the error falls with the square of that
@@ -52,7 +53,7 @@ def test_rigid_plan_is_as_wrong_by_another_integrator(compared: Comparison) -> N
     torque = PlannedTorque.of(rigid.problem, rigid.solution)
     start = compared.flexible.problem.start
     state = resimulated(model, compared.flexible.problem.p, start, torque)
-    outcome = compared.of(Way.RIGID_OPEN)
+    outcome = compared.of(ExecutionMode.RIGID_OPEN)
     index = np.searchsorted(outcome.execution.times, 1.0 - 1e-9)
     found = outcome.execution.coordinates[index]
     np.testing.assert_allclose(found, state[:6], atol=2e-6)  # of 1e-3: the torque is held
@@ -74,12 +75,13 @@ def test_errors_are_those_of_the_recorded_motion(compared: Comparison) -> None:
 
 
 def test_feedback_does_not_replace_the_feedforward(compared: Comparison) -> None:
-    plain = compared.of(Way.PD_ONLY)
+    plain = compared.of(ExecutionMode.PD_ONLY)
     assert plain.arrival_error > 10 * MM
-    assert plain.tracking_error > 1e4 * compared.of(Way.FLEXIBLE).tracking_error
+    assert plain.tracking_error > 1e4 * compared.of(ExecutionMode.FLEXIBLE).tracking_error
     # the joints settle sooner, but the links go on ringing
-    assert compared.of(Way.RIGID).arrival_error < compared.of(Way.RIGID_OPEN).arrival_error
-    assert compared.of(Way.RIGID).bending > 1 * MM
+    open_loop = compared.of(ExecutionMode.RIGID_OPEN)
+    assert compared.of(ExecutionMode.RIGID).arrival_error < open_loop.arrival_error
+    assert compared.of(ExecutionMode.RIGID).bending > 1 * MM
 
 
 def test_wrong_payload_and_stiffness_cost_what_they_cost(ei5_arm: Arm, ei5_model: ArmModel,
@@ -87,10 +89,10 @@ def test_wrong_payload_and_stiffness_cost_what_they_cost(ei5_arm: Arm, ei5_model
     other = compare(paper_task(ei5_arm), model=ei5_model, settling=0.3, payload_mass=1.05,
                     mismatch=Mismatch(modes=3, rigidity_scale=0.9))
     assert other.arm.n_modes == 6
-    flexible = other.of(Way.FLEXIBLE_OPEN)
+    flexible = other.of(ExecutionMode.FLEXIBLE_OPEN)
     assert 5 * MM < flexible.arrival_error < 20 * MM
-    assert other.of(Way.FLEXIBLE).arrival_error < flexible.arrival_error / 10
-    assert other.of(Way.FLEXIBLE).bending < 0.7 * other.of(Way.RIGID).bending
+    assert other.of(ExecutionMode.FLEXIBLE).arrival_error < flexible.arrival_error / 10
+    assert other.of(ExecutionMode.FLEXIBLE).bending < 0.7 * other.of(ExecutionMode.RIGID).bending
 
 
 def test_clamped_links_need_a_flexible_plan_even_more() -> None:
@@ -98,10 +100,11 @@ def test_clamped_links_need_a_flexible_plan_even_more() -> None:
     start, goal = postures_from_points(arm, (0.5, 0.0), (0.5, 0.5), elbow=-1)
     found = compare(Task(arm=arm, start_positions=start, goal_positions=goal, duration=1.0,
                          payload_mass=1.0, effort_weights=[1 / 8, 1 / 8]), settling=0.5)
-    assert found.of(Way.RIGID_OPEN).arrival_error == pytest.approx(15.7 * MM, abs=0.3 * MM)
-    assert found.of(Way.FLEXIBLE_OPEN).arrival_error < 0.3 * MM
-    assert found.of(Way.RIGID).arrival_error > 20 * MM
-    assert found.of(Way.FLEXIBLE).arrival_error < 0.02 * MM
+    assert found.of(ExecutionMode.RIGID_OPEN).arrival_error == pytest.approx(15.7 * MM,
+                                                                             abs=0.3 * MM)
+    assert found.of(ExecutionMode.FLEXIBLE_OPEN).arrival_error < 0.3 * MM
+    assert found.of(ExecutionMode.RIGID).arrival_error > 20 * MM
+    assert found.of(ExecutionMode.FLEXIBLE).arrival_error < 0.02 * MM
 
 
 def test_plan_that_fails_leaves_its_ways_out(ei5_arm: Arm, ei5_model: ArmModel,
@@ -118,7 +121,7 @@ def test_plan_that_fails_leaves_its_ways_out(ei5_arm: Arm, ei5_model: ArmModel,
 
 def test_simulation_can_be_canceled(ei5_arm: Arm, ei5_model: ArmModel, paper_task: Any) -> None:
     watch = Monitor()
-    watch.canceled = lambda: watch.phase == Way.RIGID_OPEN.value
+    watch.canceled = lambda: watch.phase == ExecutionMode.RIGID_OPEN.value
     with pytest.raises(StoppedError):
         compare(paper_task(ei5_arm), model=ei5_model, monitor=watch)
 
@@ -151,7 +154,7 @@ def test_table_says_what_was_compared(compared: Comparison) -> None:
     assert rows['planned flexible'].endswith('iterations)')
     lines = [re.split(' {2,}', line.strip()) for line in comparison_table(compared).splitlines()]
     assert lines[0][0] == 'error on arrival [mm]'
-    assert [line[0] for line in lines[1:]] == [way.value for way in Way]
+    assert [line[0] for line in lines[1:]] == [way.value for way in ExecutionMode]
     assert [lines[2][1], lines[2][4]] == ['0.912', '1.07']
 
 

@@ -14,7 +14,7 @@ from flex_planner.dynamics.integration import simulate
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_path
-from flex_planner.planning.sampling import sample_reference, SamplingSettings
+from flex_planner.planning.sampling import sample_plan, SamplingSettings
 from flex_planner.simulation.joint_control import Disturbance, Encoder, Gains, JointReference
 from flex_planner.simulation.plant import Control, Plant, RunawayError
 import numpy as np
@@ -46,7 +46,7 @@ def workshop_plant(workshop_arm: Arm) -> PlantModel:
 
 @pytest.fixture(scope='module')
 def reference(plan: Plan) -> JointReference:
-    return JointReference.of(sample_reference(plan, SamplingSettings(torque_tolerance=2e-3)))
+    return JointReference.of(sample_plan(plan, SamplingSettings(torque_tolerance=2e-3)))
 
 
 def plant_at_start(plan: Plan, gains: Gains = GAINS, payload_mass: float = 1.0,

@@ -8,7 +8,7 @@ from flex_planner.simulation.settling import (
     ArrivalWatch,
     bending_peak_to_peak,
     peak_to_peak,
-    Residual,
+    ResidualVibration,
 )
 import numpy as np
 import pytest
@@ -29,7 +29,8 @@ def test_bending_is_the_travel_of_the_middle_of_a_supported_link(ei50_arm: Arm) 
 
 
 def test_rigid_arm_does_not_bend(rigid_arm: Arm) -> None:
-    assert Residual.of(rigid_arm, np.array([[0.0, 1.0], [0.1, 1.0]])) == Residual(
+    assert ResidualVibration.of(rigid_arm,
+                                np.array([[0.0, 1.0], [0.1, 1.0]])) == ResidualVibration(
         tip=pytest.approx(2 * 0.878 * np.sin(0.05), rel=1e-3), bending=0.0)
 
 
@@ -52,4 +53,4 @@ def test_watch_begins_anew_with_a_new_motion(rigid_arm: Arm) -> None:
     watch.expect(1.0)
     assert watch.result(0.6) is None
     watch.see(1.2, np.zeros(4))
-    assert watch.result(1.6) == Residual(tip=0.0, bending=0.0)
+    assert watch.result(1.6) == ResidualVibration(tip=0.0, bending=0.0)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from flex_planner.base.progress import Monitor
-from flex_planner.collocation import CollocationSolution, GaussRule, Settings
+from flex_planner.collocation import CollocationSolution, GaussRule, SolverSettings
 from flex_planner.collocation.newton import newton, NewtonOutcome
 import numpy as np
 from numpy.typing import NDArray
@@ -94,7 +94,7 @@ class Case:
     # of the other unknowns, from z_1 on; the slope of the guess if not given
     others: tuple[float, ...] = ()
 
-    def start(self, settings: Settings) -> CollocationSolution:
+    def start(self, settings: SolverSettings) -> CollocationSolution:
         mesh = np.linspace(*self.span, settings.intervals + 1)
         nodes = np.zeros((mesh.size, self.problem.size))
         nodes[:, 0] = self.guess(mesh)

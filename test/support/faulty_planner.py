@@ -6,7 +6,7 @@ from typing import Any
 
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import Plan
-from flex_planner.planning.sampling import Reference
+from flex_planner.planning.sampling import SampledPlan
 from flex_planner.ros.planner import node, request_planner
 
 plan_path, motion_markers = request_planner.plan_path, node.motion_markers
@@ -20,7 +20,7 @@ def faulty_plan(task: Task, **options: Any) -> Plan:
     return plan_path(task, **options)
 
 
-def faulty_markers(arm: Any, reference: Reference, frame: str) -> Any:
+def faulty_markers(arm: Any, reference: SampledPlan, frame: str) -> Any:
     if reference.times_ns[-1] > 1.5e9:
         raise KeyError('while publishing')
     return motion_markers(arm, reference, frame)

@@ -15,7 +15,7 @@ from flex_planner.cli.request import add_objectives, add_task, named_as_options,
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.planning.plan import Peaks, peaks, Plan, PlanStatus
 from flex_planner.planning.plan_path import plan_path
-from flex_planner.planning.sampling import Reference, sample_reference
+from flex_planner.planning.sampling import sample_plan, SampledPlan
 from flex_planner.reports.motion import (
     payload_rows,
     plan_rows,
@@ -96,11 +96,11 @@ def _payload(options: argparse.Namespace) -> int:
     return _exit_code(request, found)
 
 
-def _sampled(request: Request, plan: Plan | None) -> tuple[Reference | None, Peaks | None]:
+def _sampled(request: Request, plan: Plan | None) -> tuple[SampledPlan | None, Peaks | None]:
     """Return samples of a plan and its peaks, if it has a solution."""
     if plan is None or plan.solution is None:
         return None, None
-    reference = sample_reference(plan, request.sampling)
+    reference = sample_plan(plan, request.sampling)
     return reference, peaks(plan, reference.samples)
 
 

@@ -26,7 +26,7 @@ from flex_planner.paper.evidence import (
     Table,
 )
 from flex_planner.simulation.comparison import compare
-from flex_planner.simulation.execution import Outcome, Way
+from flex_planner.simulation.execution import ExecutionMode, ExecutionResult
 import numpy as np
 
 _GRID = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0, 5.5)  # [kg]
@@ -35,7 +35,8 @@ _SOFT = 5.0  # [N m^2]
 # dozens of switches at the limit: the last grams of the bracket take longest
 _CLAMPED_ACCURACY = 5e-3  # [kg]
 _HARDLY, _FEW = 0.98, 1e-3
-_WAYS = (Way.FLEXIBLE_OPEN, Way.RIGID_OPEN, Way.FLEXIBLE, Way.RIGID, Way.PD_ONLY)
+_WAYS = (ExecutionMode.FLEXIBLE_OPEN, ExecutionMode.RIGID_OPEN, ExecutionMode.FLEXIBLE,
+         ExecutionMode.RIGID, ExecutionMode.PD_ONLY)
 
 
 def front(*, reduced: bool = False) -> Section:
@@ -121,7 +122,7 @@ def feedforward(*, reduced: bool = False) -> Section:
     outcomes = {way: result.of(way) for way in _WAYS}
     rows = tuple((way.value, f'{one.arrival_error * 1e3:.3g}', f'{one.final_error * 1e3:.3g}',
                   f'{one.residual.tip * 1e3:.3g}') for way, one in outcomes.items())
-    flexible, rigid = outcomes[Way.FLEXIBLE_OPEN], outcomes[Way.RIGID_OPEN]
+    flexible, rigid = outcomes[ExecutionMode.FLEXIBLE_OPEN], outcomes[ExecutionMode.RIGID_OPEN]
     return Section(
         key='6.3', title='Beyond the paper: rigid and flexible feedforward',
         text='The motion of section 5.2 with 1 kg, planned with rigid and with flexible links '
@@ -139,7 +140,7 @@ def feedforward(*, reduced: bool = False) -> Section:
         values={'flexible_error': flexible.arrival_error, 'rigid_error': rigid.arrival_error})
 
 
-def _distances(outcomes: dict[Way, Outcome], goal: Array) -> Picture:
+def _distances(outcomes: dict[ExecutionMode, ExecutionResult], goal: Array) -> Picture:
     curves = []
     for k, (way, one) in enumerate(outcomes.items()):
         execution = one.execution

@@ -8,7 +8,7 @@ import math
 from flex_planner.arms.inverse_kinematics import inverse_kinematics
 from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.validation import Array
-from flex_planner.collocation import CollocationSolution, Settings, solve
+from flex_planner.collocation import CollocationSolution, solve, SolverSettings
 from flex_planner.dynamics.statics import natural_modes
 from flex_planner.optimal_control.arm_model import ArmModel, Parameters
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
@@ -113,7 +113,7 @@ def _costates() -> Rows:
 def _solved(problem: MotionProblem, guess: CollocationSolution | None) -> CollocationSolution:
     if guess is None:
         raise NoPlanError('a plan without a solution')
-    result = solve(problem, guess, Settings())
+    result = solve(problem, guess, SolverSettings())
     if not result.converged:
         raise NoPlanError(f'the printed costate equation: {result.message}')
     return result.solution

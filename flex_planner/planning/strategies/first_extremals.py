@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.progress import Monitor
-from flex_planner.collocation import CollocationResult, CollocationSolution, Settings
+from flex_planner.collocation import CollocationResult, CollocationSolution, SolverSettings
 from flex_planner.collocation.homotopy import STOPPED
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.planning.strategies.initial_guesses import (
@@ -21,11 +21,11 @@ from flex_planner.planning.strategies.price_continuation import (
     changed,
     durations,
     Enough,
+    Extremal,
     Family,
     no_aim,
     payloads,
-    Start,
-    Stop,
+    SearchStart,
     worth,
     worth_time,
 )
@@ -36,8 +36,8 @@ _FIRST_MESHES = 4
 _LIFT, _LIFTS, _MOST_RIGID = 0.03, 3, 15
 
 
-def heaviest(problem: MotionProblem, settings: Settings, monitor: Monitor, *,
-             first: Stop | None = None, enough: Enough = no_aim) -> Iterator[Stop]:
+def heaviest(problem: MotionProblem, settings: SolverSettings, monitor: Monitor, *,
+             first: Extremal | None = None, enough: Enough = no_aim) -> Iterator[Extremal]:
     """
     Yield heavier and heavier payloads from that of the problem on.
 
@@ -50,14 +50,14 @@ def heaviest(problem: MotionProblem, settings: Settings, monitor: Monitor, *,
     return _family(problem, payloads, settings, monitor, first, enough)
 
 
-def quickest(problem: MotionProblem, settings: Settings, monitor: Monitor, *,
-             first: Stop | None = None, enough: Enough = no_aim) -> Iterator[Stop]:
+def quickest(problem: MotionProblem, settings: SolverSettings, monitor: Monitor, *,
+             first: Extremal | None = None, enough: Enough = no_aim) -> Iterator[Extremal]:
     """Yield shorter and shorter durations from that of the problem on, see `heaviest`."""
     return _family(problem, durations, settings, monitor, first, enough)
 
 
-def _family(problem: MotionProblem, family: Family, settings: Settings, monitor: Monitor,
-            first: Stop | None, enough: Enough) -> Iterator[Stop]:
+def _family(problem: MotionProblem, family: Family, settings: SolverSettings, monitor: Monitor,
+            first: Extremal | None, enough: Enough) -> Iterator[Extremal]:
     """Yield the motions of a family, the first one included."""
     payload = family is payloads
     if first is None and problem.model.arm.n_modes:
@@ -72,19 +72,19 @@ def _family(problem: MotionProblem, family: Family, settings: Settings, monitor:
                 return
     if first is None:
         result = first_motion(problem, settings, monitor)
-        first = Stop(value=problem.task.payload_mass if payload else problem.task.duration,
-                     price=0.0, problem=problem, result=result)
+        first = Extremal(value=problem.task.payload_mass if payload else problem.task.duration,
+                         price=0.0, problem=problem, result=result)
     yield first
     if first.result.converged:
         yield from family(first.problem, first.result, settings, monitor, enough)
 
 
-def _rigid_stops(problem: MotionProblem, family: Family, settings: Settings,
-                 monitor: Monitor) -> list[Stop]:
+def _rigid_stops(problem: MotionProblem, family: Family, settings: SolverSettings,
+                 monitor: Monitor) -> list[Extremal]:
     """Return the motions of the same arm made rigid up to one that is near its limit."""
     rigid = rigid_problem(problem)
     first = cold_start(rigid, settings, monitor).result
-    stops: list[Stop] = []
+    stops: list[Extremal] = []
     if not first.converged:
         return stops
     for stop in family(rigid, first, settings, monitor, lambda value: _LIFT * value):
@@ -94,20 +94,22 @@ def _rigid_stops(problem: MotionProblem, family: Family, settings: Settings,
     return stops
 
 
-def _lifted_first(problem: MotionProblem, stops: list[Stop], payload: bool, settings: Settings,
-                  monitor: Monitor) -> Stop | None:
+def _lifted_first(problem: MotionProblem, stops: list[Extremal], payload: bool,
+                  settings: SolverSettings,
+                  monitor: Monitor) -> Extremal | None:
     """Return the flexible motion at the price of a rigid one that is near its limit, or None."""
     for stop in reversed(stops[-_LIFTS:]):
         if stop.stopped:
             return stop
-        found = taken_over(problem, Start.of(stop), settings, monitor, payload=payload)
+        found = taken_over(problem, SearchStart.of(stop), settings, monitor, payload=payload)
         if found is not None:
             return found
     return None
 
 
-def taken_over(problem: MotionProblem, start: Start, settings: Settings, monitor: Monitor, *,
-               payload: bool) -> Stop | None:
+def taken_over(problem: MotionProblem, start: SearchStart, settings: SolverSettings,
+               monitor: Monitor, *,
+               payload: bool) -> Extremal | None:
     """
     Return the motion at the price of another arm's or task's; None if there is none beyond.
 
@@ -115,7 +117,7 @@ def taken_over(problem: MotionProblem, start: Start, settings: Settings, monitor
     ----------
     problem : MotionProblem
         With the least payload, or the longest duration, that is of interest.
-    start : Start
+    start : SearchStart
         Of the other arm or task.
     settings, monitor
         Of the solver.
@@ -141,13 +143,13 @@ def taken_over(problem: MotionProblem, start: Start, settings: Settings, monitor
 
 
 def _fitted(problem: MotionProblem, solution: CollocationSolution,
-            settings: Settings) -> CollocationSolution:
+            settings: SolverSettings) -> CollocationSolution:
     """Return a motion of the same or of a rigid arm as a guess, stretched to the duration."""
     guess = solution.stretched(problem.task.duration / solution.mesh[-1])
     return guess if guess.nodes.shape[1] == problem.size else lifted(problem, guess, settings)
 
 
-def first_motion(problem: MotionProblem, settings: Settings,
+def first_motion(problem: MotionProblem, settings: SolverSettings,
                  monitor: Monitor) -> CollocationResult:
     """Return the first solution that strategies find, or the last failure: soon."""
     most = max(_FIRST_MESHES * problem.fewest_intervals(settings.stages), 200)

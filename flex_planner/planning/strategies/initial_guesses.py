@@ -17,9 +17,9 @@ from flex_planner.collocation import (
     CollocationResult,
     CollocationSolution,
     GaussRule,
-    Settings,
     solve,
-    Status,
+    SolverSettings,
+    SolverStatus,
 )
 from flex_planner.collocation.homotopy import loose, walk
 from flex_planner.optimal_control.arm_model import ArmModel
@@ -46,7 +46,7 @@ class Attempt:
     evidence: str = ''
 
 
-Strategy = Callable[[MotionProblem, Settings, Monitor], Attempt | None]
+Strategy = Callable[[MotionProblem, SolverSettings, Monitor], Attempt | None]
 
 # the smallest weight that a walk starts with, and what a walk in stiffness starts with
 _FIRST_WEIGHT, _STIFFER = 1.0, 10.0
@@ -60,18 +60,18 @@ _COARSE_STAGES, _COARSE_INTERVALS = 3, (60, 40, 20)
 _DIRECT_INTERVALS, _DIRECT_STAGES, _DIRECT_ITERATIONS = 20, 4, 150
 
 
-def cold_start(problem: MotionProblem, settings: Settings, monitor: Monitor) -> Attempt:
+def cold_start(problem: MotionProblem, settings: SolverSettings, monitor: Monitor) -> Attempt:
     """Start from a straight line with zero costates."""
     return Attempt(result=solve(problem, _straight(problem, settings), settings, monitor))
 
 
-def _straight(problem: MotionProblem, settings: Settings) -> CollocationSolution:
+def _straight(problem: MotionProblem, settings: SolverSettings) -> CollocationSolution:
     """Return the straight line on the first mesh."""
     intervals = max(settings.intervals, problem.fewest_intervals(settings.stages))
     return problem.straight_line(min(intervals, settings.max_intervals), settings.rule)
 
 
-def lifted_rigid_motion(problem: MotionProblem, settings: Settings,
+def lifted_rigid_motion(problem: MotionProblem, settings: SolverSettings,
                         monitor: Monitor) -> Attempt | None:
     """Start from the motion of the same arm made rigid, bent as gravity bends the ends."""
     if not problem.task.arm.n_modes:
@@ -84,7 +84,7 @@ def lifted_rigid_motion(problem: MotionProblem, settings: Settings,
 
 
 def lifted(problem: MotionProblem, rigid: CollocationSolution,
-           settings: Settings) -> CollocationSolution:
+           settings: SolverSettings) -> CollocationSolution:
     """Return a motion of the rigid arm as a guess for the flexible one."""
     arm = problem.task.arm
     mesh = _straight(problem, settings).mesh
@@ -105,7 +105,7 @@ def lifted(problem: MotionProblem, rigid: CollocationSolution,
     return CollocationSolution(mesh, nodes, stages, coarse.rule)
 
 
-def coarse_mesh(problem: MotionProblem, settings: Settings, monitor: Monitor) -> Attempt:
+def coarse_mesh(problem: MotionProblem, settings: SolverSettings, monitor: Monitor) -> Attempt:
     """
     Start on meshes too coarse to show the ringing, then refine.
 
@@ -117,7 +117,7 @@ def coarse_mesh(problem: MotionProblem, settings: Settings, monitor: Monitor) ->
     for intervals in (min(count, settings.max_intervals) for count in _COARSE_INTERVALS):
         guess = problem.straight_line(intervals, few.rule)
         result = solve(problem, guess, few, monitor)
-        if result.status not in (Status.CONVERGED, Status.MESH_LIMIT):
+        if result.status not in (SolverStatus.CONVERGED, SolverStatus.MESH_LIMIT):
             continue
         coarse = result.solution
         finer = 2 * max(intervals, problem.fewest_intervals(settings.stages))
@@ -142,7 +142,7 @@ def rigid_problem(problem: MotionProblem) -> MotionProblem:
     return MotionProblem(ArmModel(rigid_task.arm), rigid_task, parameters)
 
 
-def walked_weights(problem: MotionProblem, settings: Settings,
+def walked_weights(problem: MotionProblem, settings: SolverSettings,
                    monitor: Monitor) -> Attempt | None:
     """Start without position and velocity weights and raise them tenfold at a time."""
     if not has_weights(problem):
@@ -151,7 +151,7 @@ def walked_weights(problem: MotionProblem, settings: Settings,
     return _walked(at, settings, monitor, first_step)
 
 
-def weights_raised(problem: MotionProblem, solution: CollocationSolution, settings: Settings,
+def weights_raised(problem: MotionProblem, solution: CollocationSolution, settings: SolverSettings,
                    monitor: Monitor) -> CollocationResult:
     """Start from the motion of the same task without position and velocity weights."""
     if not has_weights(problem):
@@ -185,7 +185,7 @@ def _weighted(problem: MotionProblem) -> tuple[Callable[[float], MotionProblem],
     return at, 1 / (1 + decades)
 
 
-def walked_vibration(problem: MotionProblem, settings: Settings,
+def walked_vibration(problem: MotionProblem, settings: SolverSettings,
                      monitor: Monitor) -> Attempt | None:
     """
     Start with a price on the bending rates, which keeps the links from ringing, and lower it.
@@ -200,7 +200,7 @@ def walked_vibration(problem: MotionProblem, settings: Settings,
     return _walked(_calmed(problem), settings, monitor, first_step=1 / _DECADES)
 
 
-def walked_stiffness(problem: MotionProblem, settings: Settings,
+def walked_stiffness(problem: MotionProblem, settings: SolverSettings,
                      monitor: Monitor) -> Attempt | None:
     """Start with stiffer links and a price on the bending rates; soften, then lower the price."""
     if not problem.model.arm.n_modes:
@@ -237,7 +237,8 @@ def _with(problem: MotionProblem, **changes: Any) -> MotionProblem:
     return MotionProblem(problem.model, problem.task, replace(problem.parameters, **changes))
 
 
-def _walked(problem_at: Callable[[float], MotionProblem], settings: Settings, monitor: Monitor,
+def _walked(problem_at: Callable[[float], MotionProblem], settings: SolverSettings,
+            monitor: Monitor,
             first_step: float) -> Attempt:
     """Solve the first problem from a straight line and walk from there."""
     first = problem_at(0.0)
@@ -248,7 +249,7 @@ def _walked(problem_at: Callable[[float], MotionProblem], settings: Settings, mo
     return Attempt(result=result)
 
 
-def direct_collocation(problem: MotionProblem, settings: Settings,
+def direct_collocation(problem: MotionProblem, settings: SolverSettings,
                        monitor: Monitor) -> Attempt | None:
     """
     Start from a coarse transcription solved by IPOPT, whose multipliers are the costates.
@@ -276,7 +277,8 @@ def direct_collocation(problem: MotionProblem, settings: Settings,
 
 def warm_start(solution: CollocationSolution) -> Strategy:
     """Return a strategy that starts from a solution, stretched to the duration."""
-    def strategy(problem: MotionProblem, settings: Settings, monitor: Monitor) -> Attempt | None:
+    def strategy(problem: MotionProblem, settings: SolverSettings,
+                 monitor: Monitor) -> Attempt | None:
         if solution.nodes.shape[1] != problem.size:
             return None
         guess = solution.stretched(problem.task.duration / solution.mesh[-1])

@@ -20,15 +20,15 @@ from flex_planner.collocation import (
     CollocationResult,
     CollocationSolution,
     GaussRule,
-    Settings,
     solve,
+    SolverSettings,
 )
 from flex_planner.collocation.homotopy import STOPPED
 from flex_planner.collocation.mesh import defects, levelled, switching_times
 from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectSettings
 from flex_planner.optimal_control.free_payload import PayloadProblem
 from flex_planner.optimal_control.motion_problem import MotionProblem
-from flex_planner.planning.strategies.price_continuation import changed, Enough, Stop
+from flex_planner.planning.strategies.price_continuation import changed, Enough, Extremal
 import numpy as np
 
 # points an interval, intervals of the first mesh and of the finest
@@ -52,8 +52,8 @@ class _Found:
     converged: bool
 
 
-def hard_payloads(problem: MotionProblem, price: float, settings: Settings, monitor: Monitor,
-                  enough: Enough) -> Iterator[Stop]:
+def hard_payloads(problem: MotionProblem, price: float, settings: SolverSettings, monitor: Monitor,
+                  enough: Enough) -> Iterator[Extremal]:
     """
     Yield heavier and heavier payloads from a price on, as far as IPOPT and Newton's method lead.
 
@@ -86,7 +86,7 @@ def hard_payloads(problem: MotionProblem, price: float, settings: Settings, moni
         price = before * factor
 
 
-def _factor(stop: Stop, largest: float, enough: Enough) -> float:
+def _factor(stop: Extremal, largest: float, enough: Enough) -> float:
     """Return the factor in price that leaves little enough room, which goes with its inverse."""
     wanted = enough(stop.value)
     if not wanted:
@@ -95,8 +95,8 @@ def _factor(stop: Stop, largest: float, enough: Enough) -> float:
 
 
 def _priced(problem: MotionProblem, price: float, mesh: Array,
-            guess: CollocationSolution | None, settings: Settings,
-            monitor: Monitor) -> Stop | None:
+            guess: CollocationSolution | None, settings: SolverSettings,
+            monitor: Monitor) -> Extremal | None:
     """Return the motion whose payload is worth a price, on better and better meshes; or None."""
     for _ in range(_MESHES):
         found = _transcribed(problem, price, mesh, guess, monitor)
@@ -113,19 +113,19 @@ def _priced(problem: MotionProblem, price: float, mesh: Array,
     return None
 
 
-def _newton(settings: Settings) -> Settings:
+def _newton(settings: SolverSettings) -> SolverSettings:
     """Return settings for Newton's method from a motion of IPOPT, with its own rule."""
     return replace(settings, stages=_STAGES, error_tolerance=_EXACT,
                    max_iterations=min(_NEWTON, settings.max_iterations))
 
 
-def _stop(ahead: PayloadProblem, result: CollocationResult, price: float) -> Stop:
+def _stop(ahead: PayloadProblem, result: CollocationResult, price: float) -> Extremal:
     """Return a solution as a stop."""
     payload, inner = ahead.restricted(result.solution)
     if not result.converged:
-        return Stop(value=payload, price=price, result=result, problem=ahead.motion)
-    return Stop(value=payload, price=price, result=replace(result, solution=inner),
-                problem=ahead.with_payload(payload))
+        return Extremal(value=payload, price=price, result=result, problem=ahead.motion)
+    return Extremal(value=payload, price=price, result=replace(result, solution=inner),
+                    problem=ahead.with_payload(payload))
 
 
 def _transcribed(problem: MotionProblem, price: float, mesh: Array,

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 from flex_planner.base.progress import Monitor
-from flex_planner.collocation import CollocationResult, Settings, solve, Status
+from flex_planner.collocation import CollocationResult, solve, SolverSettings, SolverStatus
 from flex_planner.collocation.homotopy import STOPPED, walk
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import MAX_DURATION
@@ -27,10 +27,10 @@ from flex_planner.planning.strategies.initial_guesses import (
 from flex_planner.planning.strategies.price_continuation import (
     changed,
     durations,
+    Extremal,
     free,
     longer_durations,
     on_the_way,
-    Stop,
     stretched,
     time_price,
 )
@@ -44,7 +44,7 @@ _NEAR_PRICE = 16.0
 _LONGER = (3.0, 12.0)
 
 
-def walked_payload(problem: MotionProblem, settings: Settings,
+def walked_payload(problem: MotionProblem, settings: SolverSettings,
                    monitor: Monitor) -> Attempt | None:
     """
     Start with little payload and let it grow, at a rising price of effort, up to the task's.
@@ -68,7 +68,7 @@ def walked_payload(problem: MotionProblem, settings: Settings,
     return Attempt(result=_walked_to(problem, stops, settings, monitor))
 
 
-def _walked_to(problem: MotionProblem, stops: list[Stop], settings: Settings,
+def _walked_to(problem: MotionProblem, stops: list[Extremal], settings: SolverSettings,
                monitor: Monitor) -> CollocationResult:
     """Go from the nearest stop to the payload of a task, then raise its weights."""
     wanted = problem.task.payload_mass
@@ -84,10 +84,10 @@ def _walked_to(problem: MotionProblem, stops: list[Stop], settings: Settings,
     return result
 
 
-def walked_duration(problem: MotionProblem, settings: Settings,
+def walked_duration(problem: MotionProblem, settings: SolverSettings,
                     monitor: Monitor) -> Attempt | None:
     """Start with a longer duration and shorten it, at a rising price of time, to the task's."""
-    wanted, met = problem.task.duration, list[Stop]()
+    wanted, met = problem.task.duration, list[Extremal]()
     bare = without_weights(problem)
     for factor in (factor for factor in _LONGER if wanted * factor <= MAX_DURATION):
         slow = changed(bare, duration=wanted * factor)
@@ -111,7 +111,7 @@ def walked_duration(problem: MotionProblem, settings: Settings,
     return Attempt(result=result)
 
 
-def freed_duration(problem: MotionProblem, result: CollocationResult, settings: Settings,
+def freed_duration(problem: MotionProblem, result: CollocationResult, settings: SolverSettings,
                    monitor: Monitor) -> tuple[MotionProblem, CollocationResult]:
     """
     Free the duration of a solved motion, at the price per second of its task.
@@ -134,12 +134,13 @@ def freed_duration(problem: MotionProblem, result: CollocationResult, settings: 
         if freed is not None or passed:
             break
     if freed is None:
-        return problem, replace(result, status=Status.NEWTON_FAILED,
+        return problem, replace(result, status=SolverStatus.NEWTON_FAILED,
                                 message='no duration was found that is worth its price')
     return freed
 
 
-def _freed(problem: MotionProblem, result: CollocationResult, price: float, settings: Settings,
+def _freed(problem: MotionProblem, result: CollocationResult, price: float,
+           settings: SolverSettings,
            monitor: Monitor) -> tuple[MotionProblem, CollocationResult] | None:
     """Return the motion with a free duration if it is near, or if the monitor stopped it."""
     ahead = free(problem, price)
@@ -153,9 +154,9 @@ def _freed(problem: MotionProblem, result: CollocationResult, price: float, sett
                                           solution=ahead.restricted(found.solution))
 
 
-def until(stops: Iterable[Stop], done: Callable[[Stop], bool]) -> list[Stop]:
+def until(stops: Iterable[Extremal], done: Callable[[Extremal], bool]) -> list[Extremal]:
     """Return the stops up to one that is enough, or to a limit; at least one."""
-    met: list[Stop] = []
+    met: list[Extremal] = []
     for stop in stops:
         met.append(stop)
         if not stop.result.converged or done(stop) or len(met) == _MOST_STOPS or steady(met):
@@ -163,14 +164,14 @@ def until(stops: Iterable[Stop], done: Callable[[Stop], bool]) -> list[Stop]:
     return met
 
 
-def steady(stops: list[Stop], share: float = _STEADY) -> bool:
+def steady(stops: list[Extremal], share: float = _STEADY) -> bool:
     """Return whether the last value is a limit: a higher price has not moved it."""
     last = stops[-1]
     cheaper = [stop for stop in stops if stop.price * _DEARER < 1.01 * last.price]
     return bool(cheaper) and abs(last.value - cheaper[-1].value) < share * last.value
 
 
-def _limited(stops: list[Stop], sentence: str) -> Attempt:
+def _limited(stops: list[Extremal], sentence: str) -> Attempt:
     """
     Return an attempt with evidence: only if the price shows that the limit is near.
 
@@ -180,11 +181,11 @@ def _limited(stops: list[Stop], sentence: str) -> Attempt:
     """
     last = stops[-1]
     if last.problem.model.arm.gravity.any():
-        return Attempt(result=replace(last.result, status=Status.NEWTON_FAILED, message=(
+        return Attempt(result=replace(last.result, status=SolverStatus.NEWTON_FAILED, message=(
             f'by the motions that were followed {sentence}; under gravity others may do more')))
     if steady(stops):
         grown = last.price / max(stops[0].price, 1.0)
         return Attempt(result=last.result, evidence=(
             f'{sentence} (the price of more has grown {grown:.0e} times)'))
-    return Attempt(result=replace(last.result, status=Status.NEWTON_FAILED,
+    return Attempt(result=replace(last.result, status=SolverStatus.NEWTON_FAILED,
                                   message='the limit was not found'))

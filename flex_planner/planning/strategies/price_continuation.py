@@ -18,9 +18,9 @@ from flex_planner.base.progress import Monitor
 from flex_planner.collocation import (
     CollocationResult,
     CollocationSolution,
-    Settings,
     solve,
-    Status,
+    SolverSettings,
+    SolverStatus,
 )
 from flex_planner.collocation.homotopy import STOPPED
 from flex_planner.optimal_control.free_payload import (
@@ -40,9 +40,9 @@ import numpy as np
 
 # from a payload or duration to how far from the limit is near enough
 Enough = Callable[[float], float]
-Family = Callable[[MotionProblem, CollocationResult, Settings, Monitor, Enough],
-                  Iterator['Stop']]
-Step = Callable[['Stop', float, Settings, Monitor], 'Stop | None']
+Family = Callable[[MotionProblem, CollocationResult, SolverSettings, Monitor, Enough],
+                  Iterator['Extremal']]
+Step = Callable[['Extremal', float, SolverSettings, Monitor], 'Extremal | None']
 
 # errors on the way: payloads and durations are some hundred times as exact
 _TOLERANCE = 1e-2
@@ -65,7 +65,7 @@ def no_aim(value: float) -> float:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Stop:
+class Extremal:
     """
     A motion on the way to a limit.
 
@@ -108,14 +108,14 @@ class Stop:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Start:
+class SearchStart:
     """
     What a search may start from: a motion on the way to the limit of a similar task.
 
     Attributes
     ----------
     value, price : float
-        As of `Stop`.
+        As of `Extremal`.
     solution : CollocationSolution
         Of that motion.
 
@@ -126,7 +126,7 @@ class Start:
     solution: CollocationSolution
 
     @classmethod
-    def of(cls, stop: Stop) -> Start:
+    def of(cls, stop: Extremal) -> SearchStart:
         """Return a stop as a start."""
         return cls(value=stop.value, price=stop.price, solution=stop.result.solution)
 
@@ -147,8 +147,8 @@ def reserve(problem: MotionProblem, solution: CollocationSolution) -> float:
     return float(weights @ ((bound**2 - torque**2) @ parameters.effort_weights)) / 2
 
 
-def payloads(problem: MotionProblem, first: CollocationResult, settings: Settings,
-             monitor: Monitor, enough: Enough = no_aim) -> Iterator[Stop]:
+def payloads(problem: MotionProblem, first: CollocationResult, settings: SolverSettings,
+             monitor: Monitor, enough: Enough = no_aim) -> Iterator[Extremal]:
     """
     Yield heavier and heavier payloads, each with the motion of least effort that carries it.
 
@@ -164,17 +164,17 @@ def payloads(problem: MotionProblem, first: CollocationResult, settings: Setting
     settings, monitor
         Of the solver, see `on_the_way`.
     enough : callable
-        From a value to the room that is wanted there, see `Stop.room`; 0 for as little as there
-        is.
+        From a value to the room that is wanted there, see `Extremal.room`; 0 for as little as
+        there is.
 
     """
-    start = Stop(value=problem.task.payload_mass, result=first, problem=problem,
-                 price=_payload_price(problem, first.solution))
+    start = Extremal(value=problem.task.payload_mass, result=first, problem=problem,
+                     price=_payload_price(problem, first.solution))
     return _followed(start, _heavier, settings, monitor, enough)
 
 
-def durations(problem: MotionProblem, first: CollocationResult, settings: Settings,
-              monitor: Monitor, enough: Enough = no_aim) -> Iterator[Stop]:
+def durations(problem: MotionProblem, first: CollocationResult, settings: SolverSettings,
+              monitor: Monitor, enough: Enough = no_aim) -> Iterator[Extremal]:
     """
     Yield shorter and shorter durations, see `payloads`.
 
@@ -182,13 +182,13 @@ def durations(problem: MotionProblem, first: CollocationResult, settings: Settin
     price succeeds, the duration is shortened by itself.
 
     """
-    start = Stop(value=problem.task.duration, result=first, problem=problem,
-                 price=time_price(problem, first.solution))
+    start = Extremal(value=problem.task.duration, result=first, problem=problem,
+                     price=time_price(problem, first.solution))
     return _followed(start, _quicker, settings, monitor, enough)
 
 
-def _followed(here: Stop, further: Step, settings: Settings, monitor: Monitor,
-              enough: Enough) -> Iterator[Stop]:
+def _followed(here: Extremal, further: Step, settings: SolverSettings, monitor: Monitor,
+              enough: Enough) -> Iterator[Extremal]:
     """Yield stops at higher and higher prices, as far apart as Newton's method allows."""
     factor = _FACTOR if here.problem.model.arm.n_modes else _LARGEST_FACTOR
     while factor > _SMALLEST_FACTOR:
@@ -208,7 +208,7 @@ def _followed(here: Stop, further: Step, settings: Settings, monitor: Monitor,
         here = stop
 
 
-def _aim(here: Stop, enough: Enough) -> float:
+def _aim(here: Extremal, enough: Enough) -> float:
     """Return the factor in price that leaves about so much room."""
     room, wanted = here.room, enough(here.value)
     if not wanted or not room < _CLOSE * here.value:
@@ -216,7 +216,8 @@ def _aim(here: Stop, enough: Enough) -> float:
     return max(float((room / (_SURE * wanted)) ** (1 / _POWER)), _LEAST_FACTOR)
 
 
-def _heavier(here: Stop, factor: float, settings: Settings, monitor: Monitor) -> Stop | None:
+def _heavier(here: Extremal, factor: float, settings: SolverSettings,
+             monitor: Monitor) -> Extremal | None:
     """Return the next stop, a factor in price away or else a step in payload."""
     price = here.price * factor
     found = worth(here.problem, here.result.solution, price, settings, monitor)
@@ -228,27 +229,29 @@ def _heavier(here: Stop, factor: float, settings: Settings, monitor: Monitor) ->
     if not there.converged:
         return None
     price = _payload_price(heavier, there.solution)
-    stop = Stop(value=here.value + more, result=there, problem=heavier, price=price)
+    stop = Extremal(value=here.value + more, result=there, problem=heavier, price=price)
     # far from the limit the price may fall for a while: J of light payloads need not be convex
     return stop if price > here.price or here.room > here.value + more else None
 
 
-def worth(problem: MotionProblem, guess: CollocationSolution, price: float, settings: Settings,
-          monitor: Monitor) -> Stop | None:
+def worth(problem: MotionProblem, guess: CollocationSolution, price: float,
+          settings: SolverSettings,
+          monitor: Monitor) -> Extremal | None:
     """Return the motion whose payload is worth a price, or None."""
     ahead = PayloadProblem(problem.model, problem.task, problem.parameters, price)
     found = solve(ahead, ahead.extended(guess), settings, monitor)
     payload, inner = ahead.restricted(found.solution)
     if found.status in STOPPED:
-        return Stop(value=payload, price=price, result=found, problem=problem)
+        return Extremal(value=payload, price=price, result=found, problem=problem)
     if not found.converged or payload < 0:
         return None
-    return Stop(value=payload, price=price,
-                result=replace(found, solution=inner, errors=found.errors[:problem.size]),
-                problem=ahead.with_payload(payload))
+    return Extremal(value=payload, price=price,
+                    result=replace(found, solution=inner, errors=found.errors[:problem.size]),
+                    problem=ahead.with_payload(payload))
 
 
-def _quicker(here: Stop, factor: float, settings: Settings, monitor: Monitor) -> Stop | None:
+def _quicker(here: Extremal, factor: float, settings: SolverSettings,
+             monitor: Monitor) -> Extremal | None:
     """Return the next stop, a factor in price away or else a step in duration."""
     price = here.price * factor
     found = worth_time(here.problem, here.result.solution, price, settings, monitor)
@@ -259,28 +262,28 @@ def _quicker(here: Stop, factor: float, settings: Settings, monitor: Monitor) ->
     if not there.converged:
         return None
     price = time_price(shorter, there.solution)
-    stop = Stop(value=shorter.task.duration, result=there, problem=shorter, price=price)
+    stop = Extremal(value=shorter.task.duration, result=there, problem=shorter, price=price)
     return stop if price > here.price else None
 
 
 def worth_time(problem: MotionProblem, guess: CollocationSolution, price: float,
-               settings: Settings, monitor: Monitor) -> Stop | None:
+               settings: SolverSettings, monitor: Monitor) -> Extremal | None:
     """Return the motion whose duration is worth a price, or None."""
     ahead = free(problem, price)
     found = solve(ahead, ahead.extended(guess), settings, monitor)
     duration = float(found.solution.nodes[0, -1])
     if found.status in STOPPED:
-        return Stop(value=duration, price=price, result=found, problem=problem)
+        return Extremal(value=duration, price=price, result=found, problem=problem)
     if not found.converged or not duration > 0:
         return None
-    return Stop(value=duration, price=price, problem=ahead.fixed(duration),
-                result=replace(found, solution=ahead.restricted(found.solution),
-                               errors=found.errors[:problem.size],
-                               switches=found.switches * duration))
+    return Extremal(value=duration, price=price, problem=ahead.fixed(duration),
+                    result=replace(found, solution=ahead.restricted(found.solution),
+                                   errors=found.errors[:problem.size],
+                                   switches=found.switches * duration))
 
 
-def longer_durations(problem: MotionProblem, first: CollocationResult, settings: Settings,
-                     monitor: Monitor) -> Iterator[Stop]:
+def longer_durations(problem: MotionProblem, first: CollocationResult, settings: SolverSettings,
+                     monitor: Monitor) -> Iterator[Extremal]:
     """Yield longer and longer durations, whose prices fall."""
     here = first
     while problem.task.duration / _SHORTER <= MAX_DURATION:
@@ -288,8 +291,8 @@ def longer_durations(problem: MotionProblem, first: CollocationResult, settings:
         here = stretched(problem, here.solution, settings, monitor)
         if not here.converged and here.status not in STOPPED:
             return
-        yield Stop(value=problem.task.duration, price=time_price(problem, here.solution),
-                   result=here, problem=problem)
+        yield Extremal(value=problem.task.duration, price=time_price(problem, here.solution),
+                       result=here, problem=problem)
 
 
 def free(problem: MotionProblem, price: float) -> FreeDurationProblem:
@@ -298,12 +301,12 @@ def free(problem: MotionProblem, price: float) -> FreeDurationProblem:
     return FreeDurationProblem(MotionProblem(problem.model, task, problem.parameters))
 
 
-def stretched(problem: MotionProblem, solution: CollocationSolution, settings: Settings,
+def stretched(problem: MotionProblem, solution: CollocationSolution, settings: SolverSettings,
               monitor: Monitor) -> CollocationResult:
     """Solve a motion, starting from one of another duration, or else from nothing."""
     for strategy in (warm_start(solution), cold_start, coarse_mesh):
         attempt = strategy(problem, settings, monitor)
-        if attempt is not None and attempt.result.status is not Status.NEWTON_FAILED:
+        if attempt is not None and attempt.result.status is not SolverStatus.NEWTON_FAILED:
             break
     assert attempt is not None
     return attempt.result
@@ -316,7 +319,7 @@ def changed(problem: MotionProblem, **changes: float) -> MotionProblem:
     return MotionProblem(problem.model, task, parameters)
 
 
-def on_the_way(settings: Settings, tolerance: float = _TOLERANCE) -> Settings:
+def on_the_way(settings: SolverSettings, tolerance: float = _TOLERANCE) -> SolverSettings:
     """Return settings for motions on the way to a limit: exact and patient enough."""
     wanted = max(min(tolerance, _TOLERANCE), settings.error_tolerance)
     return replace(settings, error_tolerance=wanted,

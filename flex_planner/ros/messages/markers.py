@@ -5,7 +5,7 @@ from __future__ import annotations
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import link_points
 from flex_planner.base.validation import Array
-from flex_planner.planning.sampling import Reference
+from flex_planner.planning.sampling import SampledPlan
 from geometry_msgs.msg import Point
 import numpy as np
 from std_msgs.msg import ColorRGBA
@@ -17,7 +17,7 @@ _LONGEST_PATH = 500  # points
 _LINK, _PATH, _START, _GOAL = (0.2, 0.4, 0.8), (0.9, 0.5, 0.1), (0.2, 0.7, 0.2), (0.8, 0.2, 0.2)
 
 
-def motion_markers(arm: Arm, reference: Reference, frame: str) -> MarkerArray:
+def motion_markers(arm: Arm, reference: SampledPlan, frame: str) -> MarkerArray:
     """
     Return the bent links at nine instants, the later the less transparent, and the tip's path.
 
@@ -28,7 +28,7 @@ def motion_markers(arm: Arm, reference: Reference, frame: str) -> MarkerArray:
     ----------
     arm : Arm
         The arm.
-    reference : Reference
+    reference : SampledPlan
         Samples of the plan.
     frame : str
         Of the base.

@@ -21,7 +21,7 @@ from flex_planner.base.validation import Array, number
 from flex_planner.optimal_control.task import postures_from_points, Task
 from flex_planner.planning.objectives import Objectives
 from flex_planner.planning.plan import peaks, Plan, PlanStatus, Samples
-from flex_planner.planning.sampling import Reference
+from flex_planner.planning.sampling import SampledPlan
 from flex_planner.ros.settings.planner import PlannerSettings
 from flex_planner_interfaces.msg import (
     FlexiblePoint,
@@ -150,7 +150,7 @@ def report_from_plan(plan: Plan) -> PlanReport:
     return report
 
 
-def add_reference(report: PlanReport, plan: Plan, reference: Reference) -> None:
+def add_reference(report: PlanReport, plan: Plan, reference: SampledPlan) -> None:
     """Add to a report what the sampled plan shows."""
     most = peaks(plan, reference.samples)
     limited = np.isfinite([joint.motor.no_load_speed for joint in plan.arm.joints]).any()
@@ -172,7 +172,7 @@ def duration_seconds(duration: Duration) -> float:
     return float(duration.sec + duration.nanosec * 1e-9)
 
 
-def joint_trajectory(reference: Reference, joint_names: Sequence[str]) -> JointTrajectory:
+def joint_trajectory(reference: SampledPlan, joint_names: Sequence[str]) -> JointTrajectory:
     """Return what a joint_trajectory_controller with an effort interface takes."""
     samples, n = reference.samples, len(joint_names)
     points = [
@@ -185,7 +185,7 @@ def joint_trajectory(reference: Reference, joint_names: Sequence[str]) -> JointT
     return JointTrajectory(joint_names=list(joint_names), points=points)
 
 
-def flexible_trajectory(plan: Plan, reference: Reference, joints: JointTrajectory,
+def flexible_trajectory(plan: Plan, reference: SampledPlan, joints: JointTrajectory,
                         frame: str) -> FlexibleTrajectory:
     """Return the trajectory with the bending of the links, costates and the tip's path."""
     samples = reference.samples
@@ -199,7 +199,7 @@ def flexible_trajectory(plan: Plan, reference: Reference, joints: JointTrajector
     return message
 
 
-def reported_trajectory(report: PlanReport, plan: Plan, reference: Reference,
+def reported_trajectory(report: PlanReport, plan: Plan, reference: SampledPlan,
                         settings: PlannerSettings) -> FlexibleTrajectory:
     """Return the trajectory of a sampled plan, and add to its report what the samples show."""
     add_reference(report, plan, reference)

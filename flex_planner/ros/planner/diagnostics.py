@@ -8,7 +8,7 @@ from pathlib import Path
 import time
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from flex_planner.ros.planner.request_queue import Desk
+from flex_planner.ros.planner.request_queue import RequestQueue
 from flex_planner.ros.planner.streamer import Streamer
 from flex_planner_interfaces.msg import PlanReport
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -66,7 +66,7 @@ class Diagnostics:
     ----------
     node : Node
         The planner.
-    desk : Desk
+    desk : RequestQueue
         Its requests.
     record : Record
         How they ended.
@@ -79,7 +79,7 @@ class Diagnostics:
 
     """
 
-    def __init__(self, node: Node, desk: Desk, record: Record, streamer: Streamer,
+    def __init__(self, node: Node, desk: RequestQueue, record: Record, streamer: Streamer,
                  trajectories: Publisher, arm: str) -> None:
         self._node, self._desk, self._record, self._arm = node, desk, record, arm
         self._streamer, self._trajectories = streamer, trajectories

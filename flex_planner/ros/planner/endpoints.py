@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 from flex_planner.ros.messages.payload_searches import fill_response, search_without_result
 from flex_planner.ros.messages.plans import duration_message
 from flex_planner.ros.planner.request_planner import Outcome
-from flex_planner.ros.planner.request_queue import Pending, Work
-from flex_planner.ros.planner.request_state import Ticket
+from flex_planner.ros.planner.request_queue import PendingRequest, Work
+from flex_planner.ros.planner.request_state import RequestState
 from flex_planner_interfaces.msg import MotionTask, PlanReport
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.action.server import ServerGoalHandle
@@ -26,7 +26,7 @@ _MANY = QoSProfile(depth=1000)
 _FEEDBACK_PERIOD = 0.1  # [s]
 
 
-class Counter(NamedTuple):
+class RequestHandlers(NamedTuple):
     """
     What endpoints do with requests.
 
@@ -41,9 +41,9 @@ class Counter(NamedTuple):
 
     """
 
-    submit: Callable[[Work], Pending]
-    withdraw: Callable[[Pending], None]
-    conclude: Callable[[Pending, MotionTask], Coroutine[Any, Any, Outcome]]
+    submit: Callable[[Work], PendingRequest]
+    withdraw: Callable[[PendingRequest], None]
+    conclude: Callable[[PendingRequest, MotionTask], Coroutine[Any, Any, Outcome]]
 
 
 class Endpoint:
@@ -59,7 +59,7 @@ class Endpoint:
     kinds : pair of types
         Of the service and of the action; the request has the fields of the goal, and the
         response those of the result.
-    counter : Counter
+    counter : RequestHandlers
         Where requests are handed in.
     work : callable
         Returns the outcome of a request; runs in the thread of the worker.
@@ -68,11 +68,11 @@ class Endpoint:
 
     """
 
-    def __init__(self, node: Node, name: str, kinds: tuple[Any, Any], counter: Counter,
-                 work: Callable[[Any, Ticket], Outcome],
+    def __init__(self, node: Node, name: str, kinds: tuple[Any, Any], counter: RequestHandlers,
+                 work: Callable[[Any, RequestState], Outcome],
                  fill: Callable[[Any, Any, Outcome], None]) -> None:
         self._counter, self._work, self._fill = counter, work, fill
-        self._goals: dict[bytes, tuple[ServerGoalHandle, Pending]] = {}
+        self._goals: dict[bytes, tuple[ServerGoalHandle, PendingRequest]] = {}
         service, self._action = kinds
         # in the group that all else is in, a request that waits would hold up the others
         group = ReentrantCallbackGroup()
@@ -133,7 +133,7 @@ def fill_search(response: Any, request: Any, outcome: Outcome) -> None:
     fill_response(response, outcome.search or search_without_result(request))
 
 
-def _feedback(action: Any, ticket: Ticket) -> Any:
+def _feedback(action: Any, ticket: RequestState) -> Any:
     progress = ticket.progress
     return action.Feedback(
         phase=progress.phase, iteration=int(progress.iteration),

@@ -9,11 +9,11 @@ from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.ros.messages.markers import motion_markers
 from flex_planner.ros.messages.plans import duration_seconds
 from flex_planner.ros.planner.diagnostics import Diagnostics, Record
-from flex_planner.ros.planner.endpoints import Counter, Endpoint, fill_plan, fill_search
+from flex_planner.ros.planner.endpoints import Endpoint, fill_plan, fill_search, RequestHandlers
 from flex_planner.ros.planner.map_starts import Starts
 from flex_planner.ros.planner.recorder import OutcomeRecorder
 from flex_planner.ros.planner.request_planner import Outcome, Planning, unknown_failure
-from flex_planner.ros.planner.request_queue import Desk, Pending, Work
+from flex_planner.ros.planner.request_queue import PendingRequest, RequestQueue, Work
 from flex_planner.ros.planner.streamer import Streamer
 from flex_planner.ros.runtime.parameters import (
     declare,
@@ -78,7 +78,7 @@ class PlannerNode(Node):  # type: ignore[misc]
                                    'there to start from')
         self._planning = Planning(
             ArmModel(arm), OutcomeRecorder(arm, self.get_fully_qualified_name()), starts)
-        self._desk = Desk(self._settings.queue_length)
+        self._desk = RequestQueue(self._settings.queue_length)
         self._joints = self.create_publisher(JointTrajectory, '~/joint_trajectory', LATCHED)
         self._flexible = self.create_publisher(
             FlexibleTrajectory, '~/flexible_trajectory', LATCHED)
@@ -91,7 +91,7 @@ class PlannerNode(Node):  # type: ignore[misc]
         self.get_logger().info(f'ready to plan for {arm.name}')
 
     def _create_endpoints(self) -> list[Endpoint]:
-        counter = Counter(self._submit, self._desk.withdraw, self._conclude)
+        counter = RequestHandlers(self._submit, self._desk.withdraw, self._conclude)
         plan, search = self._planning.plan, self._planning.find_max_payload
         return [
             Endpoint(self, '~/plan_path', (PlanPath, action.PlanPath), counter,
@@ -105,10 +105,10 @@ class PlannerNode(Node):  # type: ignore[misc]
     def _apply_parameters(self, changes: list[Parameter]) -> None:
         self._settings = validated_changes(self._settings, changes)
 
-    def _submit(self, work: Work) -> Pending:
+    def _submit(self, work: Work) -> PendingRequest:
         return self._desk.submit(work, self._settings, self.executor)
 
-    async def _conclude(self, pending: Pending, task: MotionTask) -> Outcome:
+    async def _conclude(self, pending: PendingRequest, task: MotionTask) -> Outcome:
         """Return what a request led to: an exception here would end the node."""
         try:
             outcome: Outcome = await pending.future
@@ -146,7 +146,7 @@ class PlannerNode(Node):  # type: ignore[misc]
             self.get_logger().warning(f'error {report.error_code}: {report.error_msg}')
 
     def destroy_node(self) -> Any:
-        """Stop the streamer and the worker, then the node."""
+        """Extremal the streamer and the worker, then the node."""
         self._streamer.close()
         if not self._desk.close(_STOP_TIMEOUT):
             self._planning.abandon()

@@ -12,7 +12,7 @@ from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import plain_arm
 from flex_planner.base.errors import RecordingError
 from flex_planner.planning.plan import Plan
-from flex_planner.planning.sampling import Reference
+from flex_planner.planning.sampling import SampledPlan
 from flex_planner.recording import (
     DEFAULT,
     definition_folder,
@@ -65,7 +65,7 @@ class OutcomeRecorder:
                              DEFAULT)
 
     def write(self, settings: PlannerSettings, stamp: int, task: MotionTask, report: PlanReport,
-              trajectory: FlexibleTrajectory, plan: Plan | None, reference: Reference | None,
+              trajectory: FlexibleTrajectory, plan: Plan | None, reference: SampledPlan | None,
               canceled: Callable[[], bool], *, search: PayloadSearch | None = None) -> Path:
         """
         Write a recording and return its folder.
@@ -85,7 +85,7 @@ class OutcomeRecorder:
             The plan as it is published.
         plan : Plan or None
             None where none was made.
-        reference : Reference or None
+        reference : SampledPlan or None
             Samples of the plan.
         canceled : callable
             Returns True once writing should stop, which is an error.
@@ -117,7 +117,7 @@ class OutcomeRecorder:
         return path
 
     def _write_states(self, recording: Recording, settings: PlannerSettings, plan: Plan,
-                      reference: Reference, ready: int, canceled: Callable[[], bool]) -> None:
+                      reference: SampledPlan, ready: int, canceled: Callable[[], bool]) -> None:
         names = [*settings.joint_names, *plan.arm.modal_names]
         for k, time in enumerate(reference.times_ns):
             if canceled():

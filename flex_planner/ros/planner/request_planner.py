@@ -15,7 +15,7 @@ from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_path, WARM_START
-from flex_planner.planning.sampling import Reference, sample_reference
+from flex_planner.planning.sampling import sample_plan, SampledPlan
 from flex_planner.ros.messages.payload_searches import (
     report_from_search,
     search_message,
@@ -36,7 +36,7 @@ from flex_planner.ros.messages.plans import (
 from flex_planner.ros.messages.trajectory_rules import trajectory_violations
 from flex_planner.ros.planner.map_starts import Starts
 from flex_planner.ros.planner.recorder import OutcomeRecorder
-from flex_planner.ros.planner.request_state import Ticket
+from flex_planner.ros.planner.request_state import RequestState
 from flex_planner.ros.settings.planner import PlannerSettings
 from flex_planner_interfaces.msg import (
     FlexibleTrajectory,
@@ -70,7 +70,7 @@ class Outcome:
     report: PlanReport
     trajectory: FlexibleTrajectory
     plan: Plan | None = None
-    reference: Reference | None = None
+    reference: SampledPlan | None = None
     search: PayloadSearch | None = None
 
     @property
@@ -100,7 +100,7 @@ class Planning:
         self._starts = Starts('', model.arm) if starts is None else starts
         self._recorded_now: PlanReport | None = None
 
-    def plan(self, message: MotionTask, ticket: Ticket) -> Outcome:
+    def plan(self, message: MotionTask, ticket: RequestState) -> Outcome:
         """
         Plan a request and record it with its outcome.
 
@@ -108,7 +108,7 @@ class Planning:
         ----------
         message : MotionTask
             The request.
-        ticket : Ticket
+        ticket : RequestState
             What it is served with.
 
         """
@@ -127,7 +127,7 @@ class Planning:
 
         return self._concluded(planned, message, ticket)
 
-    def find_max_payload(self, request: FindMaxPayload.Request, ticket: Ticket) -> Outcome:
+    def find_max_payload(self, request: FindMaxPayload.Request, ticket: RequestState) -> Outcome:
         """
         Find the maximum payload, plan the motion with it, and record both.
 
@@ -135,7 +135,7 @@ class Planning:
         ----------
         request : FindMaxPayload.Request
             The request, or the goal of the action, which has the same fields.
-        ticket : Ticket
+        ticket : RequestState
             What it is served with.
 
         """
@@ -167,7 +167,7 @@ class Planning:
             shutil.rmtree(stage, ignore_errors=True)
 
     def _concluded(self, work: Callable[[Task, Monitor], Outcome], message: MotionTask,
-                   ticket: Ticket, search: PayloadSearch | None = None) -> Outcome:
+                   ticket: RequestState, search: PayloadSearch | None = None) -> Outcome:
         """Do the work of a request and record its outcome, with `search` where it failed."""
         try:
             ticket.report(replace(ticket.progress, phase='start'))
@@ -186,7 +186,7 @@ class Planning:
         outcome.report.planning_time = duration_message(ticket.elapsed_ns)
         return self._recorded(message, ticket, outcome)
 
-    def _recorded(self, message: MotionTask, ticket: Ticket, outcome: Outcome) -> Outcome:
+    def _recorded(self, message: MotionTask, ticket: RequestState, outcome: Outcome) -> Outcome:
         """Record an outcome; a plan that cannot be recorded is a failure with a trajectory."""
         # a node that ends has no time to record what it gave up
         given_up = outcome.report.error_code == PlanReport.CANCELED and ticket.stopping()
@@ -217,7 +217,7 @@ def _outcome(report: PlanReport, plan: Plan | None, settings: PlannerSettings,
     """Return the outcome that a report tells of, with a trajectory if it is a success."""
     if plan is None or report.error_code != PlanReport.NONE:
         return Outcome(report=report, trajectory=FlexibleTrajectory(), plan=plan)
-    reference = sample_reference(plan, settings.sampling(), monitor)
+    reference = sample_plan(plan, settings.sampling(), monitor)
     trajectory = reported_trajectory(report, plan, reference, settings)
     broken = trajectory_violations(trajectory.joint_trajectory, settings.joint_names)
     if broken:
@@ -234,7 +234,7 @@ def unknown_failure(error: Exception) -> Outcome:
     return _failure(PlanReport.UNKNOWN, f'{type(error).__name__}: {error}')
 
 
-def canceled(ticket: Ticket) -> Outcome:
+def canceled(ticket: RequestState) -> Outcome:
     """Return the outcome of a request that its client gave up."""
     outcome = _failure(PlanReport.CANCELED, StopReason.CANCELED.value)
     outcome.report.planning_time = duration_message(ticket.elapsed_ns)

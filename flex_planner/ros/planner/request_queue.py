@@ -7,29 +7,29 @@ from functools import partial
 import threading
 
 from flex_planner.ros.planner.request_planner import busy, canceled, Outcome, unknown_failure
-from flex_planner.ros.planner.request_state import Ticket
+from flex_planner.ros.planner.request_state import RequestState
 from flex_planner.ros.planner.worker import Job, Worker
 from flex_planner.ros.settings.planner import PlannerSettings
 from rclpy.executors import Executor
 from rclpy.task import Future
 
-Work = Callable[[Ticket], Outcome]
+Work = Callable[[RequestState], Outcome]
 
 
-class Pending:
+class PendingRequest:
     """
     A request that was handed in.
 
     Parameters
     ----------
-    ticket : Ticket
+    ticket : RequestState
         Of the request.
     executor : Executor
         Runs what awaits `future`.
 
     """
 
-    def __init__(self, ticket: Ticket, executor: Executor) -> None:
+    def __init__(self, ticket: RequestState, executor: Executor) -> None:
         self.ticket, self.future = ticket, Future(executor=executor)
         self.job: Job | None = None
         self._executor, self._lock = executor, threading.Lock()
@@ -44,7 +44,7 @@ class Pending:
         self._executor.wake()
 
 
-class Desk:
+class RequestQueue:
     """
     Takes requests, one at work and a bounded number waiting.
 
@@ -58,7 +58,7 @@ class Desk:
     def __init__(self, queue_length: int) -> None:
         self._queue_length = queue_length
         self._worker = Worker(queue_length)
-        self._active: Pending | None = None
+        self._active: PendingRequest | None = None
 
     @property
     def waiting(self) -> int:
@@ -66,12 +66,12 @@ class Desk:
         return self._worker.waiting
 
     @property
-    def active(self) -> Ticket | None:
+    def active(self) -> RequestState | None:
         """Return what is at work, None if nothing is."""
         active = self._active
         return active.ticket if active else None
 
-    def submit(self, work: Work, settings: PlannerSettings, executor: Executor) -> Pending:
+    def submit(self, work: Work, settings: PlannerSettings, executor: Executor) -> PendingRequest:
         """
         Hand in a request.
 
@@ -85,14 +85,14 @@ class Desk:
             Runs what awaits the outcome.
 
         """
-        ticket = Ticket(settings=settings, stopping=lambda: self._worker.stopping)
-        pending = Pending(ticket, executor)
+        ticket = RequestState(settings=settings, stopping=lambda: self._worker.stopping)
+        pending = PendingRequest(ticket, executor)
         pending.job = partial(self._serve, work, pending)
         if not self._worker.submit(pending.job):
             pending.conclude(busy(self._queue_length))
         return pending
 
-    def withdraw(self, pending: Pending) -> None:
+    def withdraw(self, pending: PendingRequest) -> None:
         """
         Cancel a request, whose outcome is there at once.
 
@@ -108,7 +108,7 @@ class Desk:
         """Take no more, tell the one at work to give up, and return whether it did [s]."""
         return self._worker.stop(timeout)
 
-    def _serve(self, work: Work, pending: Pending) -> None:
+    def _serve(self, work: Work, pending: PendingRequest) -> None:
         self._active = pending
         try:
             outcome = work(pending.ticket)

@@ -19,7 +19,7 @@ def _never() -> bool:
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
-class Ticket:
+class RequestState:
     """
     What a request is served with, how far it is, and whether anyone still waits for it.
 

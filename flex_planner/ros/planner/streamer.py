@@ -10,7 +10,7 @@ import sys
 import time
 
 from flex_planner.planning.plan import Plan
-from flex_planner.planning.sampling import Reference
+from flex_planner.planning.sampling import SampledPlan
 from flex_planner.ros.reference_states import StreamedPlan
 from flex_planner.ros.settings.planner import PlannerSettings
 from rclpy.node import Node
@@ -40,7 +40,7 @@ class Streamer:
         if output is None or not output.readline():
             self._node.get_logger().error('the process that streams states did not start')
 
-    def start(self, plan: Plan, reference: Reference, settings: PlannerSettings) -> None:
+    def start(self, plan: Plan, reference: SampledPlan, settings: PlannerSettings) -> None:
         """Stream a plan from now on, in place of the one before; that it fails is logged."""
         samples = reference.samples
         streamed = StreamedPlan(

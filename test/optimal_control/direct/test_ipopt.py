@@ -19,7 +19,7 @@ from flex_planner.arms.arm_files import load_arm
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.progress import Monitor, Progress
 from flex_planner.base.validation import Array
-from flex_planner.collocation import GaussRule, Settings
+from flex_planner.collocation import GaussRule, SolverSettings
 from flex_planner.dynamics.statics import equilibrium
 from flex_planner.optimal_control.arm_model import ArmModel, Parameters
 from flex_planner.optimal_control.direct.ipopt import (
@@ -65,7 +65,7 @@ def plan_of(request: pytest.FixtureRequest, paper_task: TaskFactory) -> PlanFact
         if key not in known:
             model = request.getfixturevalue(f'{arm}_model')
             known[key] = plan_path(paper_task(model.arm, payload_mass), model=model,
-                                   settings=Settings(error_tolerance=1e-9))
+                                   settings=SolverSettings(error_tolerance=1e-9))
         return known[key]
 
     return plan

@@ -10,7 +10,7 @@ from flex_planner.arms.arm import Arm
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
 from flex_planner.capacity.max_payload import find_max_payload
-from flex_planner.collocation import Settings, solve
+from flex_planner.collocation import solve, SolverSettings
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.direct.ipopt import (
     DirectProblem,
@@ -59,7 +59,7 @@ def worth(problem: MotionProblem, price: float) -> float:
     # near it: from 5 kg on
     task = replace(problem.task, payload_mass=5.0)
     plan = plan_path(task, model=problem.model)
-    settings = Settings(error_tolerance=1e-8)
+    settings = SolverSettings(error_tolerance=1e-8)
     ahead = PayloadProblem(problem.model, task, plan.problem.parameters, price)
     found = solve(ahead, ahead.extended(solution_of(plan)), settings)
     assert found.converged, found.message

@@ -12,9 +12,9 @@ from flex_planner.base.progress import Monitor
 from flex_planner.collocation import (
     CollocationResult,
     CollocationSolution,
-    Settings,
     solve,
-    Status,
+    SolverSettings,
+    SolverStatus,
 )
 from flex_planner.collocation.homotopy import walk
 from flex_planner.optimal_control.arm_model import ArmModel
@@ -54,12 +54,12 @@ def test_every_strategy_solves_the_task_of_the_paper_alone(
         label: str, strategy: Strategy, name: str) -> None:
     model = request.getfixturevalue(f'{name}_model')
     problem, monitor = problem_of(model, paper_task(model.arm, w_2=10.0)), Monitor()
-    attempt = strategy(problem, Settings(), monitor)
+    attempt = strategy(problem, SolverSettings(), monitor)
     if label in NOTHING_TO_ADD[name]:
         assert attempt is None
         return
     assert attempt is not None
-    assert (attempt.result.status, attempt.evidence) == (Status.CONVERGED, '')
+    assert (attempt.result.status, attempt.evidence) == (SolverStatus.CONVERGED, '')
     cost = totals(problem, attempt.result.solution).cost
     assert cost == pytest.approx(plan_of(name, 1.0, 10.0).cost, rel=SAME_COST)
     assert monitor.iteration <= 140  # 132 for the walk in payload of EI = 5
@@ -69,7 +69,7 @@ def test_every_strategy_solves_the_task_of_the_paper_alone(
 def test_walk_in_what_a_task_has_not_adds_nothing(
         rigid_model: ArmModel, paper_task: TaskFactory, label: str) -> None:
     problem = problem_of(rigid_model, paper_task(rigid_model.arm, payload_mass=0.0))
-    assert dict(LADDER)[label](problem, Settings(), Monitor()) is None
+    assert dict(LADDER)[label](problem, SolverSettings(), Monitor()) is None
 
 
 def test_lifted_guess_is_the_rigid_motion_with_straight_links(
@@ -84,7 +84,7 @@ def test_lifted_guess_is_the_rigid_motion_with_straight_links(
 
     monkeypatch.setattr('flex_planner.planning.strategies.initial_guesses.solve', watched)
     problem = problem_of(ei5_model, paper_task(ei5_model.arm, w_2=10.0))
-    dict(LADDER)['rigid motion lifted'](problem, Settings(), Monitor())
+    dict(LADDER)['rigid motion lifted'](problem, SolverSettings(), Monitor())
     rigid = solution_of(plan_of('rigid', 1.0, 10.0))
     joints = np.array([0, 1, 6, 7, 12, 13, 18, 19])
     times, lifted = np.linspace(0, 1, 7), guesses[-1]
@@ -97,7 +97,7 @@ def test_rigid_motion_takes_the_weights_and_velocities_of_the_joints(
         ei5_model: ArmModel, paper_task: TaskFactory, monkeypatch: pytest.MonkeyPatch) -> None:
     tasks: list[Task] = []
 
-    def watched(problem: MotionProblem, settings: Settings, monitor: Monitor) -> Attempt:
+    def watched(problem: MotionProblem, settings: SolverSettings, monitor: Monitor) -> Attempt:
         tasks.append(problem.task)
         return cold_start(problem, settings, monitor)
 
@@ -107,7 +107,7 @@ def test_rigid_motion_takes_the_weights_and_velocities_of_the_joints(
                'goal_position_weights': [math.inf, 7, 8, 9, 10, 11],
                'goal_velocity_weights': [12, 13]}
     task = paper_task(ei5_model.arm, **numbers)
-    dict(LADDER)['rigid motion lifted'](problem_of(ei5_model, task), Settings(), Monitor())
+    dict(LADDER)['rigid motion lifted'](problem_of(ei5_model, task), SolverSettings(), Monitor())
     for name, values in numbers.items():
         assert getattr(tasks[0], name).tolist() == values[:2]
     assert tasks[0].arm.n_modes == 0
@@ -125,7 +125,7 @@ def test_large_weights_are_walked_up_from_none(
     for module in ('planning.strategies.initial_guesses', 'collocation.homotopy'):
         monkeypatch.setattr(f'flex_planner.{module}.solve', watched)
     problem = problem_of(rigid_model, paper_task(rigid_model.arm, w_2=1400.0))
-    attempt = dict(LADDER)['weights walked up'](problem, Settings(), Monitor())
+    attempt = dict(LADDER)['weights walked up'](problem, SolverSettings(), Monitor())
     assert attempt is not None
     assert attempt.result.converged
     assert (weights[0], weights[-1]) == (0.0, 1400.0)
@@ -160,7 +160,7 @@ def test_solution_solves_its_own_task_at_once(ei5_model: ArmModel, paper_task: T
 def test_plan_may_start_one_of_another_rule_or_stiffness(
         ei50_model: ArmModel, paper_task: TaskFactory, plan_of: PlanFactory) -> None:
     plan = plan_path(paper_task(ei50_model.arm), model=ei50_model, start_from=plan_of('ei5'),
-                     settings=Settings(stages=5))
+                     settings=SolverSettings(stages=5))
     assert (plan.solved, plan.strategy) == (True, 'warm start')
     assert plan.cost == pytest.approx(plan_of('ei50').cost, rel=SAME_COST)
 
@@ -169,7 +169,7 @@ def test_plan_of_an_arm_with_other_coordinates_is_no_start(
         rigid_model: ArmModel, paper_task: TaskFactory, plan_of: PlanFactory) -> None:
     task = paper_task(rigid_model.arm)
     strategy = warm_start(solution_of(plan_of('ei5')))
-    assert strategy(problem_of(rigid_model, task), Settings(), Monitor()) is None
+    assert strategy(problem_of(rigid_model, task), SolverSettings(), Monitor()) is None
     plan = plan_path(task, model=rigid_model, start_from=plan_of('ei5'))
     assert (plan.solved, plan.strategy) == (True, 'cold start')
 
@@ -200,7 +200,7 @@ def test_walk_reaches_the_end_exactly_in_growing_steps(
         rigid_model: ArmModel, paper_task: TaskFactory, plan_of: PlanFactory) -> None:
     ways: list[float] = []
     family = heavier(rigid_model, paper_task(rigid_model.arm), 5.5, ways)
-    result = walk(family, solution_of(plan_of('rigid')), Settings(), Monitor(), 0.1)
+    result = walk(family, solution_of(plan_of('rigid')), SolverSettings(), Monitor(), 0.1)
     assert result.converged
     assert ways == pytest.approx([0.1, 0.3, 0.7, 1.0])
     cost = totals(family(1.0), result.solution).cost
@@ -209,7 +209,7 @@ def test_walk_reaches_the_end_exactly_in_growing_steps(
 
 def test_walk_to_where_nothing_is_says_how_far_it_came() -> None:
     # Bratu's y'' = -lambda exp(y) has solutions up to lambda = 3.5138307
-    settings, ways = Settings(), []
+    settings, ways = SolverSettings(), []
 
     def at(way: float) -> System:
         ways.append(way)
@@ -218,7 +218,7 @@ def test_walk_to_where_nothing_is_says_how_far_it_came() -> None:
     nothing = CollocationSolution.from_values(np.linspace(0, 1, 21), np.zeros((21, 2)),
                                               settings.rule)
     result = walk(at, nothing, settings, Monitor(), first_step=1.0)
-    assert result.status is not Status.CONVERGED
+    assert result.status is not SolverStatus.CONVERGED
     assert ways[:2] == [1.0, 0.5]  # halved where it failed
     percent = float(result.message.rpartition(' at ')[2].removesuffix('% of the way'))
     # where the last step, twice the smallest of 1/256 or less, failed; rounded to 0.1 %
@@ -231,5 +231,5 @@ def test_walk_is_stopped(rigid_model: ArmModel, paper_task: TaskFactory, plan_of
     monitor = Monitor()
     monitor.canceled = lambda: monitor.iteration >= last
     family = heavier(rigid_model, paper_task(rigid_model.arm), 9.0, [])
-    result = walk(family, solution_of(plan_of('rigid')), Settings(), monitor, 0.2)
-    assert (result.status, monitor.iteration) == (Status.CANCELED, last)
+    result = walk(family, solution_of(plan_of('rigid')), SolverSettings(), monitor, 0.2)
+    assert (result.status, monitor.iteration) == (SolverStatus.CANCELED, last)

@@ -10,7 +10,7 @@ from typing import Any
 
 from flex_planner.arms.arm import Arm, Joint, Link, Motor
 from flex_planner.base.progress import Monitor
-from flex_planner.collocation import CollocationResult, Settings, solve, Status
+from flex_planner.collocation import CollocationResult, solve, SolverSettings, SolverStatus
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.free_payload import PayloadProblem
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
@@ -19,28 +19,28 @@ from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.strategies.initial_guesses import Attempt, cold_start
 from flex_planner.planning.strategies.limit_strategies import walked_duration, walked_payload
-from flex_planner.planning.strategies.price_continuation import durations, payloads, Stop
+from flex_planner.planning.strategies.price_continuation import durations, Extremal, payloads
 import numpy as np
 from plan_checks import costates, problem_of, share_of, solution_of
 import pytest
 
 PlanFactory = Callable[..., Plan]
 TaskFactory = Callable[..., Task]
-Search = Callable[[MotionProblem, CollocationResult, Settings, Monitor], Iterator[Stop]]
+Search = Callable[[MotionProblem, CollocationResult, SolverSettings, Monitor], Iterator[Extremal]]
 
 # limits of section 5.3's motion: kg in 1 s, and s with 1 kg
 HEAVIEST = {'rigid': 5.85514, 'ei5': 5.7418}
 SHORTEST = {'rigid': 0.642097, 'ei5': 0.649512}
-EXACT = Settings(error_tolerance=1e-8)
+EXACT = SolverSettings(error_tolerance=1e-8)
 # a hundredth of the error that is asked for on the way to a limit
 WAY = 1e-6
 
 
-def stops_of(search: Search, problem: MotionProblem, share: float = 1e-5) -> list[Stop]:
+def stops_of(search: Search, problem: MotionProblem, share: float = 1e-5) -> list[Extremal]:
     """Return the stops on the way to a limit, until one changes the value less than a share."""
-    first = cold_start(problem, Settings(), Monitor()).result
-    stops: list[Stop] = []
-    for stop in search(problem, first, Settings(), Monitor()):
+    first = cold_start(problem, SolverSettings(), Monitor()).result
+    stops: list[Extremal] = []
+    for stop in search(problem, first, SolverSettings(), Monitor()):
         stops.append(stop)
         if len(stops) > 1 and abs(stop.value / stops[-2].value - 1) < share:
             break
@@ -103,8 +103,8 @@ def test_motion_without_limits_has_none() -> None:
     task = replace(one_link(2.0, 0.0), arm=Arm(
         name='free', links=(Link(length=1.0, linear_density=3.0),), joints=(Joint(),)))
     problem = problem_of(ArmModel(task.arm), task)
-    first = cold_start(problem, Settings(), Monitor()).result
-    search = payloads(problem, first, Settings(), Monitor())
+    first = cold_start(problem, SolverSettings(), Monitor()).result
+    search = payloads(problem, first, SolverSettings(), Monitor())
     stops = list(islice(search, 4))
     np.testing.assert_allclose([stop.value for stop in stops],
                                [stop.price / 0.375 - 1 for stop in stops], rtol=WAY)
@@ -164,7 +164,7 @@ def test_price_under_gravity_counts_how_the_payload_bends_the_ends(
     assert abs(price - share) > 0.02
     # at this price the payload is worth its effort
     problem = PayloadProblem(crane_model, crane_task, task_parameters(crane_task), float(price))
-    found = solve(problem, problem.extended(solution_of(plan)), Settings())
+    found = solve(problem, problem.extended(solution_of(plan)), SolverSettings())
     assert found.converged
     assert problem.restricted(found.solution)[0] == pytest.approx(mass, rel=1e-6)
     assert found.iterations <= 3
@@ -173,8 +173,8 @@ def test_price_under_gravity_counts_how_the_payload_bends_the_ends(
 def test_price_of_a_payload_raised_by_itself_counts_the_ends(crane_model: ArmModel,
                                                              crane_task: Task) -> None:
     # at the first stops no step in price succeeds
-    first = cold_start(problem_of(crane_model, crane_task), Settings(), Monitor()).result
-    stop = next(payloads(problem_of(crane_model, crane_task), first, Settings(), Monitor()))
+    first = cold_start(problem_of(crane_model, crane_task), SolverSettings(), Monitor()).result
+    stop = next(payloads(problem_of(crane_model, crane_task), first, SolverSettings(), Monitor()))
     h = 2e-3
     less, more = (plan_path(replace(crane_task, payload_mass=stop.value + k), model=crane_model,
                             settings=EXACT).cost for k in (-h, h))
@@ -233,7 +233,7 @@ def test_feasible_motion_is_never_called_impossible(
         by_mass = search is walked_payload
         task = paper_task(model.arm, share * HEAVIEST[name] if by_mass else 1.0,
                           duration=1.0 if by_mass else SHORTEST[name] / share)
-        attempt = search(problem_of(model, task), Settings(), Monitor())
+        attempt = search(problem_of(model, task), SolverSettings(), Monitor())
         # the rigid arm makes it in time: then there is no search in time
         assert attempt is None or attempt.evidence == ''
         assert attempt is not None or (name, search) == ('ei5', walked_duration)
@@ -245,7 +245,7 @@ def test_motion_a_hundred_thousandth_from_its_limit_is_not_called_impossible(
         ei5_model: ArmModel, paper_task: TaskFactory) -> None:
     # the cold start solves 5.7415 kg, and 5.74182 kg are on the way to the limit
     problem = problem_of(ei5_model, paper_task(ei5_model.arm, 5.74177))
-    attempt = walked_payload(problem, Settings(), Monitor())
+    attempt = walked_payload(problem, SolverSettings(), Monitor())
     assert attempt is not None
     assert attempt.evidence == ''
 
@@ -287,8 +287,8 @@ def test_payload_tried_on_the_way_may_be_too_heavy_to_hold() -> None:
 def test_payload_of_an_iterate_may_be_too_heavy_for_the_links(crane_model: ArmModel,
                                                               crane_task: Task) -> None:
     problem = problem_of(crane_model, crane_task)
-    first = cold_start(problem, Settings(), Monitor()).result
-    search = payloads(problem, first, Settings(), Monitor())
+    first = cold_start(problem, SolverSettings(), Monitor()).result
+    search = payloads(problem, first, SolverSettings(), Monitor())
     # steps that lead there fail, and nothing is raised
     values = [stop.value for stop in islice(search, 4)]
     assert values == sorted(values)
@@ -334,9 +334,9 @@ def test_search_for_a_limit_is_stopped(
 def test_stopped_search_says_so_and_ends(rigid_model: ArmModel, paper_task: TaskFactory,
                                          search: Search) -> None:
     problem, monitor = problem_of(rigid_model, paper_task(rigid_model.arm)), Monitor()
-    first = cold_start(problem, Settings(), monitor).result
+    first = cold_start(problem, SolverSettings(), monitor).result
     monitor.canceled = lambda: monitor.iteration >= 20
-    stops = list(search(problem, first, Settings(), monitor))
-    assert stops[-1].result.status is Status.CANCELED
+    stops = list(search(problem, first, SolverSettings(), monitor))
+    assert stops[-1].result.status is SolverStatus.CANCELED
     assert all(stop.result.converged for stop in stops[:-1])
     assert len(stops) > 1

@@ -19,11 +19,11 @@ from flex_planner.base.errors import (
     UnreachableError,
 )
 from flex_planner.base.progress import Monitor
-from flex_planner.collocation import Settings
+from flex_planner.collocation import SolverSettings
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_path import plan_path
-from flex_planner.planning.sampling import Reference, sample_reference, SamplingSettings
+from flex_planner.planning.sampling import sample_plan, SampledPlan, SamplingSettings
 from flex_planner.ros.messages.plans import (
     add_reference,
     duration_message,
@@ -63,8 +63,8 @@ def plan(ei50_arm: Arm, ei50_model: ArmModel, paper_task: Any) -> Plan:
 
 
 @pytest.fixture(scope='module')
-def reference(plan: Plan) -> Reference:
-    return sample_reference(plan, SamplingSettings())
+def reference(plan: Plan) -> SampledPlan:
+    return sample_plan(plan, SamplingSettings())
 
 
 # Messages to tasks
@@ -157,7 +157,7 @@ def test_every_status_has_its_code() -> None:
 
 def test_report_of_a_failed_plan_is_infinite_and_says_why(rigid_arm: Arm, rigid_model: ArmModel,
                                                           paper_task: Any) -> None:
-    settings = Settings(stages=2, intervals=4, max_intervals=4, error_tolerance=1e-11)
+    settings = SolverSettings(stages=2, intervals=4, max_intervals=4, error_tolerance=1e-11)
     failed = plan_path(paper_task(rigid_arm), model=rigid_model, settings=settings)
     report = report_from_plan(failed)
     assert report.error_code == PlanReport.NOT_CONVERGED
@@ -203,7 +203,7 @@ def test_outcomes_without_a_plan_are_not_publishable() -> None:
 # Plans to messages
 
 
-def test_report_of_a_plan_repeats_its_numbers(plan: Plan, reference: Reference) -> None:
+def test_report_of_a_plan_repeats_its_numbers(plan: Plan, reference: SampledPlan) -> None:
     report = report_from_plan(plan)
     add_reference(report, plan, reference)
     assert (report.error_code, report.error_msg) == (PlanReport.NONE, '')
@@ -220,13 +220,13 @@ def test_speed_shares_are_left_out_without_a_speed_limit(ei50_arm: Arm, paper_ta
     free = replace(ei50_arm, joints=(Joint(), Joint())).rigid()
     free_plan = plan_path(paper_task(free))
     report = report_from_plan(free_plan)
-    add_reference(report, free_plan, sample_reference(free_plan, SamplingSettings()))
+    add_reference(report, free_plan, sample_plan(free_plan, SamplingSettings()))
     assert len(report.peak_speeds) == 2
     assert list(report.peak_speed_shares) == []
     assert list(report.peak_torque_shares) == [0.0, 0.0]
 
 
-def test_messages_hold_the_samples(plan: Plan, reference: Reference) -> None:
+def test_messages_hold_the_samples(plan: Plan, reference: SampledPlan) -> None:
     joints = joint_trajectory(reference, NAMES)
     message = flexible_trajectory(plan, reference, joints, 'base')
     samples, k = reference.samples, 37
@@ -242,7 +242,7 @@ def test_messages_hold_the_samples(plan: Plan, reference: Reference) -> None:
     assert (message.header.frame_id, message.payload_mass) == ('base', 1.0)
 
 
-def test_reference_state_has_joints_and_modes(plan: Plan, reference: Reference) -> None:
+def test_reference_state_has_joints_and_modes(plan: Plan, reference: SampledPlan) -> None:
     names = [*NAMES, *plan.arm.modal_names]
     state = reference_state(plan, reference.samples, 5, names, 1_700_000_000_123_456_789)
     assert (state.header.stamp.sec, state.header.stamp.nanosec) == (1_700_000_000, 123_456_789)

@@ -11,7 +11,7 @@ from flex_planner.arms.arm import Arm
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.ros.planner.recorder import OutcomeRecorder
 from flex_planner.ros.planner.request_planner import Outcome, Planning
-from flex_planner.ros.planner.request_state import Ticket
+from flex_planner.ros.planner.request_state import RequestState
 from flex_planner.ros.settings.planner import PlannerSettings
 from flex_planner_interfaces.msg import PlanReport
 import pytest
@@ -31,7 +31,7 @@ def worker(rigid_arm: Arm, rigid_model: ArmModel) -> Planning:
 
 
 def planned(worker: Planning, settings: PlannerSettings, **fields: Any) -> Outcome:
-    return worker.plan(task(**fields), Ticket(settings=settings))
+    return worker.plan(task(**fields), RequestState(settings=settings))
 
 
 def test_request_with_a_speed_limit_gets_the_weights_that_keep_it(
@@ -87,6 +87,6 @@ def test_search_for_the_maximum_payload_takes_no_objectives(worker: Planning,
                                                             settings: PlannerSettings) -> None:
     request = search_request()
     request.task.max_joint_speeds = [0.8, 0.8]
-    outcome = worker.find_max_payload(request, Ticket(settings=settings))
+    outcome = worker.find_max_payload(request, RequestState(settings=settings))
     assert outcome.report.error_code == PlanReport.INVALID_TASK
     assert 'do not go with a search for the maximum payload' in outcome.report.error_msg

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from factories import PlanFactory
 from flex_planner.arms.arm import Arm
 from flex_planner.planning.plan import Plan
-from flex_planner.planning.sampling import sample_reference
+from flex_planner.planning.sampling import sample_plan
 from flex_planner.reports.recording import RecordedRequest
 from flex_planner.ros.messages.plans import (
     flexible_trajectory,
@@ -333,7 +333,7 @@ def test_failed_search_is_recorded_as_it_was_asked(planner: Planner, read: Any) 
 def written(plan: Plan, folder: Path, **changes: Any) -> Path:
     """Return where the recorder puts a plan with some parameters changed."""
     settings = replace(PlannerSettings.for_arm(plan.arm), recording_folder=str(folder), **changes)
-    reference = sample_reference(plan, settings.sampling())
+    reference = sample_plan(plan, settings.sampling())
     joints = joint_trajectory(reference, settings.joint_names)
     trajectory = flexible_trajectory(plan, reference, joints, settings.base_frame)
     return OutcomeRecorder(plan.arm, NODE).write(

@@ -9,7 +9,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from factories import PlanFactory
 from flex_planner.arms.arm_files import load_arm
 from flex_planner.arms.kinematics import link_points
-from flex_planner.planning.sampling import sample_reference, SamplingSettings
+from flex_planner.planning.sampling import sample_plan, SamplingSettings
 from flex_planner.ros.messages.markers import motion_markers
 from flex_planner.ros.planner.diagnostics import Record, SUBSCRIBERS
 from flex_planner_interfaces.msg import PlanReport
@@ -126,7 +126,7 @@ def points(marker: Marker) -> np.ndarray:
 
 def test_markers_show_the_bent_links_of_the_plan(plan_of: PlanFactory) -> None:
     plan = plan_of('ei50')
-    reference = sample_reference(plan, SamplingSettings())
+    reference = sample_plan(plan, SamplingSettings())
     markers = motion_markers(plan.arm, reference, 'base').markers
     assert markers[0].action == Marker.DELETEALL
     links = [marker for marker in markers if marker.ns == 'links']
@@ -143,7 +143,7 @@ def test_markers_show_the_bent_links_of_the_plan(plan_of: PlanFactory) -> None:
 
 def test_markers_show_the_way_of_the_tip(plan_of: PlanFactory) -> None:
     plan = plan_of('ei50')
-    reference = sample_reference(plan, SamplingSettings(longest_step=1e-3))
+    reference = sample_plan(plan, SamplingSettings(longest_step=1e-3))
     found = {marker.ns: marker for marker in motion_markers(plan.arm, reference, 'base').markers}
     path = points(found['tip_path'])
     assert len(path) == 500

@@ -14,7 +14,7 @@ from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.ros.planner import request_planner
 from flex_planner.ros.planner.recorder import OutcomeRecorder
 from flex_planner.ros.planner.request_planner import Outcome, Planning
-from flex_planner.ros.planner.request_state import Ticket
+from flex_planner.ros.planner.request_state import RequestState
 from flex_planner.ros.settings.planner import PlannerSettings
 from flex_planner_interfaces.msg import PayloadSearch, PlanReport
 import pytest
@@ -39,8 +39,8 @@ def test_stop_after_the_solve_is_reported_without_a_trajectory(
     def stopped(*arguments: Any) -> None:
         raise StoppedError(reason)
 
-    monkeypatch.setattr(request_planner, 'sample_reference', stopped)
-    outcome = worker.plan(task(), Ticket(settings=settings))
+    monkeypatch.setattr(request_planner, 'sample_plan', stopped)
+    outcome = worker.plan(task(), RequestState(settings=settings))
     assert (outcome.report.error_code, outcome.report.error_msg) == (code, reason.value)
     assert not outcome.trajectory.points
     assert not outcome.publishable
@@ -50,15 +50,15 @@ def test_recording_that_is_told_to_stop_leaves_nothing_and_is_not_published(
         worker: Planning, settings: PlannerSettings, tmp_path: Path,
         monkeypatch: pytest.MonkeyPatch) -> None:
     told = []  # once the samples are made, everyone is told to stop
-    sample = request_planner.sample_reference
+    sample = request_planner.sample_plan
 
     def sampled(*arguments: Any) -> Any:
         reference = sample(*arguments)
         told.append(True)
         return reference
 
-    monkeypatch.setattr(request_planner, 'sample_reference', sampled)
-    outcome = worker.plan(task(), Ticket(settings=settings, stopping=lambda: bool(told)))
+    monkeypatch.setattr(request_planner, 'sample_plan', sampled)
+    outcome = worker.plan(task(), RequestState(settings=settings, stopping=lambda: bool(told)))
     assert outcome.report.error_code == PlanReport.RECORDING_FAILED
     assert 'writing stopped after 0 of' in outcome.report.error_msg
     assert outcome.report.recording == ''
@@ -76,7 +76,7 @@ def test_recording_that_is_abandoned_leaves_nothing(
         go_on.wait(10)
 
     monkeypatch.setattr(OutcomeRecorder, '_write_states', stuck)
-    thread = threading.Thread(target=worker.plan, args=(task(), Ticket(settings=settings)))
+    thread = threading.Thread(target=worker.plan, args=(task(), RequestState(settings=settings)))
     thread.start()
     assert reached.wait(20)
     (stage,) = tmp_path.iterdir()
@@ -90,13 +90,13 @@ def test_recording_that_is_abandoned_leaves_nothing(
 
 def test_client_that_gives_up_is_recorded_as_canceled(
         worker: Planning, settings: PlannerSettings, tmp_path: Path) -> None:
-    outcome = worker.plan(task(), Ticket(settings=settings, withdrawn=True))
+    outcome = worker.plan(task(), RequestState(settings=settings, withdrawn=True))
     assert outcome.report.error_code == PlanReport.CANCELED
     assert [str(path) for path in tmp_path.iterdir()] == [outcome.report.recording]
 
 
 def test_ticket_tells_how_far_a_plan_is(worker: Planning, settings: PlannerSettings) -> None:
-    ticket = Ticket(settings=replace(settings, record=False))
+    ticket = RequestState(settings=replace(settings, record=False))
     assert ticket.progress.iteration == 0
     outcome = worker.plan(task(), ticket)
     assert ticket.progress.iteration == outcome.report.iterations > 0
@@ -114,7 +114,7 @@ ACCURACY = 2e-3  # [kg], of both, and twice the default of a request
 
 def search(worker: Planning, settings: PlannerSettings, **fields: Any) -> Outcome:
     """Ask for the maximum payload of the motion of the paper with some fields changed."""
-    return worker.find_max_payload(search_request(**fields), Ticket(settings=settings))
+    return worker.find_max_payload(search_request(**fields), RequestState(settings=settings))
 
 
 def check_failure(outcome: Outcome, code: int, text: str) -> None:
@@ -201,8 +201,8 @@ def test_search_that_cannot_be_done_says_why(worker: Planning, settings: Planner
 def test_search_is_canceled_before_and_while_it_is_at_work(
         worker: Planning, settings: PlannerSettings, method: int, looks: int) -> None:
     left = iter(range(looks))
-    ticket = Ticket(settings=replace(settings, record=False),
-                    stopping=lambda: next(left, None) is None)
+    ticket = RequestState(settings=replace(settings, record=False),
+                          stopping=lambda: next(left, None) is None)
     outcome = worker.find_max_payload(search_request(method=method), ticket)
     assert (outcome.report.error_code, outcome.publishable) == (PlanReport.CANCELED, False)
     assert 0 <= outcome.report.iterations <= looks
@@ -223,7 +223,7 @@ def test_search_that_is_stopped_after_the_solve_has_no_payload(
     def stopped(*arguments: Any) -> None:
         raise StoppedError(StopReason.TIMEOUT)
 
-    monkeypatch.setattr(request_planner, 'sample_reference', stopped)
+    monkeypatch.setattr(request_planner, 'sample_plan', stopped)
     check_failure(search(worker, settings), PlanReport.TIMEOUT, StopReason.TIMEOUT.value)
 
 

@@ -9,8 +9,8 @@ from typing import Any
 
 from flex_planner.base.progress import Progress
 from flex_planner.ros.planner.request_planner import Outcome, unknown_failure
-from flex_planner.ros.planner.request_queue import Desk
-from flex_planner.ros.planner.request_state import Ticket
+from flex_planner.ros.planner.request_queue import RequestQueue
+from flex_planner.ros.planner.request_state import RequestState
 from flex_planner.ros.settings.planner import PlannerSettings
 from flex_planner_interfaces.msg import PlanReport
 import pytest
@@ -30,8 +30,8 @@ class FakeExecutor:
 
 
 @pytest.fixture
-def desk() -> Iterator[Desk]:
-    desk = Desk(1)
+def desk() -> Iterator[RequestQueue]:
+    desk = RequestQueue(1)
     yield desk
     assert desk.close(5)
 
@@ -48,7 +48,7 @@ def wait(done: Any) -> None:
         time.sleep(0.001)
 
 
-def until_canceled(ticket: Ticket) -> Outcome:
+def until_canceled(ticket: RequestState) -> Outcome:
     ticket.report(Progress(phase='test', iteration=3, residual=0.5, intervals=7))
     wait(ticket.canceled)
     return unknown_failure(ValueError('too late'))
@@ -58,7 +58,7 @@ def code(pending: Any) -> int:
     return int(pending.future.result().report.error_code)
 
 
-def test_outcome_wakes_the_executor(desk: Desk, settings: PlannerSettings) -> None:
+def test_outcome_wakes_the_executor(desk: RequestQueue, settings: PlannerSettings) -> None:
     executor = FakeExecutor()
     pending = desk.submit(lambda ticket: unknown_failure(ValueError('x')), settings, executor)
     wait(pending.future.done)
@@ -66,8 +66,9 @@ def test_outcome_wakes_the_executor(desk: Desk, settings: PlannerSettings) -> No
     assert pending.future.result().report.error_msg == 'ValueError: x'
 
 
-def test_exception_of_the_work_is_an_outcome(desk: Desk, settings: PlannerSettings) -> None:
-    def fail(ticket: Ticket) -> Outcome:
+def test_exception_of_the_work_is_an_outcome(desk: RequestQueue,
+                                             settings: PlannerSettings) -> None:
+    def fail(ticket: RequestState) -> Outcome:
         raise KeyError('nobody foresaw this')
 
     pending = desk.submit(fail, settings, FakeExecutor())
@@ -76,7 +77,7 @@ def test_exception_of_the_work_is_an_outcome(desk: Desk, settings: PlannerSettin
     assert desk.active is None
 
 
-def test_one_works_one_waits_and_the_third_is_refused(desk: Desk,
+def test_one_works_one_waits_and_the_third_is_refused(desk: RequestQueue,
                                                       settings: PlannerSettings) -> None:
     executor = FakeExecutor()
     first = desk.submit(until_canceled, settings, executor)
@@ -92,10 +93,10 @@ def test_one_works_one_waits_and_the_third_is_refused(desk: Desk,
 
 
 def test_withdrawn_request_has_its_outcome_at_once_and_keeps_it(
-        desk: Desk, settings: PlannerSettings) -> None:
+        desk: RequestQueue, settings: PlannerSettings) -> None:
     ended = threading.Event()
 
-    def slow(ticket: Ticket) -> Outcome:
+    def slow(ticket: RequestState) -> Outcome:
         until_canceled(ticket)
         time.sleep(0.05)
         ended.set()
@@ -112,7 +113,7 @@ def test_withdrawn_request_has_its_outcome_at_once_and_keeps_it(
 
 
 def test_desk_that_closes_tells_the_work_and_takes_no_more(settings: PlannerSettings) -> None:
-    desk = Desk(1)
+    desk = RequestQueue(1)
     desk.submit(until_canceled, settings, FakeExecutor())
     wait(lambda: desk.active)
     assert desk.close(5)
