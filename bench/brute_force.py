@@ -14,7 +14,7 @@ from typing import Any
 
 from flex_planner.arms.arm import Arm
 from flex_planner.base.validation import Array
-from flex_planner.optimal_control.arm_model import Parameters
+from flex_planner.optimal_control.parameters import Parameters
 import numpy as np
 import sympy
 

@@ -22,7 +22,8 @@ from bench.brute_force import brute_force_rate
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import load_arm
 from flex_planner.base.validation import Array
-from flex_planner.optimal_control.arm_model import ArmModel, Parameters
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.parameters import Parameters
 import numpy as np
 
 POINTS = 300
@@ -90,9 +91,9 @@ def start_seconds(arm: Arm, cache: str) -> float:
 
 def interpreted_seconds(arm: Arm, z: Array, p: Array) -> float:
     """Return the time of CasADi's virtual machine for all points, called once."""
-    from flex_planner.optimal_control.pontryagin import build_functions
+    from flex_planner.optimal_control.pontryagin import build_optimality_functions
 
-    function, _ = build_functions(arm)['optimality_jacobian']
+    function, _ = build_optimality_functions(arm)['optimality_jacobian']
     mapped = function.map(len(z))
     columns, shared = np.ascontiguousarray(z.T), np.repeat(p[:, None], len(z), axis=1)
     return median_seconds(lambda: mapped(columns, shared))
@@ -100,10 +101,10 @@ def interpreted_seconds(arm: Arm, z: Array, p: Array) -> float:
 
 def measure(links: int, modes: int) -> Row:
     """Return the figures of one arm."""
-    from flex_planner.optimal_control.pontryagin import build_functions
+    from flex_planner.optimal_control.pontryagin import build_optimality_functions
 
     arm = uniform_arm(links, modes)
-    built = build_functions(arm)
+    built = build_optimality_functions(arm)
     with tempfile.TemporaryDirectory() as cache:
         first, later = start_seconds(arm, cache), start_seconds(arm, cache)
     z, p = random_points(arm)

@@ -11,7 +11,7 @@ search does it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 import statistics
 import time
 
@@ -22,7 +22,7 @@ from flex_planner.capacity.max_payload import find_max_payload, PayloadMethod
 from flex_planner.capacity.min_duration import find_min_duration
 from flex_planner.dynamics.integration import PiecewisePolynomial, simulate
 from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectResult, DirectSettings
-from flex_planner.optimal_control.direct.programme import Mesh
+from flex_planner.optimal_control.direct.mesh import Mesh
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.planning.certificate import CertificateLimits
 import numpy as np
@@ -133,9 +133,9 @@ def _tip_error(problem: MotionProblem, settings: DirectSettings, found: DirectRe
     index = np.arange(settings.intervals)[:, None] * count + np.arange(count + shared)
     theta = points[index[0]]
     torque = PiecewisePolynomial.through(breaks, theta, found.torques[index])
-    p = problem.p.copy()
-    p[0] = found.payload
-    final = simulate(problem.model, p, problem.start, torque, problem.task.duration, rtol=1e-9)
+    physical = replace(problem.parameters, payload_mass=found.payload).physical
+    final = simulate(problem.model, physical, problem.start, torque, problem.task.duration,
+                     rtol=1e-9)
     n_t = problem.model.arm.n_coordinates
     tips = tip_position(problem.model.arm, np.stack([final[:n_t], problem.goal[:n_t]]))
     return float(np.linalg.norm(tips[0] - tips[1]))

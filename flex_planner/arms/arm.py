@@ -266,25 +266,6 @@ class Arm:
         return (np.array([joint.lower_limit for joint in self.joints]),
                 np.array([joint.upper_limit for joint in self.joints]))
 
-    def torque_bounds(self, speeds: Array) -> tuple[Array, Array]:
-        """
-        Return the lower and upper torque bound of each motor at a speed, eq. (15).
-
-        Parameters
-        ----------
-        speeds : numpy.ndarray, shape (..., n)
-            Joint speeds [rad/s].
-
-        Returns
-        -------
-        tuple of numpy.ndarray, shape (..., n)
-            Lower and upper bound [N m].
-
-        """
-        stall = np.array([joint.motor.stall_torque for joint in self.joints])
-        slope = np.array([joint.motor.torque_slope for joint in self.joints])
-        return -stall - slope * speeds, stall - slope * speeds
-
     def rigid(self) -> Arm:
         """Return the same arm with every link rigid."""
         links = tuple(Link(length=link.length, linear_density=link.linear_density)

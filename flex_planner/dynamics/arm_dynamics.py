@@ -1,67 +1,153 @@
-"""The part of an arm's compiled functions that simulating it takes."""
+"""
+An arm with its compiled dynamics as array functions.
+
+Arrays hold one point per row. The state is x = (q, q').
+
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 from flex_planner.arms.arm import Arm
 from flex_planner.base.validation import Array
-from flex_planner.dynamics.compiled_functions import content_key, load_functions
-from flex_planner.optimal_control.arm_model import _build, _key, ArmModel, RUNGE_KUTTA_STAGES
+from flex_planner.dynamics.cache_key import cache_key
+from flex_planner.dynamics.compiled_functions import BatchFunction, load_functions
 import numpy as np
 
-_FUNCTIONS = ('forward_dynamics', 'runge_kutta_step', 'mass_and_energy', 'static_forces')
-_SMALLEST = float(np.finfo(np.float64).tiny)
+RungeKuttaSteps = Callable[[Array, Array, float], tuple[Array, Array, Array]]
+HeldStep = Callable[[Array, Array, float], tuple[Array, Array, Array]]
 
-Step = Callable[[Array, Array, float], tuple[Array, float]]
+RUNGE_KUTTA_STAGES = 12
 
 
-class PlantModel(ArmModel):
+class ArmDynamics:
     """
-    The dynamics of one arm, without the optimality conditions.
+    The equations of motion of one arm, compiled on first use anywhere on this machine.
 
-    Compiling those takes most of the time, and with 8 modes a link it takes minutes.
+    That takes seconds; later they are read from disk. `physical` is
+    `PhysicalParameters.physical` everywhere.
 
     Parameters
     ----------
     arm : Arm
-        Compiled on first use anywhere on this machine (seconds), then read from disk.
+        n joints, n_t coordinates.
 
     """
 
     def __init__(self, arm: Arm) -> None:
         self.arm = arm
-        self._functions = load_functions(content_key(_key(arm), 'plant'), lambda: {
-            name: function for name, function in _build(arm).items() if name in _FUNCTIONS})
+        self._loaded: dict[str, BatchFunction] = {}
+        self.compile()
 
-    def step(self, p: Array, *, rtol: float, atol: float) -> Step:
+    def __getstate__(self) -> Arm:
+        """Leave the machine code behind: it is loaded again when it is needed."""
+        return self.arm
+
+    def __setstate__(self, arm: Arm) -> None:
+        """Wait with loading until a function is needed."""
+        self.arm, self._loaded = arm, {}
+
+    def compile(self) -> None:
+        """Load the functions from disk, or compile them."""
+        self._load('forward_dynamics')
+
+    def forward_dynamics(self, x: Array, torque: Array, physical: Array) -> Array:
+        """Return x' of eq. (5) for states (k, 2 n_t) and torques (k, n)."""
+        return self._load('forward_dynamics')(x, torque, physical)[0]
+
+    def state_rate(self, physical: Array) -> Callable[[Array, Array], Array]:
         """
-        Return one step of the Dormand-Prince method of order 8 as a quick function.
+        Return x' as a quick function of one state (2 n_t,) and one torque (n,).
 
-        From a state (2 n_t,), torques (n,) that are held and a length [s] it makes the next
-        state, and an error that is at most 1 if the tolerances are kept. As `state_rate`, it must
-        not be shared between threads.
+        Every call returns the same array, overwritten; one function must not be shared between
+        threads.
+
+        """
+        x, torque = np.zeros((1, 2 * self.arm.n_coordinates)), np.zeros((1, self.arm.n_joints))
+        rate = np.zeros_like(x)
+        run = self._load('forward_dynamics').repeated([x, torque, np.array(physical)], [rate])
+
+        def evaluate(state: Array, torques: Array) -> Array:
+            x[0], torque[0] = state, torques
+            run()
+            result: Array = rate[0]
+            return result
+
+        return evaluate
+
+    def runge_kutta_steps(self, physical: Array) -> RungeKuttaSteps:
+        """
+        Return steps of the Dormand-Prince method of order 8 as a quick function.
+
+        From a state (2 n_t,), torques at the twelve stages of k steps (k, 12 n) and the length of
+        a step it makes the states after each step and their two error estimates, (k, 2 n_t) each.
+
+        """
+        function = self._load('runge_kutta_step')
+
+        def advance(state: Array, torques: Array, length: float) -> tuple[Array, Array, Array]:
+            first = np.broadcast_to(state, (len(torques), state.size))
+            after, fifth, third = function.chained(
+                first, torques, np.full((len(torques), 1), length), physical)
+            return after, fifth, third
+
+        return advance
+
+    def held_step(self, physical: Array) -> HeldStep:
+        """
+        Return one such step under torques that are held, as a quick function.
+
+        From a state (2 n_t,), torques (n,) and a length [s] it makes the next state and the two
+        error estimates, (2 n_t,) each. As with `state_rate`, the arrays are overwritten by the
+        next call.
 
         """
         n, size = self.arm.n_joints, 2 * self.arm.n_coordinates
         x, torques, length = np.zeros((1, size)), np.zeros((1, 12, n)), np.zeros((1, 1))
         after, fifth, third = (np.zeros((1, size)) for _ in range(3))
-        run = self._functions['runge_kutta_step'].repeated(
-            [x, torques.reshape(1, RUNGE_KUTTA_STAGES * n), length, np.array(p)],
+        run = self._load('runge_kutta_step').repeated(
+            [x, torques.reshape(1, RUNGE_KUTTA_STAGES * n), length, np.array(physical)],
             [after, fifth, third])
 
-        def advance(state: Array, torque: Array, seconds: float) -> tuple[Array, float]:
+        def advance(state: Array, torque: Array, seconds: float) -> tuple[Array, Array, Array]:
             x[0], torques[0], length[0, 0] = state, torque, seconds
             run()
-            scale = atol + rtol * np.maximum(np.abs(state), np.abs(after[0]))
-            return after[0].copy(), _error(fifth[0] / scale, third[0] / scale)
+            return after[0], fifth[0], third[0]
 
         return advance
 
+    def inverse_dynamics(self, x: Array, acceleration: Array, physical: Array) -> Array:
+        """Return M q'' + h, shape (k, n_t), eq. (3)."""
+        return self._load('inverse_dynamics')(x, acceleration, physical)[0]
 
-def _error(fifth: Array, third: Array) -> float:
-    """Return the error of a step; Hairer, Norsett and Wanner, section II.10."""
-    first, second = float(fifth @ fifth), float(third @ third)
-    bound = np.sqrt(max((first + 0.01 * second) * fifth.size, _SMALLEST))
-    error = first / bound
-    return float(error) if np.isfinite(error) else np.inf
+    def static_forces(self, q: Array, physical: Array) -> tuple[Array, Array]:
+        """
+        Return the forces that hold the arm at rest, and its stiffness.
+
+        First and second derivatives of the potential energy at coordinates (k, n_t), shapes
+        (k, n_t) [N m, N] and (k, n_t, n_t).
+
+        """
+        force, stiffness = self._load('static_forces')(q, physical)
+        count = self.arm.n_coordinates
+        return force, stiffness.reshape(-1, count, count)
+
+    def mass_and_energy(self, x: Array, physical: Array) -> tuple[Array, Array, Array]:
+        """Return M (k, n_t, n_t), kinetic and potential energy (k,) [J]."""
+        mass, kinetic, potential = self._load('mass_and_energy')(x, physical)
+        count = self.arm.n_coordinates
+        return mass.reshape(-1, count, count), kinetic[:, 0], potential[:, 0]
+
+    def _load(self, name: str) -> BatchFunction:
+        """Return a function; the first one brings all of its library."""
+        if name not in self._loaded:
+            self._loaded |= load_functions(cache_key(self.arm, 'dynamics'), self._build)
+        return self._loaded[name]
+
+    def _build(self) -> Mapping[str, tuple[Any, int]]:
+        """Derive the functions; CasADi is imported only here."""
+        from flex_planner.dynamics.dynamics_functions import build_dynamics_functions
+
+        return build_dynamics_functions(self.arm)

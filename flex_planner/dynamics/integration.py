@@ -1,16 +1,30 @@
-"""Integration of the arm's motion under given torques, independent of the collocation."""
+"""
+Integration of the arm's motion under given torques, independent of the collocation.
+
+Steps of the Dormand-Prince method of order 8 with SciPy's coefficients and error control,
+compiled together with the arm's dynamics.
+
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
+from typing import Protocol
 
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
-from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.dynamics.arm_dynamics import ArmDynamics, RUNGE_KUTTA_STAGES, RungeKuttaSteps
 import numpy as np
 from numpy.polynomial.legendre import legvander
-from scipy.integrate import solve_ivp
+
+_SAFETY, _LARGEST_GROWTH = 0.9, 5.0
+# an interval or a period is not cut finer: the motion must have run away
+_MOST_STEPS = 4096
+# error of a step below which half as many are as good, with a margin: the order is 8
+_EASY = 2.0**-10
+_SMALLEST = float(np.finfo(np.float64).tiny)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,18 +70,207 @@ class PiecewisePolynomial:
         return basis.astype(np.float64, copy=False)
 
 
-def simulate(model: ArmModel, p: Array, state: Array, torque: Callable[[float], Array],
-             duration: float, monitor: Monitor | None = None, *, rtol: float = 1e-8,
+class TorqueProfile(Protocol):
+    """A torque that is smooth between its breaks and may jump or bend there."""
+
+    @property
+    def breaks(self) -> Array:
+        """Return the times [s] at which steps of an integrator must end, shape (N + 1,)."""
+
+    def basis(self, shares: Array) -> Array:
+        """Return a matrix for `within`, at shares (k,) of an interval, 0 to 1."""
+
+    def within(self, interval: int, basis: Array) -> Array:
+        """Return the torques in an interval where `basis` was taken, shape (k, n) [N m]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinearTorque:
+    """
+    A torque that is linear between given times.
+
+    Attributes
+    ----------
+    breaks : numpy.ndarray, shape (N + 1,)
+        Increasing [s].
+    torques : numpy.ndarray, shape (N + 1, n)
+        [N m].
+
+    """
+
+    breaks: Array
+    torques: Array
+
+    def basis(self, shares: Array) -> Array:
+        """Return the weights of the torques at both ends, shape (k, 2)."""
+        return np.stack([1 - shares, shares], axis=1)
+
+    def within(self, interval: int, basis: Array) -> Array:
+        """Return the torques in an interval, shape (k, n)."""
+        torques: Array = basis @ self.torques[interval:interval + 2]
+        return torques
+
+
+def integrate(dynamics: ArmDynamics, physical: Array, state: Array, torque: TorqueProfile,
+              monitor: Monitor | None = None, *, rtol: float = 1e-8,
+              atol: float = 1e-10) -> Array:
+    """
+    Return the states at the breaks of a torque that is applied open loop.
+
+    Parameters
+    ----------
+    dynamics : ArmDynamics
+        n joints, n_t coordinates.
+    physical : numpy.ndarray
+        `PhysicalParameters.physical` of the plant.
+    state : numpy.ndarray, shape (2 n_t,)
+        At the first break.
+    torque : TorqueProfile
+        Limits of motors are not applied to it.
+    monitor : Monitor, optional
+        May stop it.
+    rtol, atol : float
+        Error of a step, relative and absolute.
+
+    Returns
+    -------
+    numpy.ndarray, shape (N + 1, 2 n_t)
+        NaN from where the integration failed.
+
+    Raises
+    ------
+    StoppedError
+        If the monitor stopped it.
+
+    """
+    watch, advance = monitor or Monitor(), dynamics.runge_kutta_steps(physical)
+    basis = cache(lambda count: torque.basis(_stage_shares(count)))
+    states = np.full((torque.breaks.size, state.size), np.nan)
+    states[0] = state
+    steps = 1.0  # that an interval needs
+    with np.errstate(over='ignore', invalid='ignore'):
+        for interval, length in enumerate(np.diff(torque.breaks).tolist()):
+            error = np.inf
+            while not error <= 1:
+                watch.check()
+                count = int(np.ceil(steps))
+                if count > _MOST_STEPS:
+                    return states
+                torques = torque.within(interval, basis(count)).reshape(count, -1)
+                after, error = _cross(advance, states[interval], torques, length / count,
+                                      (rtol, atol))
+                needed = error ** (1 / 8) / _SAFETY if np.isfinite(error) else _LARGEST_GROWTH
+                steps = count * min(max(needed, 1 / _LARGEST_GROWTH), _LARGEST_GROWTH)
+            states[interval + 1] = after
+    return states
+
+
+class HeldTorqueIntegrator:
+    """
+    Crosses period after period under torques that are held.
+
+    Parameters
+    ----------
+    dynamics : ArmDynamics
+        n joints, n_t coordinates.
+    physical : numpy.ndarray
+        `PhysicalParameters.physical` of the plant.
+    period : float
+        [s].
+    longest_step : float
+        [s].
+    rtol, atol : float
+        Error of a step, relative and absolute.
+
+    """
+
+    def __init__(self, dynamics: ArmDynamics, physical: Array, *, period: float,
+                 longest_step: float, rtol: float, atol: float) -> None:
+        self._step, self._period = dynamics.held_step(physical), period
+        self._tolerances = rtol, atol
+        self._fewest = self._steps = int(np.ceil(period / longest_step - 1e-9))
+
+    def advance(self, state: Array, torque: Array) -> Array | None:
+        """Return the state (2 n_t,) after one period; None if it has run away."""
+        with np.errstate(over='ignore', invalid='ignore'):
+            while self._steps <= _MOST_STEPS:
+                after, error = self._cross(state, torque)
+                if error <= 1:
+                    if error < _EASY:
+                        self._steps = max(self._fewest, self._steps // 2)
+                    return after
+                self._steps *= 2
+        return None
+
+    def _cross(self, state: Array, torque: Array) -> tuple[Array, float]:
+        """Return the state after equal steps, and the error of the worst of them."""
+        worst, length = 0.0, self._period / self._steps
+        for _ in range(self._steps):
+            after, fifth, third = self._step(state, torque, length)
+            worst = max(worst, step_error(np.stack([state, after]), fifth, third,
+                                          self._tolerances))
+            state = after.copy()
+            if worst > 1:
+                break
+        return state, worst
+
+
+def _cross(advance: RungeKuttaSteps, state: Array, torques: Array, step: float,
+           tolerances: tuple[float, float]) -> tuple[Array, float]:
+    """Return the state after equal steps, and the error of the worst of them."""
+    after, fifth, third = advance(state, torques, step)
+    return after[-1], step_error(np.vstack([state, after]), fifth, third, tolerances)
+
+
+def step_error(states: Array, fifth: Array, third: Array,
+               tolerances: tuple[float, float]) -> float:
+    """
+    Return the error of the worst of k steps, at most 1 if the tolerances are kept.
+
+    Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, section II.10.
+
+    Parameters
+    ----------
+    states : numpy.ndarray, shape (k + 1, m)
+        Before, between and after the steps.
+    fifth, third : numpy.ndarray, shape (k, m) or (m,)
+        Error estimates of those orders.
+    tolerances : tuple of float
+        Relative and absolute.
+
+    """
+    rtol, atol = tolerances
+    size = np.abs(states)
+    scale = atol + rtol * np.maximum(size[:-1], size[1:])
+    first, second = (((error / scale) ** 2).sum(axis=1) for error in (fifth, third))
+    bound = np.sqrt(np.maximum((first + 0.01 * second) * states.shape[1], _SMALLEST))
+    worst = float((first / bound).max())
+    return worst if np.isfinite(worst) else np.inf
+
+
+@cache
+def _stage_shares(count: int) -> Array:
+    """Return the times of the stages of equal steps, as shares of the interval they cross."""
+    from scipy.integrate import DOP853
+
+    stages = np.array(DOP853.C[:RUNGE_KUTTA_STAGES], dtype=float)
+    shares: Array = ((np.arange(count)[:, None] + stages) / count).ravel()
+    return shares
+
+
+def simulate(dynamics: ArmDynamics, physical: Array, state: Array,
+             torque: Callable[[float], Array], duration: float, monitor: Monitor | None = None, *,
+             rtol: float = 1e-8,
              atol: float = 1e-10) -> Array:
     """
     Return the state after a time under open-loop torques, by SciPy's DOP853.
 
     Parameters
     ----------
-    model : ArmModel
+    dynamics : ArmDynamics
         n joints, n_t coordinates.
-    p : numpy.ndarray
-        Stacked `Parameters` of the plant; its motor limits are not applied.
+    physical : numpy.ndarray
+        `PhysicalParameters.physical` of the plant.
     state : numpy.ndarray, shape (2 n_t,)
         At time 0.
     torque : callable
@@ -91,12 +294,14 @@ def simulate(model: ArmModel, p: Array, state: Array, torque: Callable[[float], 
 
     """
     watch = monitor or Monitor()
-    state_rate = model.state_rate(p)
+    state_rate = dynamics.state_rate(physical)
 
     def rate(time: float, x: Array) -> Array:
         watch.check()
         result: Array = state_rate(x, torque(time)).copy()
         return result
+
+    from scipy.integrate import solve_ivp
 
     result = solve_ivp(rate, (0.0, duration), state, method='DOP853', rtol=rtol, atol=atol)
     final: Array = result.y[:, -1] if result.success else np.full_like(state, np.nan)

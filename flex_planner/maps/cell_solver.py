@@ -12,7 +12,7 @@ from flex_planner.capacity.extrapolation import thinned
 from flex_planner.capacity.max_payload import find_max_payload, MaxPayload
 from flex_planner.capacity.min_duration import find_min_duration, MinDuration
 from flex_planner.collocation import SolverSettings
-from flex_planner.dynamics.arm_dynamics import PlantModel
+from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.maps.cell_results import CellCode, CellResult
 from flex_planner.maps.kept_motions import KeptMotion
 from flex_planner.maps.quantities import Quantity
@@ -128,7 +128,7 @@ class Solver:
         arm, carried = study.plant(index)
         gains = study.gains or Gains.of(arm.n_joints, 0.0, 0.0)
         goal = tip_position(task.arm, plan.problem.goal[:task.arm.n_coordinates])
-        setting = Setting(model=PlantModel(arm), gains=gains, rate=_RATE, payload_mass=carried,
+        setting = Setting(model=ArmDynamics(arm), gains=gains, rate=_RATE, payload_mass=carried,
                           goal=goal, settling=study.settling, monitor=monitor)
         way = ExecutionMode.FLEXIBLE if study.gains else ExecutionMode.FLEXIBLE_OPEN
         outcome = execute_plan(way, plan, finely_sampled(plan, monitor), setting)

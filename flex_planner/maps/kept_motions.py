@@ -12,8 +12,8 @@ from dataclasses import dataclass, fields
 
 from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationSolution, GaussRule
-from flex_planner.optimal_control.arm_model import Parameters
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
+from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.strategies.price_continuation import SearchStart
 import numpy as np

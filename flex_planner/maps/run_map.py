@@ -8,7 +8,7 @@ import time
 from distributed import Client
 from distributed.comm import get_address_host
 from flex_planner import __version__
-from flex_planner.dynamics.arm_dynamics import PlantModel
+from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.maps.block_solver import blocks, solve_block
 from flex_planner.maps.cluster import (
     ClusterError,
@@ -107,4 +107,4 @@ def _compile(study: Study) -> None:
     """Have the functions of a study's arms in the cache of this machine."""
     ArmModel(study.arm)
     if study.quantity is Quantity.RESIDUAL_VIBRATION:
-        PlantModel(study.plant((0,) * len(study.axes))[0])
+        ArmDynamics(study.plant((0,) * len(study.axes))[0])

@@ -15,8 +15,9 @@ from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationSolution
 from flex_planner.collocation.linear import SingularSystemError
 from flex_planner.dynamics.statics import equilibrium
-from flex_planner.optimal_control.arm_model import ArmModel, Parameters
+from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import Indices, MotionProblem
+from flex_planner.optimal_control.parameters import Parameters, payload_index
 from flex_planner.optimal_control.task import Task
 import numpy as np
 
@@ -201,7 +202,7 @@ class PayloadProblem:
 
     def _at(self, z: Array) -> tuple[MotionProblem, Array]:
         """Return the motion and the parameters with the payload of an iterate."""
-        self._p[0] = z[0, -2]
+        self._p[payload_index()] = z[0, -2]
         return self.motion, self._p
 
 

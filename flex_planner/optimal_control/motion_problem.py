@@ -8,7 +8,8 @@ from flex_planner.base.errors import InvalidTaskError, NoEquilibriumError
 from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationSolution, GaussRule
 from flex_planner.dynamics.statics import equilibrium, natural_modes
-from flex_planner.optimal_control.arm_model import ArmModel, Parameters
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.optimal_control.task import MAX_PAYLOAD, Task
 import numpy as np
 from numpy.typing import NDArray
@@ -89,9 +90,7 @@ class MotionProblem:
         """Return how far the unbounded torque is from each bound of eq. (15), (k, 2 n)."""
         free = self.model.controls(z, self.p if p is None else p).free_torque
         n_t, n = self.model.arm.n_coordinates, self.model.arm.n_joints
-        stall, slope = self.parameters.stall_torque, self.parameters.torque_slope
-        shifted = free + slope * z[:, n_t:n_t + n]
-        return np.hstack([shifted - stall, shifted + stall])
+        return np.hstack(self.parameters.torque_limits.distances(free, z[:, n_t:n_t + n]))
 
     def left(self, z: Array) -> tuple[Array, Array]:
         """Return the initial conditions of eq. (16)."""
@@ -137,12 +136,13 @@ class MotionProblem:
         arm, duration = self.model.arm, self.task.duration
         n = arm.n_joints
         travel = np.maximum(np.abs(self.goal - self.start)[:n], 0.1)
-        mass = self.model.mass_and_energy(self.start[None], self.p)[0][0]
+        mass = self.model.mass_and_energy(self.start[None], self.parameters.physical)[0][0]
         inertia = np.abs(mass[:, :n]) @ (4 * travel / duration**2)
         bend = np.zeros(0)
         if arm.n_modes:
             coordinates = self.start[None, :arm.n_coordinates]
-            stiffness = self.model.static_forces(coordinates, self.p)[1][0, n:, n:]
+            stiffness = self.model.static_forces(coordinates, self.parameters.physical)[1][0, n:,
+                                                                                           n:]
             bend = np.maximum(np.abs(np.linalg.solve(stiffness, inertia[n:])), 1e-9 * arm.reach)
         positions = np.concatenate([travel, bend])
         velocity_costates = np.abs(mass[:, :n]) @ (self.parameters.effort_weights * inertia[:n])

@@ -3,7 +3,9 @@ Pontryagin's conditions of the minimum-effort problem as CasADi expressions.
 
 Korayem et al. 2009, eqs. (7)-(15). The dynamics enter through the inverse dynamics
 ``ID = M a + h``, so no inverse of a matrix is differentiated: with ``a = M^-1 (B u - h)`` and
-``y = M^-1 psi_2`` the derivative of ``psi_2^T a`` is ``-d(y^T ID)/dx`` at fixed y and a.
+``y = M^-1 psi_2`` the derivative of ``psi_2^T a`` by the state is ``-d(y^T ID)/dx`` at fixed y and
+a. So the costates follow from one gradient of ``L + psi_1^T q' - y^T ID``, which has the same
+derivatives as H at fixed u.
 
 """
 
@@ -14,40 +16,49 @@ from typing import Any
 
 import casadi as ca
 from flex_planner.arms.arm import Arm
-from flex_planner.dynamics.planar_chain import build_chain, Chain
+from flex_planner.dynamics.chain import Chain
+from flex_planner.dynamics.dynamics_functions import batched, BatchedFunction, solver_of
+from flex_planner.dynamics.planar_chain import build_chain
+from flex_planner.optimal_control.parameters import ParameterSymbols
+from flex_planner.optimal_control.running_cost import running_cost
+from flex_planner.optimal_control.torque_limits import free_torque
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Parameters:
-    """Symbols that stay free in the compiled functions, see `arm_model.Parameters`."""
-
-    chain: Chain
-    stall: Any
-    slope: Any
-    effort: Any
-    position: Any
-    velocity: Any
-
-    @classmethod
-    def of(cls, chain: Chain, n: int) -> _Parameters:
-        """Create the symbols for n joints."""
-        n_t = chain.coordinates.numel()
-        return cls(chain=chain, stall=ca.SX.sym('K_1', n), slope=ca.SX.sym('K_2', n),
-                   effort=ca.SX.sym('R', n), position=ca.SX.sym('W_1', n_t),
-                   velocity=ca.SX.sym('W_2', n_t))
-
-    def stacked(self) -> Any:
-        """Return all of them as one column, in the order of `model.Parameters.stacked`."""
-        return ca.vertcat(self.chain.payload_mass, self.chain.payload_inertia,
-                          self.chain.rigidity, self.stall, self.slope, self.effort,
-                          self.position, self.velocity)
-
-
-def build_functions(arm: Arm) -> dict[str, tuple[Any, int]]:
+class Conditions:
     """
-    Return the functions of an arm that the numerics evaluate, with their batched inputs.
+    The optimality conditions at a point, all of them expressions of z and the parameters.
 
-    Every function takes the stacked parameters last.
+    Attributes
+    ----------
+    z, rate : casadi.SX, shape (4 n_t, 1)
+        (q, q', psi_1, psi_2), and z' of eqs. (11) and (12).
+    torque, free_torque : casadi.SX, shape (n, 1)
+        Eq. (14), and eq. (13) without bounds [N m].
+    cost, hamiltonian : casadi.SX
+        L of eq. (7) and H of eq. (8).
+    payload_share : casadi.SX
+        dH/dm_p [1/kg].
+    acceleration : casadi.SX, shape (n_t, 1)
+        q''.
+
+    """
+
+    z: Any
+    rate: Any
+    torque: Any
+    free_torque: Any
+    cost: Any
+    hamiltonian: Any
+    payload_share: Any
+    acceleration: Any
+
+
+def build_optimality_functions(arm: Arm) -> dict[str, BatchedFunction]:
+    """
+    Derive the functions of the optimality conditions that the numerics evaluate.
+
+    Every function takes `Parameters.stacked` last.
 
     Parameters
     ----------
@@ -64,107 +75,47 @@ def build_functions(arm: Arm) -> dict[str, tuple[Any, int]]:
         - ``control`` z -> torque, torque without bounds, running cost L, Hamiltonian H,
           dH/dm_p, accelerations
         - ``payload_sensitivity`` z -> dz'/dm_p, dH/dm_p, d2H/dm_p2
-        - ``forward_dynamics`` (x, u) -> x', eq. (5)
-        - ``runge_kutta_step`` (x, torques at the stages, step) -> next x and the two error
-          estimates of the Dormand-Prince method of order 8
-        - ``inverse_dynamics`` (x, a) -> generalized forces
-        - ``mass_and_energy`` x -> M, kinetic energy, potential energy
-        - ``static_forces`` q -> dV/dq, d2V/dq2 with V the potential energy
 
     """
     chain = build_chain(arm)
-    par = _Parameters.of(chain, arm.n_joints)
-    p = par.stacked()
-    z, F, outputs = _optimality(par, arm.n_joints)
-    share, payload = outputs[4], chain.payload_mass
-    q = chain.coordinates
-    x = ca.vertcat(q, chain.rates)
-    u, a = ca.SX.sym('u', arm.n_joints), ca.SX.sym('a', arm.n_coordinates)
-    M, solve = _factorized(chain.mass_matrix())
-    forces = ca.vertcat(u, ca.SX(arm.n_modes, 1))
-    state_rate = ca.vertcat(chain.rates, solve(forces - chain.bias()))
-
-    def function(name: str, inputs: list[Any], results: list[Any]) -> tuple[Any, int]:
-        dense = [ca.densify(result) for result in results]
-        return ca.Function(name, [*inputs, p], dense), len(inputs)
-
-    forward_dynamics = function('forward_dynamics', [x, u], [state_rate])
+    symbols = ParameterSymbols.of(chain)
+    found, p = derive_conditions(chain, symbols), ca.vertcat(*symbols.stacked())
+    z, F, share, payload = found.z, found.rate, found.payload_share, chain.payload_mass
     return {
-        'optimality': function('optimality', [z], [F]),
+        'optimality': batched('optimality', [z], p, [F]),
         # transposed: CasADi stores columns, NumPy rows
-        'optimality_jacobian': function('optimality_jacobian', [z], [F, ca.jacobian(F, z).T]),
-        'control': function('control', [z], list(outputs)),
-        'payload_sensitivity': function('payload_sensitivity', [z], [
+        'optimality_jacobian': batched('optimality_jacobian', [z], p,
+                                       [F, ca.jacobian(F, z).T]),
+        'control': batched('control', [z], p, [
+            found.torque, found.free_torque, found.cost, found.hamiltonian, share,
+            found.acceleration]),
+        'payload_sensitivity': batched('payload_sensitivity', [z], p, [
             ca.jacobian(F, payload), share, ca.jacobian(share, payload)]),
-        'forward_dynamics': forward_dynamics,
-        'runge_kutta_step': _runge_kutta_step(forward_dynamics[0]),
-        'inverse_dynamics': function('inverse_dynamics', [x, a], [chain.inverse_dynamics(a)]),
-        'mass_and_energy': function('mass_and_energy', [x],
-                                    [M, chain.kinetic, chain.potential]),
-        'static_forces': function('static_forces', [q], [ca.gradient(chain.potential, q),
-                                                         ca.hessian(chain.potential, q)[0]]),
     }
 
 
-def _runge_kutta_step(rate: Any) -> tuple[Any, int]:
-    """Return one step of DOP853, with SciPy's coefficients, of x' = rate(x, u, p)."""
-    from scipy.integrate import DOP853
-
-    x, u = ca.MX.sym('x', rate.size1_in(0)), ca.MX.sym('u', rate.size1_in(1), DOP853.n_stages)
-    step, p = ca.MX.sym('h'), ca.MX.sym('p', rate.size1_in(2))
-    slopes: list[Any] = []
-    for i in range(DOP853.n_stages):
-        slopes.append(rate(x + step * _combined(DOP853.A[i, :i], slopes), u[:, i], p))
-    following = x + step * _combined(DOP853.B, slopes)
-    # the last stage of the error estimate is at the end of the step, as stage 12 is
-    slopes.append(rate(following, u[:, DOP853.n_stages - 1], p))
-    errors = [step * _combined(row, slopes) for row in (DOP853.E5, DOP853.E3)]
-    return ca.Function('runge_kutta_step', [x, ca.vec(u), step, p], [following, *errors]), 3
-
-
-def _combined(weights: Any, vectors: list[Any]) -> Any:
-    """Return the sum of weighted vectors; 0 for none."""
-    return sum((float(w) * v for w, v in zip(weights, vectors, strict=True) if w), 0)
-
-
-def _factorized(matrix: Any) -> tuple[Any, Any]:
-    """Return a symmetric positive definite matrix and its solver by unrolled LDL^T."""
-    D, LT, order = ca.ldl(matrix, False)
-    return matrix, lambda rhs: ca.ldl_solve(rhs, D, LT, order)
-
-
-def _optimality(par: _Parameters, n: int) -> tuple[Any, Any, tuple[Any, ...]]:
-    """Return z, z' and the outputs of ``control``."""
-    chain = par.chain
+def derive_conditions(chain: Chain, parameters: ParameterSymbols) -> Conditions:
+    """Derive eqs. (8) and (11)-(14) for a chain."""
     q, rates = chain.coordinates, chain.rates
-    n_t = q.numel()
+    n_t, n = q.numel(), chain.rigidity.numel()
     psi_1, psi_2 = ca.SX.sym('psi_1', n_t), ca.SX.sym('psi_2', n_t)
-    a, y = ca.SX.sym('a', n_t), ca.SX.sym('y', n_t)
-    _, solve = _factorized(chain.mass_matrix())
+    u, a, y = (ca.SX.sym(name, size) for name, size in (('u', n), ('a', n_t), ('y', n_t)))
+    solve, limits, R = solver_of(chain.mass_matrix()), parameters.torque_limits, parameters[
+        'effort_weights']
     y_value = solve(psi_2)
-    u, u_free = _bounded(par, y_value[:n], rates[:n])
-    a_value = solve(ca.vertcat(u, ca.SX(n_t - n, 1)) - chain.bias())
+    free = free_torque(R, y_value[:n])
+    torque = limits.bounded(free, rates[:n])
+    acceleration = solve(ca.vertcat(torque, ca.SX(n_t - n, 1)) - chain.bias())
 
-    work = ca.dot(y, chain.inverse_dynamics(a))
-    # dH/du vanishes unless the torque sits on its bound, which moves with the speed
-    multiplier = par.slope * par.effort * (u - u_free)
-    psi_1_rate = -par.position * q + ca.gradient(work, q)
-    psi_2_rate = -par.velocity * rates - psi_1 + ca.gradient(work, rates)
-    psi_2_rate[:n] += multiplier
-    payload_share = -ca.gradient(work, chain.payload_mass)
-    psi_1_rate, psi_2_rate, payload_share = ca.substitute(
-        [psi_1_rate, psi_2_rate, payload_share], [a, y], [a_value, y_value])
-
-    cost = (ca.dot(par.position * q, q) + ca.dot(par.velocity * rates, rates)
-            + ca.dot(par.effort * u, u)) / 2
-    hamiltonian = cost + ca.dot(psi_1, rates) + ca.dot(psi_2, a_value)
-    z = ca.vertcat(q, rates, psi_1, psi_2)
-    F = ca.vertcat(rates, a_value, psi_1_rate, psi_2_rate)
-    return z, F, (u, u_free, cost, hamiltonian, payload_share, a_value)
-
-
-def _bounded(par: _Parameters, y: Any, speeds: Any) -> tuple[Any, Any]:
-    """Return the torque of eq. (14) within the bounds of eq. (15), and without them."""
-    free = -y / par.effort
-    upper, lower = par.stall - par.slope * speeds, -par.stall - par.slope * speeds
-    return ca.fmin(ca.fmax(free, lower), upper), free
+    cost = running_cost(parameters, q, rates, u)
+    stand_in = cost + ca.dot(psi_1, rates) - ca.dot(y, chain.inverse_dynamics(a))
+    x = ca.vertcat(q, rates)
+    gradient = ca.gradient(stand_in, ca.vertcat(x, chain.payload_mass))
+    cost, gradient = ca.substitute([cost, gradient], [u, a, y], [torque, acceleration, y_value])
+    costate_rate = -gradient[:2 * n_t]
+    costate_rate[n_t:n_t + n] += limits.multiplier(R, free, torque)
+    return Conditions(
+        z=ca.vertcat(x, psi_1, psi_2), rate=ca.vertcat(rates, acceleration, costate_rate),
+        torque=torque, free_torque=free, cost=cost, payload_share=gradient[-1],
+        hamiltonian=cost + ca.dot(psi_1, rates) + ca.dot(psi_2, acceleration),
+        acceleration=acceleration)

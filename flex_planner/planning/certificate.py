@@ -8,9 +8,10 @@ from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationResult, CollocationSolution
+from flex_planner.dynamics.integration import integrate
 from flex_planner.dynamics.statics import residual_vibration
 from flex_planner.optimal_control.motion_problem import MotionProblem
-from flex_planner.optimal_control.planned_torque import PlannedTorque, resimulated
+from flex_planner.optimal_control.planned_torque import PlannedTorque
 from flex_planner.planning.plan import Certificate
 import numpy as np
 
@@ -82,9 +83,9 @@ def final_state(problem: MotionProblem, solution: CollocationSolution, monitor: 
         If the monitor stopped it.
 
     """
-    final = resimulated(problem.model, problem.p, problem.start,
-                        PlannedTorque.of(problem, solution), monitor, rtol=rtol, atol=rtol / 100)
-    return final, problem.reached(solution.nodes[-1, :problem.goal.size])
+    states = integrate(problem.model, problem.parameters.physical, problem.start,
+                       PlannedTorque.of(problem, solution), monitor, rtol=rtol, atol=rtol / 100)
+    return states[-1], problem.reached(solution.nodes[-1, :problem.goal.size])
 
 
 def _at_rest(problem: MotionProblem) -> Array:

@@ -157,7 +157,7 @@ def _peaks(objective: Objective, problem: MotionProblem,
     if objective is Objective.JOINT_SPEEDS:
         return _largest(rates)
     torque = problem.model.controls(z, problem.p).torque
-    return _largest(torque / problem.parameters.torque_limit(torque, rates))
+    return _largest(torque / problem.parameters.torque_limits.toward(torque, rates))
 
 
 def _largest(values: Array) -> Array:

@@ -12,6 +12,7 @@ from flex_planner.collocation import CollocationSolution
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import Task
+from flex_planner.optimal_control.torque_limits import TorqueLimits
 from flex_planner.planning.objectives import ObjectiveSearch
 import numpy as np
 
@@ -188,7 +189,7 @@ class Plan:
         arm, z = self.arm, self.solution(times)
         n_t = arm.n_coordinates
         control = self.model.controls(z, self.problem.p)
-        lower, upper = arm.torque_bounds(z[:, n_t:n_t + arm.n_joints])
+        lower, upper = TorqueLimits.of(arm).bounds(z[:, n_t:n_t + arm.n_joints])
         return Samples(
             times=times, coordinates=z[:, :n_t], rates=z[:, n_t:2 * n_t],
             accelerations=control.acceleration, torques=control.torque, lower_bounds=lower,

@@ -8,7 +8,8 @@ from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import link_points
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.statics import equilibrium, natural_modes
-from flex_planner.optimal_control.arm_model import ArmModel, Parameters
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.plotting.figures import finish, save
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure

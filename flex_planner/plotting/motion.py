@@ -9,6 +9,7 @@ from pathlib import Path
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import link_points
 from flex_planner.base.validation import Array
+from flex_planner.optimal_control.torque_limits import TorqueLimits
 from flex_planner.planning.plan import Samples
 from flex_planner.plotting.figures import finish, save, say
 from matplotlib.axes import Axes
@@ -134,7 +135,7 @@ def draw_torques(axes: Axes, arm: Arm, joint_names: Sequence[str], motion: Motio
 
 def _draw_bounds(axes: Axes, arm: Arm, motion: Motion) -> None:
     """Draw the bounds of the torques at the planned speeds."""
-    lower, upper = arm.torque_bounds(motion.rates[:-1, :arm.n_joints])
+    lower, upper = TorqueLimits.of(arm).bounds(motion.rates[:-1, :arm.n_joints])
     for i in range(arm.n_joints):
         if np.isfinite(upper[:, i]).all():
             for bound in (lower, upper):

@@ -10,7 +10,8 @@ from flex_planner.arms.inverse_kinematics import workspace
 from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.statics import equilibrium, natural_modes
-from flex_planner.optimal_control.arm_model import ArmModel, Parameters
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.parameters import Parameters
 import numpy as np
 
 _MOST_FREQUENCIES = 8

@@ -8,7 +8,7 @@ import time
 from builtin_interfaces.msg import Time
 from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.validation import Array
-from flex_planner.dynamics.arm_dynamics import PlantModel
+from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.ros.messages.plans import duration_seconds
 from flex_planner.ros.messages.trajectory_rules import trajectory_violations
 from flex_planner.ros.runtime.parameters import declare, declare_arm
@@ -76,7 +76,7 @@ class ArmSimulator(Node):  # type: ignore[misc]
 
     def _new_plant(self) -> Plant:
         settings = self._settings
-        return Plant(PlantModel(self._arm), settings.control,
+        return Plant(ArmDynamics(self._arm), settings.control,
                      payload_mass=settings.payload_mass,
                      payload_inertia=settings.payload_inertia,
                      positions=np.asarray(settings.initial_positions))

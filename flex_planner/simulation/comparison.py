@@ -14,7 +14,7 @@ from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array, number
-from flex_planner.dynamics.arm_dynamics import PlantModel
+from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import Plan
@@ -128,7 +128,7 @@ def compare(task: Task, *, model: ArmModel | None = None, mismatch: Mismatch | N
                     report=watch.report)
     rigid = plan_path(rigid_problem(flexible.problem).task, monitor=again)
     goal = tip_position(task.arm, flexible.problem.goal[:task.arm.n_coordinates])
-    setting = Setting(model=PlantModel(simulated), gains=chosen, rate=rate, settling=settling,
+    setting = Setting(model=ArmDynamics(simulated), gains=chosen, rate=rate, settling=settling,
                       payload_mass=carried, goal=goal, monitor=watch)
     return Comparison(flexible=flexible, rigid=rigid, arm=simulated, payload_mass=carried,
                       goal=goal, settling=settling,

@@ -8,7 +8,7 @@ from enum import Enum
 from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
-from flex_planner.dynamics.arm_dynamics import PlantModel
+from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.statics import equilibrium, residual_vibration
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.sampling import SampledPlan
@@ -108,7 +108,7 @@ class Setting:
 
     Attributes
     ----------
-    model : PlantModel
+    model : ArmDynamics
         Of the simulated arm.
     gains : Gains
         Of the PD.
@@ -125,7 +125,7 @@ class Setting:
 
     """
 
-    model: PlantModel
+    model: ArmDynamics
     gains: Gains
     rate: float
     payload_mass: float

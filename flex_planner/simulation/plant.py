@@ -13,9 +13,11 @@ from dataclasses import dataclass
 
 from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.validation import Array, integer, number, vector
-from flex_planner.dynamics.arm_dynamics import PlantModel
+from flex_planner.dynamics.arm_dynamics import ArmDynamics
+from flex_planner.dynamics.integration import HeldTorqueIntegrator
+from flex_planner.dynamics.physical_parameters import PhysicalParameters
 from flex_planner.dynamics.statics import equilibrium
-from flex_planner.optimal_control.arm_model import Parameters
+from flex_planner.optimal_control.torque_limits import TorqueLimits
 from flex_planner.simulation.joint_control import (
     Disturbance,
     Encoder,
@@ -28,10 +30,6 @@ import numpy as np
 
 RTOL, ATOL = 1e-8, 1e-10
 _LONGEST_STEP = 1e-3
-# a period of the controller is not cut finer: the arm must have run away
-_MOST_STEPS = 4096
-# error of a step below which half as many are as good, with a margin: the order is 8
-_EASY = 2.0**-10
 
 
 class RunawayError(FlexPlannerError):
@@ -88,7 +86,7 @@ class Plant:
 
     Parameters
     ----------
-    model : PlantModel
+    model : ArmDynamics
         n joints, n_t coordinates.
     control : Control
         Of the joints.
@@ -99,7 +97,7 @@ class Plant:
 
     Attributes
     ----------
-    parameters : Parameters
+    parameters : PhysicalParameters
         Of the arm, with its payload.
     state : numpy.ndarray, shape (2 n_t,)
         x = (q, q').
@@ -110,21 +108,24 @@ class Plant:
 
     """
 
-    def __init__(self, model: PlantModel, control: Control, *, payload_mass: float,
+    def __init__(self, model: ArmDynamics, control: Control, *, payload_mass: float,
                  positions: Array, payload_inertia: float = 0.0) -> None:
         n = model.arm.n_joints
         control.check(n)
         self.model, self.control, self.period = model, control, 1 / control.rate
         mass = number('payload_mass', payload_mass, at_least=0, unit='kg')
         inertia = number('payload_inertia', payload_inertia, at_least=0, unit='kg m^2')
-        parameters = Parameters.of(model.arm, payload_mass=mass, payload_inertia=inertia)
+        parameters = PhysicalParameters.of_arm(model.arm, payload_mass=mass,
+                                               payload_inertia=inertia)
         rest, self.torque = equilibrium(model, vector('positions', positions, n, unit='rad'),
                                         parameters)
         self.state = np.concatenate([rest, np.zeros_like(rest)])
         self.sensor = JointSensor(control.encoder, rest[:n])
         self.parameters = parameters
-        self._step = model.step(parameters.stacked(), rtol=RTOL, atol=ATOL)
-        self._fewest = self._steps = int(np.ceil(self.period / _LONGEST_STEP - 1e-9))
+        self._limits = TorqueLimits.of(model.arm)
+        self._integrator = HeldTorqueIntegrator(
+            model, parameters.physical, period=self.period, longest_step=_LONGEST_STEP,
+            rtol=RTOL, atol=ATOL)
         self._ticks = self._began = 0
         self._reference = JointReference.hold(rest[:n], self.torque)
         self._moves = False
@@ -171,7 +172,12 @@ class Plant:
         total = self.torque
         if self._moves:
             total = total + self.control.disturbance.mean(begin, begin + self.period, total.size)
-        self.state = self._integrated(total)
+        state = self._integrator.advance(self.state, total)
+        if state is None:
+            raise RunawayError(f'the simulated arm has run away after {self.time:.3f} s: gains '
+                               'that are too high for the rate of the controller, or too much '
+                               'torque')
+        self.state = state
         self._ticks += 1
         self.sensor.look(self.time, *self.joint_state)
 
@@ -185,29 +191,6 @@ class Plant:
             # a torque that is held for a period is best taken from its middle
             torque = torque + self._reference.torque(elapsed + self.period / 2)
         if self.control.limit_torques:
-            lower, upper = self.model.arm.torque_bounds(self.joint_state[1])
+            lower, upper = self._limits.bounds(self.joint_state[1])
             torque = np.minimum(np.maximum(torque, lower), upper)
         return torque
-
-    def _integrated(self, torque: Array) -> Array:
-        """Return the state after one period, in as many steps as it takes."""
-        with np.errstate(over='ignore', invalid='ignore'):
-            while self._steps <= _MOST_STEPS:
-                state, error = self._crossed(torque)
-                if error <= 1:
-                    if error < _EASY:
-                        self._steps = max(self._fewest, self._steps // 2)
-                    return state
-                self._steps *= 2
-        raise RunawayError(f'the simulated arm has run away after {self.time:.3f} s: gains that '
-                           'are too high for the rate of the controller, or too much torque')
-
-    def _crossed(self, torque: Array) -> tuple[Array, float]:
-        """Return the state after equal steps, and the error of the worst of them."""
-        state, worst, length = self.state, 0.0, self.period / self._steps
-        for _ in range(self._steps):
-            state, error = self._step(state, torque, length)
-            worst = max(worst, error)
-            if worst > 1:
-                break
-        return state, worst

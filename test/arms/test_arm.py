@@ -17,6 +17,7 @@ from flex_planner.base.errors import (
     UnreachableError,
 )
 from flex_planner.optimal_control.task import postures_from_points, Task
+from flex_planner.optimal_control.torque_limits import TorqueLimits
 import numpy as np
 import pytest
 
@@ -218,14 +219,15 @@ def test_link_has_the_mass_and_modes_of_its_data() -> None:
 
 def test_torque_bounds_follow_the_motor_line_of_eq_15(rigid_arm: Arm) -> None:
     # tau_s = 8 N m, omega_m = 3.5 rad/s (Table I): at half the no-load speed half the torque
-    lower, upper = rigid_arm.torque_bounds(np.array([[0.0, 1.75], [3.5, -3.5]]))
+    lower, upper = TorqueLimits.of(rigid_arm).bounds(np.array([[0.0, 1.75], [3.5, -3.5]]))
     assert upper.tolist() == [[8.0, 4.0], [0.0, 16.0]]
     assert lower.tolist() == [[-8.0, -12.0], [-16.0, 0.0]]
 
 
 def test_motor_without_no_load_speed_has_constant_bounds() -> None:
     joint = Joint(motor=Motor(stall_torque=4.0))
-    lower, upper = build_arm(joints=(joint, Joint())).torque_bounds(np.array([100.0, -5.0]))
+    lower, upper = TorqueLimits.of(build_arm(joints=(joint, Joint()))).bounds(np.array([100.0,
+                                                                                        -5.0]))
     assert (lower.tolist(), upper.tolist()) == ([-4.0, -math.inf], [4.0, math.inf])
 
 

@@ -227,7 +227,8 @@ def miss_of(model: ArmModel, task: Task, found: DirectResult) -> float:
     theta = (legendre.leggauss(4)[0] + 1) / 2
     torque = PiecewisePolynomial.through(mesh, theta,
                                          found.torques.reshape(mesh.size - 1, 4, -1))
-    miss = simulate(model, problem.p, problem.start, torque, task.duration) - problem.goal
+    miss = simulate(model, problem.parameters.physical, problem.start, torque,
+                    task.duration) - problem.goal
     return float(miss @ miss / 2)
 
 

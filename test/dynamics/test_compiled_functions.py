@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-import dataclasses
 import logging
 import os
 from pathlib import Path
@@ -15,10 +14,11 @@ import time
 from typing import Any
 
 import flex_planner
-from flex_planner.arms.arm import Arm, Motor, Node
+from flex_planner.arms.arm import Arm
 from flex_planner.dynamics import compiled_functions
 from flex_planner.dynamics.compiled_functions import cache_folder, content_key, load_functions
-from flex_planner.optimal_control.arm_model import ArmModel, Parameters
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.parameters import Parameters
 import numpy as np
 from numpy.typing import NDArray
 import pytest
@@ -147,15 +147,16 @@ def test_without_compiler_functions_are_interpreted_with_one_warning(
 @pytest.mark.usefixtures('no_compiler')
 def test_interpreted_arm_gives_the_values_of_the_compiled_one(rigid_arm: Arm, cache: Path,
                                                               rigid_model: ArmModel) -> None:
-    interpreted, p = ArmModel(rigid_arm), Parameters.of(rigid_arm, payload_mass=1.0).stacked()
+    interpreted, parameters = ArmModel(rigid_arm), Parameters.of(rigid_arm, payload_mass=1.0)
+    p, physical = parameters.stacked(), parameters.physical
     z = np.random.default_rng(0).normal(size=(5, 8))
     for ours, theirs in zip(interpreted.optimality_jacobian(z, p),
                             rigid_model.optimality_jacobian(z, p), strict=True):
         # rounding: the C compiler may fuse a multiplication and an addition
         np.testing.assert_allclose(ours, theirs, rtol=1e-11, atol=1e-11)
     state, torque = np.array([0.1, 0.2, 0.3, 0.4]), np.array([1.0, 2.0])
-    np.testing.assert_allclose(interpreted.state_rate(p)(state, torque),
-                               rigid_model.state_rate(p)(state, torque), rtol=1e-12)
+    np.testing.assert_allclose(interpreted.state_rate(physical)(state, torque),
+                               rigid_model.state_rate(physical)(state, torque), rtol=1e-12)
 
 
 def fake_compiler(folder: Path, script: str) -> str:
@@ -252,30 +253,6 @@ def test_processor_is_known_by_its_flags_or_at_least_its_kind(
 
     monkeypatch.setattr(Path, 'read_text', missing)
     assert find() == f'{platform.machine()} '
-
-
-def test_key_of_an_arm_holds_all_that_is_compiled_and_no_more(
-        workshop_arm: Arm, monkeypatch: pytest.MonkeyPatch) -> None:
-    keys: list[str] = []
-    monkeypatch.setattr('flex_planner.optimal_control.arm_model.load_functions',
-                        lambda key, build: keys.append(key) or {})
-    link, joint = workshop_arm.links[0], workshop_arm.joints[0]
-    links = [dataclasses.replace(link, **change) for change in (
-        {}, {'flexural_rigidity': 99.0}, {'length': 0.7}, {'linear_density': 5.0},
-        {'modes': 2}, {'mode_family': 'clamped_free'}, {'shape_mass': 1.0},
-        {'shape_inertia': 1.0}, {'damping_ratio': 0.1})]
-    arms = [dataclasses.replace(workshop_arm, links=(changed, workshop_arm.links[1]))
-            for changed in links]
-    stiffer = dataclasses.replace(joint, viscous_friction=0.4)
-    limited = dataclasses.replace(joint, motor=Motor(), upper_limit=1.0)
-    arms += [dataclasses.replace(workshop_arm, **change) for change in (
-        {'name': 'other'}, {'gravity': [0.0, 0.0]}, {'nodes': (Node(),) * 3},
-        {'joints': (stiffer, workshop_arm.joints[1])},
-        {'joints': (limited, workshop_arm.joints[1])})]
-    for arm in arms:
-        ArmModel(arm)
-    # the rigidity, the name and limits are not compiled in
-    assert [keys.index(key) for key in keys] == [0, 0, 2, 3, 4, 5, 6, 7, 8, 0, 10, 11, 12, 0]
 
 
 @pytest.mark.parametrize('inputs', [

@@ -10,7 +10,7 @@ from flex_planner.arms.arm_files import load_arm
 from flex_planner.arms.beam_eigenmodes import clamped_eigenvalue, TipLoad
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.statics import natural_modes
-from flex_planner.optimal_control.arm_model import Parameters
+from flex_planner.optimal_control.parameters import Parameters
 from light_model import LightModel
 import numpy as np
 import pytest
@@ -164,8 +164,8 @@ def test_natural_modes_are_orthonormal_in_the_mass_matrix(loaded_arm: Arm) -> No
     model, parameters = LightModel(arm), Parameters.of(arm)
     q = np.concatenate([[0.3, -0.8, 1.3], np.zeros(6)])
     values, vectors = natural_modes(model, q, parameters, locked=False)
-    mass = model.mass_and_energy(np.pad(q, (0, 9))[None], parameters.stacked())[0][0]
-    stiffness = model.static_forces(q[None], parameters.stacked())[1][0]
+    mass = model.mass_and_energy(np.pad(q, (0, 9))[None], parameters.physical)[0][0]
+    stiffness = model.static_forces(q[None], parameters.physical)[1][0]
     np.testing.assert_allclose(vectors.T @ mass @ vectors, np.eye(9), atol=1e-11)
     np.testing.assert_allclose(vectors.T @ stiffness @ vectors, np.diag(values**2),
                                atol=1e-11 * values[-1]**2)

@@ -15,7 +15,8 @@ from flex_planner.arms.kinematics import frame_angles, link_points, tip_position
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.integration import simulate
 from flex_planner.dynamics.statics import equilibrium, natural_modes, residual_vibration
-from flex_planner.optimal_control.arm_model import ArmModel, Parameters
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.parameters import Parameters
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from light_model import LightModel
@@ -42,7 +43,7 @@ def loaded(arm: Arm, payload_mass: float = 1.7, payload_inertia: float = 0.0) ->
 
 
 def parameters(arm: Arm, payload_mass: float = 1.7, payload_inertia: float = 0.0) -> Array:
-    return loaded(arm, payload_mass, payload_inertia).stacked()
+    return loaded(arm, payload_mass, payload_inertia).physical
 
 
 def velocity(function: object, arm: Arm, x: Array, *arguments: int) -> Array:
@@ -405,7 +406,7 @@ def test_response_tends_to_that_of_the_rigid_arm_as_it_stiffens(hanging_arm: Arm
     distances = []
     for rigidity in (100.0, 400.0, 1600.0):
         soft = replace(Parameters.of(hanging_arm), rigidity=np.full(2, rigidity))
-        distances.append(np.abs(swing(model, soft.stacked(), times) - expected).max())
+        distances.append(np.abs(swing(model, soft.physical, times) - expected).max())
     # fig. 4: E I = 100 is very close; the sag, and with it the distance, goes as 1 / E I
     assert distances[0] < 0.01
     np.testing.assert_allclose(np.divide(distances[:-1], distances[1:]), 4.0, rtol=0.15)
@@ -419,7 +420,7 @@ def test_equilibrium_leaves_no_force_on_the_modes(workshop_arm: Arm,
     p = loaded(workshop_arm)
     coordinates, torque = equilibrium(workshop_model, np.array([0.3, -0.8]), p)
     x = np.concatenate([coordinates, np.zeros(5)])[None]
-    force = workshop_model.inverse_dynamics(x, np.zeros((1, 5)), p.stacked())[0]
+    force = workshop_model.inverse_dynamics(x, np.zeros((1, 5)), p.physical)[0]
     np.testing.assert_allclose(force[2:], 0, atol=1e-12)  # rounding of ~10 N
     assert coordinates[:2].tolist() == [0.3, -0.8]
     # another order of summation: rounding of ~30 N m
@@ -454,7 +455,7 @@ def test_locked_links_ring_with_the_frequencies_of_pinned_beams(uneven_arm: Arm,
     expected = [*(order * np.pi / 0.6)**2 * np.sqrt(50 / 6.0),
                 *(order * np.pi / 0.35)**2 * np.sqrt(20 / 6.0)]
     np.testing.assert_allclose(frequencies, np.sort(expected), rtol=1e-12)  # rounding
-    stiffness = uneven_model.static_forces(q[None], p.stacked())[1][0, 2:, 2:]
+    stiffness = uneven_model.static_forces(q[None], p.physical)[1][0, 2:, 2:]
     np.testing.assert_allclose(vectors.T @ stiffness @ vectors, np.diag(frequencies**2),
                                atol=1e-12 * frequencies[-1]**2)
 

@@ -6,7 +6,7 @@ from flex_planner.arms.arm import Arm, Joint, Link, Node
 from flex_planner.arms.mode_shapes import FAMILIES
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.integration import simulate
-from flex_planner.optimal_control.arm_model import Parameters
+from flex_planner.optimal_control.parameters import Parameters
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from light_model import LightModel
@@ -45,7 +45,7 @@ def random_states(arm: Arm, count: int, seed: int) -> Array:
 
 
 def parameters(arm: Arm) -> Array:
-    return Parameters.of(arm, payload_mass=1.2, payload_inertia=0.05).stacked()
+    return Parameters.of(arm, payload_mass=1.2, payload_inertia=0.05).physical
 
 
 def differences(values: Array, step: Array) -> Array:

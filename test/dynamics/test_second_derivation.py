@@ -17,7 +17,7 @@ from autograd.differential_operators import make_jvp
 import autograd.numpy as anp
 from flex_planner.arms.arm import Arm, Joint, Link, Node
 from flex_planner.base.validation import Array
-from flex_planner.optimal_control.arm_model import Parameters
+from flex_planner.optimal_control.parameters import Parameters
 from light_model import LightModel
 import numpy as np
 import pytest
@@ -137,7 +137,7 @@ def arm(request: pytest.FixtureRequest) -> Arm:
 
 def test_energies_and_mass_matrix_agree_with_the_second_derivation(arm: Arm) -> None:
     second, (q, rates, _) = SecondDerivation(arm), states(arm, 4, 1)
-    p = Parameters.of(arm, payload_mass=PAYLOAD, payload_inertia=INERTIA).stacked()
+    p = Parameters.of(arm, payload_mass=PAYLOAD, payload_inertia=INERTIA).physical
     mass, kinetic, potential = LightModel(arm).mass_and_energy(np.hstack([q, rates]), p)
     for k in range(4):
         M = autograd.jacobian(autograd.grad(second.kinetic, 1), 1)(q[k], rates[k])
@@ -149,7 +149,7 @@ def test_energies_and_mass_matrix_agree_with_the_second_derivation(arm: Arm) -> 
 
 def test_inverse_dynamics_agrees_with_the_second_derivation(arm: Arm) -> None:
     second, (q, rates, a) = SecondDerivation(arm), states(arm, 4, 2)
-    p = Parameters.of(arm, payload_mass=PAYLOAD, payload_inertia=INERTIA).stacked()
+    p = Parameters.of(arm, payload_mass=PAYLOAD, payload_inertia=INERTIA).physical
     found = LightModel(arm).inverse_dynamics(np.hstack([q, rates]), a, p)
     for k in range(4):
         expected = second.inverse_dynamics(q[k], rates[k], a[k])
@@ -160,7 +160,7 @@ def test_inverse_dynamics_agrees_with_the_second_derivation(arm: Arm) -> None:
 
 def test_static_forces_agree_with_the_second_derivation(arm: Arm) -> None:
     second, (q, _, _) = SecondDerivation(arm), states(arm, 4, 3)
-    p = Parameters.of(arm, payload_mass=PAYLOAD, payload_inertia=INERTIA).stacked()
+    p = Parameters.of(arm, payload_mass=PAYLOAD, payload_inertia=INERTIA).physical
     force, stiffness = LightModel(arm).static_forces(q, p)
     for k in range(4):
         gradient = autograd.grad(second.potential)(q[k])
@@ -174,7 +174,7 @@ def test_static_forces_agree_with_the_second_derivation(arm: Arm) -> None:
 def test_compiled_inverse_dynamics_agree_with_the_second_derivation(
         crane_arm: Arm, crane_model: object) -> None:
     second, (q, rates, a) = SecondDerivation(crane_arm), states(crane_arm, 4, 4)
-    p = Parameters.of(crane_arm, payload_mass=PAYLOAD, payload_inertia=INERTIA).stacked()
+    p = Parameters.of(crane_arm, payload_mass=PAYLOAD, payload_inertia=INERTIA).physical
     found = crane_model.inverse_dynamics(np.hstack([q, rates]), a, p)  # type: ignore
     for k in range(4):
         expected = second.inverse_dynamics(q[k], rates[k], a[k])

@@ -8,7 +8,7 @@ from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.errors import NoEquilibriumError
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.statics import equilibrium, natural_modes, residual_vibration
-from flex_planner.optimal_control.arm_model import Parameters
+from flex_planner.optimal_control.parameters import Parameters
 from light_model import LightModel
 import numpy as np
 import pytest
@@ -73,7 +73,7 @@ def test_deflection_of_a_chain_leaves_no_force_on_its_modes(crane_arm: Arm) -> N
     arm, parameters = crane_arm, Parameters.of(crane_arm, payload_mass=1.0)
     model = LightModel(arm)
     q, torque = equilibrium(model, np.array([0.3, -0.8]), parameters)  # type: ignore
-    force, stiffness = model.static_forces(q[None], parameters.stacked())
+    force, stiffness = model.static_forces(q[None], parameters.physical)
     np.testing.assert_allclose(force[0], [*torque, 0, 0, 0], atol=1e-10)  # of forces up to 1e3 N
     assert (np.linalg.eigvalsh(stiffness[0, 2:, 2:]) > 0).all()
     assert np.abs(q[2:]).min() > 1e-5

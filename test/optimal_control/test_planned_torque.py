@@ -12,10 +12,13 @@ from flex_planner.arms.arm_files import load_arm
 from flex_planner.base.progress import Monitor, StoppedError, StopReason
 from flex_planner.base.validation import Array
 from flex_planner.dynamics import compiled_functions
-from flex_planner.dynamics.integration import PiecewisePolynomial, simulate
-from flex_planner.optimal_control.arm_model import ArmModel, Parameters, RUNGE_KUTTA_STAGES
-from flex_planner.optimal_control.planned_torque import PlannedTorque, resimulated
+from flex_planner.dynamics.arm_dynamics import RUNGE_KUTTA_STAGES
+from flex_planner.dynamics.integration import integrate, PiecewisePolynomial, simulate
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.parameters import Parameters
+from flex_planner.optimal_control.planned_torque import PlannedTorque
 from flex_planner.optimal_control.task import Task
+from flex_planner.optimal_control.torque_limits import TorqueLimits
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_path
 import numpy as np
@@ -50,7 +53,7 @@ def by_scipy(plan: Plan, torque: PlannedTorque) -> Array:
     """Return the end by SciPy, from piece to piece: it must not step over a corner."""
     state, breaks = plan.problem.start, torque.pieces.breaks
     for start, end in zip(breaks, breaks[1:], strict=False):
-        state = simulate(plan.model, plan.problem.p, state,
+        state = simulate(plan.model, plan.problem.parameters.physical, state,
                          lambda t, start=start: torque(start + t), end - start,  # type: ignore
                          rtol=1e-12, atol=1e-14)
     return state
@@ -58,8 +61,8 @@ def by_scipy(plan: Plan, torque: PlannedTorque) -> Array:
 
 def end_of(plan: Plan, torque: PlannedTorque, rtol: float, model: ArmModel | None = None,
            monitor: Monitor | None = None) -> Array:
-    return resimulated(model or plan.model, plan.problem.p, plan.problem.start, torque, monitor,
-                       rtol=rtol, atol=rtol / 100)
+    return integrate(model or plan.model, plan.problem.parameters.physical, plan.problem.start,
+                     torque, monitor, rtol=rtol, atol=rtol / 100)[-1]
 
 
 # One step
@@ -70,7 +73,7 @@ def test_steps_are_those_of_dormand_and_prince(request: pytest.FixtureRequest,
                                                name: str) -> None:
     model: ArmModel = request.getfixturevalue(f'{name}_model')
     n_t, h, rng = model.arm.n_coordinates, 2e-3, np.random.default_rng(0)
-    p = Parameters.of(model.arm, payload_mass=1.0, payload_inertia=0.1).stacked()
+    p = Parameters.of(model.arm, payload_mass=1.0, payload_inertia=0.1).physical
     rate, x = model.state_rate(p), rng.normal(size=2 * n_t) * np.repeat([0.1, 1.0], n_t)
     torques = rng.normal(size=(3, RUNGE_KUTTA_STAGES, 2))
     found = model.runge_kutta_steps(p)(x, torques.reshape(3, -1), h)
@@ -89,7 +92,7 @@ def test_steps_are_those_of_dormand_and_prince(request: pytest.FixtureRequest,
 
 
 def test_step_is_of_eighth_order(ei5_model: ArmModel) -> None:
-    p = Parameters.of(ei5_model.arm, payload_mass=1.0).stacked()
+    p = Parameters.of(ei5_model.arm, payload_mass=1.0).physical
     x = np.concatenate([[0.3, 0.8, 0.01, 0, -0.01, 0], np.full(6, 0.1)])
 
     def end(count: int) -> Array:
@@ -119,7 +122,8 @@ def test_end_is_that_of_scipy(any_plan: Callable[[Case], Plan], case: Case) -> N
 def test_end_is_that_of_scipy_in_one_go_where_no_motor_switches(plan_of: PlanFactory) -> None:
     plan = plan_of('rigid')
     torque = torque_of(plan)
-    expected = simulate(plan.model, plan.problem.p, plan.problem.start, torque, 1.0, rtol=1e-12,
+    expected = simulate(plan.model, plan.problem.parameters.physical, plan.problem.start, torque,
+                        1.0, rtol=1e-12,
                         atol=1e-14)
     np.testing.assert_allclose(end_of(plan, torque, 1e-12), expected, rtol=0, atol=1e-11)
 
@@ -127,8 +131,10 @@ def test_end_is_that_of_scipy_in_one_go_where_no_motor_switches(plan_of: PlanFac
 def test_another_start_is_followed(plan_of: PlanFactory) -> None:
     plan = plan_of('ei5')
     torque, start = torque_of(plan), plan.problem.start + 1e-3
-    end = resimulated(plan.model, plan.problem.p, start, torque, rtol=1e-11, atol=1e-13)
-    expected = simulate(plan.model, plan.problem.p, start, torque, 1.0, rtol=1e-12, atol=1e-14)
+    end = integrate(plan.model, plan.problem.parameters.physical, start, torque, rtol=1e-11,
+                    atol=1e-13)[-1]
+    expected = simulate(plan.model, plan.problem.parameters.physical, start, torque, 1.0,
+                        rtol=1e-12, atol=1e-14)
     np.testing.assert_allclose(end, expected, rtol=0, atol=1e-9)
     assert np.abs(end - plan.problem.goal).max() > 1e-3
 
@@ -168,7 +174,7 @@ def test_torque_stays_within_its_bounds(any_plan: Callable[[Case], Plan], case: 
     times = np.linspace(0, plan.task.duration, 2001)
     found = np.array([torque(time) for time in times])
     n_t = plan.arm.n_coordinates
-    lower, upper = plan.arm.torque_bounds(solution_of(plan)(times)[:, n_t:n_t + 2])
+    lower, upper = TorqueLimits.of(plan.arm).bounds(solution_of(plan)(times)[:, n_t:n_t + 2])
     # the speeds between the collocation points, to the order of the polynomials
     assert (found <= upper + 1e-6).all()
     assert (found >= lower - 1e-6).all()
@@ -178,7 +184,7 @@ def test_bounds_hold_for_any_free_torque() -> None:
     breaks, theta = np.array([0.0, 1.0]), np.array([0.0, 1.0])
     values = np.array([[[-50.0, 0.5], [50.0, 0.5]]])  # a free torque and a speed
     torque = PlannedTorque(PiecewisePolynomial.through(breaks, theta, values),
-                           stall=np.array([8.0]), slope=np.array([2.0]))
+                           TorqueLimits(np.array([8.0]), np.array([2.0])))
     found = [torque(time)[0] for time in (0.0, 0.45, 0.5, 0.52, 1.0)]
     np.testing.assert_allclose(found, [-9, -5, 0, 2, 7], atol=1e-12)
     assert np.array_equal(
@@ -202,7 +208,8 @@ def test_motion_that_runs_away_is_not_a_number(plan_of: PlanFactory) -> None:
     plan = plan_of('ei5')
     torque = torque_of(plan)
     pieces = replace(torque.pieces, coefficients=1e30 * torque.pieces.coefficients)
-    wild = replace(torque, pieces=pieces, stall=np.full(2, np.inf))
+    wild = replace(torque, pieces=pieces,
+                   limits=TorqueLimits(np.full(2, np.inf), torque.limits.slope))
     began = time.monotonic()
     end = end_of(plan, wild, 1e-8)
     assert np.isnan(end).all()
@@ -238,14 +245,14 @@ def test_monitor_stops_it(plan_of: PlanFactory) -> None:
 def test_hanging_arm_swings_as_scipy_has_it() -> None:
     # without torques, under gravity
     model = ArmModel(load_arm('korayem_hanging'))
-    p = Parameters.of(model.arm, payload_mass=0.5).stacked()
+    p = Parameters.of(model.arm, payload_mass=0.5).physical
     start = np.zeros(12)
     start[:2] = -1.5, -0.5
     breaks = np.linspace(0, 0.4, 5)
     pieces = PiecewisePolynomial(breaks, np.zeros((4, 1, 4)))
-    still = PlannedTorque(pieces, np.full(2, np.inf), np.zeros(2))
+    still = PlannedTorque(pieces, TorqueLimits(np.full(2, np.inf), np.zeros(2)))
     expected = simulate(model, p, start, still, 0.4, rtol=1e-12, atol=1e-14)
-    end = resimulated(model, p, start, still, rtol=1e-11, atol=1e-13)
+    end = integrate(model, p, start, still, rtol=1e-11, atol=1e-13)[-1]
     np.testing.assert_allclose(end, expected, rtol=0, atol=1e-10)
 
 

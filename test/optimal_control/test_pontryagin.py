@@ -12,7 +12,9 @@ from collections.abc import Callable
 
 from flex_planner.arms.arm import Arm
 from flex_planner.base.validation import Array
-from flex_planner.optimal_control.arm_model import ArmModel, Parameters
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.parameters import Parameters
+from flex_planner.optimal_control.torque_limits import TorqueLimits
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
@@ -52,11 +54,11 @@ def points(model: ArmModel, p: Array, share: tuple[float, float], seed: int = 0)
     arm, rng = model.arm, np.random.default_rng(seed)
     n_t = arm.n_coordinates
     x = rng.uniform(-1, 1, (BATCH, 2 * n_t)) * sizes(arm)
-    lower, upper = arm.torque_bounds(x[:, n_t:n_t + 2])
+    lower, upper = TorqueLimits.of(arm).bounds(x[:, n_t:n_t + 2])
     free = np.abs(share) * np.where(np.sign(share) > 0, upper, lower)
     y = rng.normal(size=(BATCH, n_t))
     y[:, :2] = -EFFORT * free
-    mass = model.mass_and_energy(x, p)[0]
+    mass = model.mass_and_energy(x, parameters(arm).physical)[0]
     velocity_costates = (mass @ y[..., None])[..., 0]
     return np.hstack([x, rng.normal(size=(BATCH, n_t)), velocity_costates])
 
@@ -132,9 +134,9 @@ def test_torque_is_eq_14_within_the_bounds_of_eq_15(model: ArmModel,
     p = parameters(model.arm).stacked()
     z = points(model, p, share)
     n_t = model.arm.n_coordinates
-    mass = model.mass_and_energy(z[:, :2 * n_t], p)[0]
+    mass = model.mass_and_energy(z[:, :2 * n_t], parameters(model.arm).physical)[0]
     free = -np.linalg.solve(mass, z[:, 3 * n_t:, None])[:, :2, 0] / EFFORT
-    lower, upper = model.arm.torque_bounds(z[:, n_t:n_t + 2])
+    lower, upper = TorqueLimits.of(model.arm).bounds(z[:, n_t:n_t + 2])
     controls = model.controls(z, p)
     torque = controls.torque
     np.testing.assert_allclose(controls.free_torque, free, rtol=1e-11)  # rounding
@@ -150,7 +152,7 @@ def hamiltonian(model: ArmModel, z: Array, torque: Array, p: Parameters) -> Arra
     q, rates = np.split(x, 2, axis=1)
     cost = (q**2 @ p.position_weights + rates**2 @ p.velocity_weights
             + torque**2 @ p.effort_weights) / 2
-    rate = model.forward_dynamics(x, torque, p.stacked())
+    rate = model.forward_dynamics(x, torque, p.physical)
     return cost + (psi * rate).sum(axis=1)
 
 
@@ -161,7 +163,7 @@ def test_torque_minimises_the_hamiltonian_among_the_admissible_ones(
     z = points(model, p.stacked(), share)
     n_t = model.arm.n_coordinates
     least = model.controls(z, p.stacked()).hamiltonian
-    lower, upper = model.arm.torque_bounds(z[:, n_t:n_t + 2])
+    lower, upper = TorqueLimits.of(model.arm).bounds(z[:, n_t:n_t + 2])
     grid = np.stack(np.meshgrid(*2 * [np.linspace(0, 1, 21)]), -1).reshape(-1, 2)
     for k in range(BATCH):
         torques = lower[k] + grid * (upper[k] - lower[k])
@@ -178,7 +180,7 @@ def test_controls_agree_with_the_dynamics_and_the_cost(model: ArmModel,
     z = points(model, p.stacked(), share)
     n_t = model.arm.n_coordinates
     found = model.controls(z, p.stacked())
-    rate = model.forward_dynamics(z[:, :2 * n_t], found.torque, p.stacked())
+    rate = model.forward_dynamics(z[:, :2 * n_t], found.torque, p.physical)
     still = np.zeros_like(z)
     still[:, :2 * n_t] = z[:, :2 * n_t]
     # rounding, relative to accelerations up to 1e5
@@ -210,7 +212,7 @@ def test_torque_never_leaves_its_bounds(workshop_model: ArmModel, seed: int,
     z = np.random.default_rng(seed).normal(size=(50, 4 * arm.n_coordinates))
     z[:, 2 * arm.n_coordinates:] *= 10**size
     torque = workshop_model.controls(z, parameters(arm).stacked()).torque
-    lower, upper = arm.torque_bounds(z[:, arm.n_coordinates:arm.n_coordinates + 2])
+    lower, upper = TorqueLimits.of(arm).bounds(z[:, arm.n_coordinates:arm.n_coordinates + 2])
     assert (lower <= torque).all()
     assert (torque <= upper).all()
 
@@ -224,7 +226,7 @@ def test_motors_without_limit_give_finite_derivatives(uneven_model: ArmModel) ->
     assert np.isfinite(rate).all()
     assert np.isfinite(jacobian).all()
     n_t = arm.n_coordinates
-    mass = uneven_model.mass_and_energy(z[:, :2 * n_t], p)[0]
+    mass = uneven_model.mass_and_energy(z[:, :2 * n_t], parameters(arm).physical)[0]
     free = -np.linalg.solve(mass, z[:, 3 * n_t:, None])[:, :2, 0] / EFFORT
     np.testing.assert_allclose(controls.torque, free, rtol=1e-10)  # rounding
 

@@ -14,6 +14,7 @@ from typing import NamedTuple
 from flex_planner.cli import main
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import task_parameters
+from flex_planner.optimal_control.torque_limits import TorqueLimits
 from flex_planner.paper.cases import (
     certified,
     NoPlanError,
@@ -207,7 +208,7 @@ def test_turning_arm_takes_its_inertias_and_motors() -> None:
     arm = turning_arm((2.0, 0.0, 1.0), limited=False)
     assert [node.inertia for node in arm.nodes] == [2.0, 0.0, 1.0]
     assert [node.mass for node in arm.nodes] == [0.0, 5.415, 0.83]
-    assert not np.isfinite(arm.torque_bounds(np.zeros(2))).any()
+    assert not np.isfinite(TorqueLimits.of(arm).bounds(np.zeros(2))).any()
     assert [joint.viscous_friction for joint in arm.joints] == [0.05, 0.05]
 
 

@@ -13,7 +13,8 @@ from dataclasses import replace
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import load_arm
 from flex_planner.base.validation import Array
-from flex_planner.optimal_control.arm_model import ArmModel, Parameters
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.parameters import Parameters
 from light_model import LightModel
 import numpy as np
 import pytest
@@ -32,7 +33,7 @@ def swing(model: ArmModel, rigidity: float | None = None, duration: float = DURA
     arm, parameters = model.arm, Parameters.of(model.arm)
     if rigidity is not None:
         parameters = replace(parameters, rigidity=np.full(2, rigidity))
-    rate, start = model.state_rate(parameters.stacked()), np.zeros(2 * arm.n_coordinates)
+    rate, start = model.state_rate(parameters.physical), np.zeros(2 * arm.n_coordinates)
     start[:2] = -1.5, -0.5
     motion = solve_ivp(lambda t, x: rate(x, np.zeros(2)).copy(), (0, duration), start,
                        method='DOP853', t_eval=TIMES[TIMES <= duration], rtol=1e-9, atol=1e-11)
@@ -84,7 +85,7 @@ def test_distance_from_the_rigid_arm_goes_as_the_compliance(model: ArmModel,
 @pytest.mark.parametrize('rigidity', [5.0, 20.0, 100.0])
 def test_energy_of_the_swinging_arm_is_constant(model: ArmModel, rigidity: float) -> None:
     states = swing(model, rigidity)
-    p = replace(Parameters.of(model.arm), rigidity=np.full(2, rigidity)).stacked()
+    p = replace(Parameters.of(model.arm), rigidity=np.full(2, rigidity)).physical
     _, kinetic, potential = model.mass_and_energy(states, p)
     assert kinetic.max() > 0.7  # [J], of its fall
     assert np.ptp(kinetic + potential) < 1e-8  # of the integrator, over hundreds of steps
@@ -108,5 +109,5 @@ def test_arm_hanging_straight_down_stays(model: ArmModel) -> None:
     arm: Arm = model.arm
     x = np.zeros((1, 2 * arm.n_coordinates))
     x[0, 0] = -np.pi / 2
-    rate = model.forward_dynamics(x, np.zeros((1, 2)), Parameters.of(arm).stacked())
+    rate = model.forward_dynamics(x, np.zeros((1, 2)), Parameters.of(arm).physical)
     np.testing.assert_allclose(rate, 0, atol=1e-12)  # rounding of cos(pi / 2)

@@ -21,6 +21,7 @@ from flex_planner.dynamics.statics import residual_vibration
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.planned_torque import PlannedTorque
 from flex_planner.optimal_control.task import Task
+from flex_planner.optimal_control.torque_limits import TorqueLimits
 from flex_planner.planning.certificate import CertificateLimits, certify, hamiltonian_drift
 from flex_planner.planning.plan import Certificate, peaks, Plan, PlanStatus
 from flex_planner.planning.plan_path import plan_path
@@ -111,7 +112,7 @@ def test_flexible_plan_spares_the_vibration_that_a_rigid_one_leaves(
         plan_of: PlanFactory, ei5_model: ArmModel) -> None:
     rigid, flexible = plan_of('rigid'), plan_of('ei5')
     problem = flexible.problem
-    end = simulate(ei5_model, problem.p, problem.start,
+    end = simulate(ei5_model, problem.parameters.physical, problem.start,
                    PlannedTorque.of(rigid.problem, solution_of(rigid)), 1.0)
     miss = np.linalg.norm(tip_position(ei5_model.arm, end[:6])
                           - tip_position(ei5_model.arm, problem.goal[:6]))
@@ -148,7 +149,7 @@ def test_plan_keeps_the_torque_within_the_bounds(plan_of: PlanFactory, case: Cas
     # rounding of K_1 - K_2 theta'
     assert (samples.torques <= samples.upper_bounds + 1e-12).all()
     assert (samples.torques >= samples.lower_bounds - 1e-12).all()
-    lower, upper = plan_of(*case).arm.torque_bounds(samples.rates[:, :2])
+    lower, upper = TorqueLimits.of(plan_of(*case).arm).bounds(samples.rates[:, :2])
     assert np.array_equal(samples.lower_bounds, lower)
     assert np.array_equal(samples.upper_bounds, upper)
 
@@ -184,7 +185,8 @@ def test_hamiltonian_of_a_saturated_motion_is_constant_to_rounding_on_a_finer_me
     ('rigid', 1.0, 10.0), ('ei5', 1.0, 0.0), ('rigid', 5.5, 0.0), ('rigid', 5.5, 200.0)], ids=str)
 def test_torques_lead_another_integrator_to_the_goal(plan_of: PlanFactory, case: Case) -> None:
     plan = plan_of(*case)
-    rate, samples = plan.model.state_rate(plan.problem.p), plan.uniform_samples(4001)
+    rate = plan.model.state_rate(plan.problem.parameters.physical)
+    samples = plan.uniform_samples(4001)
 
     def torque(t: float) -> list[float]:
         return [np.interp(t, samples.times, column) for column in samples.torques.T]
@@ -207,7 +209,7 @@ def test_samples_agree_with_one_another(plan_of: PlanFactory, case: Case) -> Non
     np.testing.assert_allclose(slope, at.accelerations,
                                atol=1e-7 * np.abs(at.accelerations).max())
     forces = plan.model.inverse_dynamics(np.hstack([at.coordinates, at.rates]),
-                                         at.accelerations, plan.problem.p)
+                                         at.accelerations, plan.problem.parameters.physical)
     np.testing.assert_allclose(forces[:, :2], at.torques, atol=1e-13)  # rounding
     np.testing.assert_array_equal(at.tip, tip_position(plan.arm, at.coordinates))
 

@@ -9,8 +9,10 @@ from flex_planner.arms.arm import Arm
 from flex_planner.base.errors import InvalidTaskError, InvalidValueError, NotFiniteError
 from flex_planner.base.progress import Monitor, StoppedError
 from flex_planner.capacity.max_payload import find_max_payload
-from flex_planner.optimal_control.arm_model import ArmModel, Parameters
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.optimal_control.task import Task
+from flex_planner.optimal_control.torque_limits import TorqueLimits
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.sampling import (
@@ -93,7 +95,7 @@ def test_motion_starts_and_ends_exactly_at_rest(plan: Plan) -> None:
 def test_last_effort_holds_the_arm(plan: Plan) -> None:
     samples = sample_plan(plan, SamplingSettings()).samples
     n, n_t = plan.arm.n_joints, plan.arm.n_coordinates
-    p = Parameters.of(plan.arm, payload_mass=plan.task.payload_mass).stacked()
+    p = Parameters.of(plan.arm, payload_mass=plan.task.payload_mass).physical
     still = np.concatenate([samples.coordinates[-1], np.zeros(n_t)])[None]
     force = plan.model.inverse_dynamics(still, np.zeros((1, n_t)), p)[0]
     np.testing.assert_allclose(samples.torques[-1], force[:n], atol=1e-9)
@@ -141,7 +143,7 @@ def test_samples_lie_on_switches_and_are_dense_only_where_torques_bend(saturated
     assert reference.times_ns.size <= 110
     assert steps.min() < 2_000_000 < 9_000_000 < steps.max() <= 10_000_000
     at_limits = reference.samples.torques[np.isin(reference.times_ns, switches)]
-    bounds = saturated.arm.torque_bounds(
+    bounds = TorqueLimits.of(saturated.arm).bounds(
         reference.samples.rates[np.isin(reference.times_ns, switches), :2])
     nearest = np.abs(np.stack(bounds) - at_limits).min(axis=(0, 2))
     assert (nearest < 1e-3).all()

@@ -17,7 +17,7 @@ from flex_planner.base.errors import RecordingError
 from flex_planner.base.progress import Monitor, StoppedError
 from flex_planner.base.validation import Array
 from flex_planner.cli import main
-from flex_planner.dynamics.integration import simulate
+from flex_planner.dynamics.integration import integrate, LinearTorque, simulate
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.recording import (
     definition_folder,
@@ -27,7 +27,6 @@ from flex_planner.recording import (
     Recording,
 )
 from flex_planner.reports.recording import check_motion, RecordedRequest, report_page, write_report
-from flex_planner.reports.recording.check import resimulated_states
 from flex_planner.reports.recording.frequencies import NaturalFrequencies
 from flex_planner.reports.recording.spectra import spectrum
 import numpy as np
@@ -179,12 +178,12 @@ def test_plan_of_another_task_is_found_out(request_of_plan: RecordedRequest,
 
 def test_resimulation_agrees_with_an_integrator_of_another_kind(
         ei50_model: ArmModel, request_of_plan: RecordedRequest) -> None:
-    motion, p = request_of_plan.motion, request_of_plan.parameters.stacked()
+    motion, p = request_of_plan.motion, request_of_plan.parameters.physical
     assert motion is not None
     times = np.linspace(0, 0.1, 5)
     torques = np.array([np.interp(times, motion.times, column) for column in motion.torques.T]).T
     start = np.concatenate([motion.coordinates[0], motion.rates[0]])
-    ours = resimulated_states(ei50_model, p, start, times, torques, Monitor())
+    ours = integrate(ei50_model, p, start, LinearTorque(times, torques), rtol=1e-10, atol=1e-12)
     state = start
     for k, length in enumerate(np.diff(times)):
         slope = (torques[k + 1] - torques[k]) / length

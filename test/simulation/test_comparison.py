@@ -12,9 +12,10 @@ from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import load_arm
 from flex_planner.base.errors import InvalidSizeError, InvalidTaskError, InvalidValueError
 from flex_planner.base.progress import Monitor, StoppedError
+from flex_planner.dynamics.integration import integrate
 from flex_planner.dynamics.statics import residual_vibration
 from flex_planner.optimal_control.arm_model import ArmModel
-from flex_planner.optimal_control.planned_torque import PlannedTorque, resimulated
+from flex_planner.optimal_control.planned_torque import PlannedTorque
 from flex_planner.optimal_control.task import postures_from_points, Task
 from flex_planner.planning.plan import PlanStatus
 from flex_planner.plotting.comparison import draw_comparison
@@ -52,7 +53,7 @@ def test_rigid_plan_is_as_wrong_by_another_integrator(compared: Comparison) -> N
     assert rigid.solution is not None
     torque = PlannedTorque.of(rigid.problem, rigid.solution)
     start = compared.flexible.problem.start
-    state = resimulated(model, compared.flexible.problem.p, start, torque)
+    state = integrate(model, compared.flexible.problem.parameters.physical, start, torque)[-1]
     outcome = compared.of(ExecutionMode.RIGID_OPEN)
     index = np.searchsorted(outcome.execution.times, 1.0 - 1e-9)
     found = outcome.execution.coordinates[index]

@@ -7,9 +7,9 @@ from typing import Any
 
 from flex_planner.arms.arm import Arm, Joint, Link
 from flex_planner.base.errors import InvalidSizeError, InvalidValueError, NotFiniteError
-from flex_planner.dynamics.arm_dynamics import PlantModel
+from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.statics import equilibrium, natural_modes
-from flex_planner.optimal_control.arm_model import Parameters
+from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.simulation.joint_control import Disturbance, Gains, JointReference
 from flex_planner.simulation.mismatch import Mismatch
 from flex_planner.simulation.plant import Control, Plant
@@ -29,7 +29,7 @@ def rod() -> Arm:
 def turned(seconds: float, mismatch: Mismatch | None = None, payload_mass: float = PAYLOAD,
            torque: float = TORQUE, disturbance: Disturbance | None = None) -> Plant:
     """Return the rod after a torque has turned it."""
-    plant = Plant(PlantModel((mismatch or Mismatch()).applied(rod())),
+    plant = Plant(ArmDynamics((mismatch or Mismatch()).applied(rod())),
                   Control(gains=Gains.of(1, 0, 0), disturbance=disturbance or Disturbance()),
                   payload_mass=payload_mass, positions=np.zeros(1))
     plant.advance(0.05)  # at rest before it is told to move
@@ -70,7 +70,7 @@ def test_sag_and_frequencies_follow_the_stiffness(workshop_arm: Arm) -> None:
     soft = Mismatch(rigidity_scale=0.81).applied(workshop_arm)
     posture, found = np.array([-1.3, 0.3]), []
     for arm in (workshop_arm, soft):
-        model, parameters = PlantModel(arm), Parameters.of(arm, payload_mass=0.3)
+        model, parameters = ArmDynamics(arm), Parameters.of(arm, payload_mass=0.3)
         rest, _ = equilibrium(model, posture, parameters)
         found.append((rest[2:], natural_modes(model, rest, parameters, locked=True)[0]))
     # the load of pinned links does not depend on their bending: the sag is linear
@@ -80,7 +80,7 @@ def test_sag_and_frequencies_follow_the_stiffness(workshop_arm: Arm) -> None:
 
 def test_more_modes_are_those_of_the_beam(ei5_arm: Arm) -> None:
     arm = Mismatch(modes=3).applied(ei5_arm)
-    model, parameters = PlantModel(arm), Parameters.of(arm)
+    model, parameters = ArmDynamics(arm), Parameters.of(arm)
     rates, _ = natural_modes(model, np.zeros(8), parameters, locked=True)
     # (j pi / L)^2 sqrt(E I / rho) of a supported beam, once for each link
     expected = (np.array([1, 1, 2, 2, 3, 3]) * np.pi / 0.5)**2 * np.sqrt(5 / 6)

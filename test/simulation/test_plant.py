@@ -9,9 +9,10 @@ from typing import Any
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.errors import InvalidSizeError, InvalidValueError, NotFiniteError
-from flex_planner.dynamics.arm_dynamics import PlantModel
+from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.integration import simulate
 from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.torque_limits import TorqueLimits
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.sampling import sample_plan, SamplingSettings
@@ -35,13 +36,13 @@ def plan(ei50_model: ArmModel, ei50_arm: Arm, paper_task: Any) -> Plan:
 
 
 @pytest.fixture(scope='module')
-def ei50_plant(ei50_arm: Arm) -> PlantModel:
-    return PlantModel(ei50_arm)
+def ei50_plant(ei50_arm: Arm) -> ArmDynamics:
+    return ArmDynamics(ei50_arm)
 
 
 @pytest.fixture(scope='module')
-def workshop_plant(workshop_arm: Arm) -> PlantModel:
-    return PlantModel(workshop_arm)
+def workshop_plant(workshop_arm: Arm) -> ArmDynamics:
+    return ArmDynamics(workshop_arm)
 
 
 @pytest.fixture(scope='module')
@@ -51,7 +52,7 @@ def reference(plan: Plan) -> JointReference:
 
 def plant_at_start(plan: Plan, gains: Gains = GAINS, payload_mass: float = 1.0,
                    **control: Any) -> Plant:
-    return Plant(PlantModel(plan.arm), Control(gains=gains, **control),
+    return Plant(ArmDynamics(plan.arm), Control(gains=gains, **control),
                  payload_mass=payload_mass, positions=plan.task.start_positions)
 
 
@@ -62,7 +63,7 @@ def distance_to_goal(plan: Plan, plant: Plant) -> float:
     return float(np.linalg.norm(tips[0] - tips[1]))
 
 
-def test_plant_at_rest_stays_under_gravity(workshop_plant: PlantModel) -> None:
+def test_plant_at_rest_stays_under_gravity(workshop_plant: ArmDynamics) -> None:
     plant = Plant(workshop_plant, Control(gains=GAINS), payload_mass=0.3, positions=POSTURE)
     before, holding = plant.state.copy(), plant.torque.copy()
     plant.advance(1.0)
@@ -72,7 +73,7 @@ def test_plant_at_rest_stays_under_gravity(workshop_plant: PlantModel) -> None:
 
 
 def test_arm_that_sags_under_more_load_than_known_leaves_its_place(
-        workshop_plant: PlantModel) -> None:
+        workshop_plant: ArmDynamics) -> None:
     plant = Plant(workshop_plant, Control(gains=GAINS), payload_mass=0.3, positions=POSTURE)
     before = plant.state.copy()
     plant.follow(JointReference.hold(before[:2], np.zeros(2)))
@@ -135,7 +136,7 @@ def test_torque_never_leaves_the_bounds_of_the_motors(plan: Plan) -> None:
     plant.follow(JointReference.hold(plan.task.start_positions + [1.0, -0.5], np.zeros(2)))
     reached = 0
     for k in range(1, 301):
-        lower, upper = plan.arm.torque_bounds(plant.state[6:8])
+        lower, upper = TorqueLimits.of(plan.arm).bounds(plant.state[6:8])
         plant.advance(k * PERIOD)
         assert (lower <= plant.torque).all()
         assert (plant.torque <= upper).all()
@@ -190,7 +191,7 @@ def test_heavier_payload_than_planned_shows_at_the_tip(plan: Plan,
     ({'disturbance': {'duration': -1.0}}, InvalidValueError, 'disturbance_duration is -1.0'),
     ({'encoder': {'rate': -1.0}}, InvalidValueError, 'encoder_rate is -1.0'),
     ({'encoder': {'resolution': 2.0}}, InvalidValueError, 'encoder_resolution is 2.0')])
-def test_bad_plant_is_refused(ei50_plant: PlantModel, changes: dict[str, Any],
+def test_bad_plant_is_refused(ei50_plant: ArmDynamics, changes: dict[str, Any],
                               error: type[Exception], text: str) -> None:
     values = {'payload_mass': 1.0, 'positions': [0.1, 0.2], 'stiffness': np.ones(2),
               'damping': np.ones(2), 'rate': 1e3, 'disturbance': {}, 'encoder': {}, **changes}
@@ -202,7 +203,7 @@ def test_bad_plant_is_refused(ei50_plant: PlantModel, changes: dict[str, Any],
             payload_mass=values['payload_mass'], positions=values['positions'])
 
 
-def test_plant_integrates_as_scipy_does(workshop_plant: PlantModel) -> None:
+def test_plant_integrates_as_scipy_does(workshop_plant: ArmDynamics) -> None:
     # held for 50 ms each, so that the integrator meets torques that are constant
     rate, torques = 20.0, np.random.default_rng(1).uniform(-3, 3, (12, 2))
     plant = Plant(workshop_plant, Control(gains=FREE, rate=rate, limit_torques=False),
@@ -213,7 +214,7 @@ def test_plant_integrates_as_scipy_does(workshop_plant: PlantModel) -> None:
     for k in range(12):
         plant.advance((k + 1) / rate)
         held = plant.torque.copy()
-        state = simulate(workshop_plant, plant.parameters.stacked(), state, lambda t, u=held: u,
+        state = simulate(workshop_plant, plant.parameters.physical, state, lambda t, u=held: u,
                          1 / rate, rtol=1e-11, atol=1e-13)
         # every step is good to 1e-8 of the state
         np.testing.assert_allclose(plant.state, state, rtol=1e-6, atol=2e-7)
@@ -222,7 +223,7 @@ def test_plant_integrates_as_scipy_does(workshop_plant: PlantModel) -> None:
 
 
 @pytest.mark.parametrize('rate', [50.0, 2000.0])
-def test_error_of_a_step_is_watched_at_every_rate(ei50_plant: PlantModel, rate: float) -> None:
+def test_error_of_a_step_is_watched_at_every_rate(ei50_plant: ArmDynamics, rate: float) -> None:
     plants = [Plant(ei50_plant, Control(gains=FREE, rate=each, limit_torques=False),
                     payload_mass=1.0, positions=POSTURE) for each in (rate, 1000.0)]
     for plant in plants:

@@ -53,7 +53,8 @@ def share_of(problem: MotionProblem, solution: CollocationSolution) -> float:
 def end_state(plan: Plan, rtol: float = 1e-9) -> Array:
     """Return where the planned torques lead SciPy's integrator."""
     torque = PlannedTorque.of(plan.problem, solution_of(plan))
-    return simulate(plan.model, plan.problem.p, plan.problem.start, torque, plan.task.duration,
+    return simulate(plan.model, plan.problem.parameters.physical, plan.problem.start, torque,
+                    plan.task.duration,
                     rtol=rtol, atol=rtol / 100)
 
 

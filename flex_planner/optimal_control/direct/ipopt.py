@@ -17,8 +17,10 @@ from typing import Any
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.progress import Monitor, StopReason
 from flex_planner.base.validation import Array, integer, number, vector
-from flex_planner.optimal_control.arm_model import ArmModel, Parameters
-from flex_planner.optimal_control.direct.programme import Mesh, Programme, SCHEMES
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.direct.mesh import Mesh, SCHEMES
+from flex_planner.optimal_control.direct.programme import Programme
+from flex_planner.optimal_control.parameters import Parameters
 import numpy as np
 
 Guess = Callable[[Array], Array]

@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 
 from flex_planner.arms.arm_files import load_arm
 from flex_planner.base.validation import Array
-from flex_planner.optimal_control.arm_model import ArmModel, Parameters
+from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectSettings
+from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.paper.evidence import (
     Claim,
     confirmed_if,
@@ -43,7 +44,7 @@ def swing(model: ArmModel, rigidity: float | None = None, duration: float = _DUR
     parameters = Parameters.of(model.arm)
     if rigidity is not None:
         parameters = replace(parameters, rigidity=np.full(2, rigidity))
-    p, start = parameters.stacked(), np.zeros(2 * model.arm.n_coordinates)
+    p, start = parameters.physical, np.zeros(2 * model.arm.n_coordinates)
     start[:2] = START
     rate, none = model.state_rate(p), np.zeros(2)
     times = np.linspace(0, duration, round((_POINTS - 1) * duration / _DURATION) + 1,

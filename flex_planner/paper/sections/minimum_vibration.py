@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.statics import natural_modes
-from flex_planner.optimal_control.arm_model import ArmModel, Parameters
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.paper.cases import certified, turn, turning_arm, VIBRATION_WEIGHT
 from flex_planner.paper.checks import checked, shown
 from flex_planner.paper.diagrams import joint_panels, modal_panels, tip_panel

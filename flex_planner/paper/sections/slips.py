@@ -10,8 +10,9 @@ from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationSolution, solve, SolverSettings
 from flex_planner.dynamics.statics import natural_modes
-from flex_planner.optimal_control.arm_model import ArmModel, Parameters
+from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
+from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.paper.cases import (
     certified,
     largest,
@@ -141,7 +142,7 @@ def _appendix() -> Rows:
     for _ in range(20):
         q = np.concatenate([rng.uniform(-3, 3, 2), rng.uniform(-0.05, 0.05, 4)])
         payload = float(rng.uniform(0, 6))
-        parameters = Parameters.of(model.arm, payload_mass=payload).stacked()
+        parameters = Parameters.of(model.arm, payload_mass=payload).physical
         mass = model.mass_and_energy(np.concatenate([q, np.zeros(6)])[None], parameters)[0][0]
         for name, (row, column, value) in _printed(q, payload).items():
             error = float(abs(value - mass[row, column]) / max(abs(mass[row, column]), 1e-9))

@@ -221,7 +221,8 @@ def walked_stiffness(problem: MotionProblem, settings: SolverSettings,
 def _calmed(problem: MotionProblem) -> Callable[[float], MotionProblem]:
     """Return the problem with a price on the kinetic energy of bending, falling to none."""
     n = problem.model.arm.n_joints
-    mass = np.diag(problem.model.mass_and_energy(problem.start[None], problem.p)[0][0])
+    mass = np.diag(problem.model.mass_and_energy(
+        problem.start[None], problem.parameters.physical)[0][0])
     added = np.concatenate([np.zeros(n), mass[n:]])
 
     def at(way: float) -> MotionProblem:

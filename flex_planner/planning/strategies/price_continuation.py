@@ -142,7 +142,7 @@ def reserve(problem: MotionProblem, solution: CollocationSolution) -> float:
     n, n_t = model.arm.n_joints, model.arm.n_coordinates
     z = solution.stage_values().reshape(-1, problem.size)
     torque = model.controls(z, problem.p).torque
-    bound = parameters.torque_limit(torque, z[:, n_t:n_t + n])
+    bound = parameters.torque_limits.toward(torque, z[:, n_t:n_t + n])
     weights = (solution.steps[:, None] * solution.rule.weights).ravel()
     return float(weights @ ((bound**2 - torque**2) @ parameters.effort_weights)) / 2
 

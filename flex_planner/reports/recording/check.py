@@ -15,15 +15,15 @@ from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.errors import RecordingError
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
+from flex_planner.dynamics.integration import integrate, LinearTorque
 from flex_planner.dynamics.statics import equilibrium
-from flex_planner.optimal_control.arm_model import ArmModel, Parameters, RUNGE_KUTTA_STAGES
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.parameters import Parameters
+from flex_planner.optimal_control.torque_limits import TorqueLimits
 from flex_planner.reports.recording.contents import RecordedMotion, RecordedRequest
 import numpy as np
-from scipy.integrate import DOP853
 
-_STAGE_TIMES: Array = np.array(DOP853.C[:RUNGE_KUTTA_STAGES], dtype=float)
-_FINEST = 256  # steps between two samples
-_CONVERGED = 1e-9
+_RTOL = 1e-10
 _TINY = float(np.finfo(float).tiny)
 
 
@@ -146,49 +146,15 @@ def check_motion(request: RecordedRequest, model: ArmModel | None = None,
                              f'{request.report.error_msg or "it failed"}')
     model, limits = model or ArmModel(request.arm), limits or CheckLimits()
     ends = [_at_rest(model, row, parameters) for row in motion.coordinates[[0, -1]]]
-    states = resimulated_states(model, parameters.stacked(), ends[0], motion.times,
-                                motion.torques, monitor or Monitor())
+    states = integrate(model, parameters.physical, ends[0],
+                       LinearTorque(motion.times, motion.torques), monitor, rtol=_RTOL,
+                       atol=_RTOL / 100)
     tip = tip_position(request.arm, states[:, :request.arm.n_coordinates])
     return MotionCheck(tip=tip, findings=(
         *_resimulation(request, motion, states[-1] - ends[1], tip, limits),
         _joint_path(motion, states, request.arm.n_joints, limits),
         *_ends(motion, ends, limits), *_asked(request, motion, limits),
         *_optimality(model, motion, parameters, limits)))
-
-
-def resimulated_states(model: ArmModel, p: Array, start: Array, times: Array, torques: Array,
-                       monitor: Monitor) -> Array:
-    """
-    Return the states (k, 2 n_t) at times (k,) under torques (k, n), linear in between.
-
-    Equal steps of order 8 between two times, twice as many until it makes no difference; NaN
-    if it always does.
-
-    Raises
-    ------
-    StoppedError
-        If the monitor stopped it.
-
-    """
-    advance, before, count = model.runge_kutta_steps(p), np.full(start.size, np.nan), 1
-    while True:
-        shares = ((np.arange(count)[:, None] + _STAGE_TIMES) / count)[:, :, None]
-        states = np.full((times.size, start.size), np.nan)
-        states[0] = start
-        with np.errstate(over='ignore', invalid='ignore'):
-            for k, length in enumerate(np.diff(times)):
-                monitor.check()
-                stages = torques[k] + shares * (torques[k + 1] - torques[k])
-                states[k + 1] = advance(states[k], stages.reshape(count, -1),
-                                        float(length) / count)[0][-1]
-                if not np.isfinite(states[k + 1]).all():
-                    break  # it ran away
-        change = np.abs(states[-1] - before).max()
-        if change <= _CONVERGED:
-            return states
-        if count == _FINEST:
-            return np.full_like(states, np.nan)
-        before, count = states[-1], 2 * count
 
 
 def _at_rest(model: ArmModel, coordinates: Array, parameters: Parameters) -> Array:
@@ -250,7 +216,7 @@ def _optimality(model: ArmModel, motion: RecordedMotion, parameters: Parameters,
                 limits: CheckLimits) -> list[Finding]:
     """Return whether torques keep their bounds and follow from the costates."""
     n, size = model.arm.n_joints, max(float(np.abs(motion.torques).max()), _TINY)
-    lower, upper = model.arm.torque_bounds(motion.rates[:, :n])
+    lower, upper = TorqueLimits.of(model.arm).bounds(motion.rates[:, :n])
     bounds = np.where(motion.torques >= 0, upper, -lower)
     # the last sample holds the arm, it is not of the extremal
     z = np.hstack([motion.coordinates, motion.rates, motion.position_costates,

@@ -10,7 +10,7 @@ from typing import Any
 from flex_planner.arms.arm import Arm, Joint, Link, Motor, Node
 from flex_planner.base.errors import FlexPlannerError, RecordingError
 from flex_planner.base.validation import Array
-from flex_planner.optimal_control.arm_model import Parameters
+from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.recording import (
     definition_folder,
     MessageTypes,

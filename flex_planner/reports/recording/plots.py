@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from flex_planner.base.validation import Array
+from flex_planner.optimal_control.torque_limits import TorqueLimits
 from flex_planner.reports.recording.check import MotionCheck
 from flex_planner.reports.recording.contents import RecordedMotion, RecordedRequest
 from flex_planner.reports.recording.frequencies import NaturalFrequencies
@@ -138,7 +139,7 @@ def _torques(request: RecordedRequest, motion: RecordedMotion) -> Plot:
     plot = _over_time('torques', 'Torques between their bounds', 'torque [N m]', motion.times,
                       motion.torques, request.joint_names)
     for name, values in zip(('lowest', 'highest'),
-                            request.arm.torque_bounds(motion.rates[:, :n]), strict=True):
+                            TorqueLimits.of(request.arm).bounds(motion.rates[:, :n]), strict=True):
         plot.series.extend(
             Series(name=f'{joint} {name}', x=motion.times, y=values[:, i], colour=i, dashed=True)
             for i, joint in enumerate(request.joint_names) if np.isfinite(values[:, i]).any())

@@ -21,7 +21,7 @@ from flex_planner.base.progress import Monitor, Progress
 from flex_planner.base.validation import Array
 from flex_planner.collocation import GaussRule, SolverSettings
 from flex_planner.dynamics.statics import equilibrium
-from flex_planner.optimal_control.arm_model import ArmModel, Parameters
+from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.direct.ipopt import (
     DirectProblem,
     DirectResult,
@@ -29,8 +29,9 @@ from flex_planner.optimal_control.direct.ipopt import (
     DirectStatus,
     solve_direct,
 )
-from flex_planner.optimal_control.direct.programme import Mesh, SCHEMES
+from flex_planner.optimal_control.direct.mesh import Mesh, SCHEMES
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
+from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_path

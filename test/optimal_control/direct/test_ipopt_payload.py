@@ -18,7 +18,8 @@ from flex_planner.optimal_control.direct.ipopt import (
     DirectSettings,
     DirectStatus,
 )
-from flex_planner.optimal_control.direct.programme import Mesh, Programme, SCHEMES
+from flex_planner.optimal_control.direct.mesh import Mesh, SCHEMES
+from flex_planner.optimal_control.direct.programme import Programme
 from flex_planner.optimal_control.free_payload import PayloadProblem
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import Task

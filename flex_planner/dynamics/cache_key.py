@@ -1,0 +1,58 @@
+"""
+Under which name the compiled functions of an arm are kept.
+
+All sources that may enter them count, and all fields of the arm but a few that are known not to:
+a new file or a new field makes a new name, so that stale machine code is never read.
+
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields, is_dataclass
+from functools import cache
+import json
+from pathlib import Path
+
+from flex_planner.arms.arm import Arm
+from flex_planner.dynamics.compiled_functions import content_key
+import numpy as np
+
+# symbols in the functions, or nothing that they contain
+FREE_FIELDS = frozenset({'Arm.name', 'Arm.source', 'Link.flexural_rigidity', 'Joint.motor',
+                         'Joint.lower_limit', 'Joint.upper_limit'})
+_PACKAGES = Path(__file__).parents[1]
+
+
+def cache_key(arm: Arm, *packages: str) -> str:
+    """
+    Return the name of an arm's library.
+
+    Parameters
+    ----------
+    arm : Arm
+        Its fields enter, except for `FREE_FIELDS`.
+    packages : str
+        Folders of flex_planner whose sources the functions are derived by, besides ``arms``.
+
+    """
+    return content_key(json.dumps(_structure(arm)), *packages,
+                       *map(_sources, ('arms', *packages)))
+
+
+def _structure(value: object) -> object:
+    """Return the fields of nested dataclasses by name, as JSON can hold them."""
+    if is_dataclass(value):
+        own = type(value).__name__
+        return {field.name: _structure(getattr(value, field.name))
+                for field in fields(value) if f'{own}.{field.name}' not in FREE_FIELDS}
+    if isinstance(value, tuple):
+        return [_structure(entry) for entry in value]
+    return value.tolist() if isinstance(value, np.ndarray) else value
+
+
+@cache
+def _sources(package: str) -> bytes:
+    """Return the names and contents of all modules of a folder."""
+    paths = sorted((_PACKAGES / package).rglob('*.py'))
+    return b''.join(str(path.relative_to(_PACKAGES)).encode() + b'\0' + path.read_bytes()
+                    for path in paths)

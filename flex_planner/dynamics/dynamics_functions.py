@@ -1,0 +1,95 @@
+"""The equations of motion of an arm as CasADi functions, eqs. (3) and (5), and their steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import casadi as ca
+from flex_planner.arms.arm import Arm
+from flex_planner.dynamics.chain import Chain
+from flex_planner.dynamics.planar_chain import build_chain
+
+BatchedFunction = tuple[Any, int]
+"""A CasADi function, and how many of its leading inputs differ from point to point."""
+
+
+def build_dynamics_functions(arm: Arm) -> dict[str, BatchedFunction]:
+    """
+    Derive the functions that simulating an arm takes.
+
+    Every function takes `PhysicalParameters.physical` last.
+
+    Parameters
+    ----------
+    arm : Arm
+        n joints, n_t coordinates.
+
+    Returns
+    -------
+    dict of str to (casadi.Function, int)
+        The int counts the leading inputs that differ from point to point.
+
+        - ``forward_dynamics`` (x, u) -> x', eq. (5)
+        - ``runge_kutta_step`` (x, torques at the stages, step) -> next x and the two error
+          estimates of the Dormand-Prince method of order 8
+        - ``inverse_dynamics`` (x, a) -> generalized forces, eq. (3)
+        - ``mass_and_energy`` x -> M, kinetic energy, potential energy
+        - ``static_forces`` q -> dV/dq, d2V/dq2 with V the potential energy
+
+    """
+    chain = build_chain(arm)
+    q, rates = chain.coordinates, chain.rates
+    x, p = ca.vertcat(q, rates), physical_symbols(chain)
+    u, a = ca.SX.sym('u', arm.n_joints), ca.SX.sym('a', arm.n_coordinates)
+    M = chain.mass_matrix()
+    forces = ca.vertcat(u, ca.SX(arm.n_modes, 1))
+    acceleration = solver_of(M)(forces - chain.bias())
+    rate = batched('forward_dynamics', [x, u], p, [ca.vertcat(rates, acceleration)])
+    return {
+        'forward_dynamics': rate,
+        'runge_kutta_step': _runge_kutta_step(rate[0]),
+        'inverse_dynamics': batched('inverse_dynamics', [x, a], p, [chain.inverse_dynamics(a)]),
+        'mass_and_energy': batched('mass_and_energy', [x], p,
+                                   [M, chain.kinetic, chain.potential]),
+        'static_forces': batched('static_forces', [q], p, [
+            ca.gradient(chain.potential, q), ca.hessian(chain.potential, q)[0]]),
+    }
+
+
+def physical_symbols(chain: Chain) -> Any:
+    """Return the free parameters of a chain in the order of `PhysicalParameters.physical`."""
+    return ca.vertcat(chain.payload_mass, chain.payload_inertia, chain.rigidity)
+
+
+def batched(name: str, inputs: Sequence[Any], p: Any, results: Sequence[Any]) -> BatchedFunction:
+    """Return a function of points and shared parameters p with dense results."""
+    dense = [ca.densify(result) for result in results]
+    return ca.Function(name, [*inputs, p], dense), len(inputs)
+
+
+def solver_of(matrix: Any) -> Callable[[Any], Any]:
+    """Return the solver of a symmetric positive definite matrix, by unrolled LDL^T."""
+    D, LT, order = ca.ldl(matrix, False)
+    return lambda rhs: ca.ldl_solve(rhs, D, LT, order)
+
+
+def _runge_kutta_step(rate: Any) -> BatchedFunction:
+    """Return one step of DOP853, with SciPy's coefficients, of x' = rate(x, u, p)."""
+    from scipy.integrate import DOP853
+
+    x, u = ca.MX.sym('x', rate.size1_in(0)), ca.MX.sym('u', rate.size1_in(1), DOP853.n_stages)
+    step, p = ca.MX.sym('h'), ca.MX.sym('p', rate.size1_in(2))
+    slopes: list[Any] = []
+    for i in range(DOP853.n_stages):
+        slopes.append(rate(x + step * _combined(DOP853.A[i, :i], slopes), u[:, i], p))
+    following = x + step * _combined(DOP853.B, slopes)
+    # the last stage of the error estimate is at the end of the step, as stage 12 is
+    slopes.append(rate(following, u[:, DOP853.n_stages - 1], p))
+    errors = [step * _combined(row, slopes) for row in (DOP853.E5, DOP853.E3)]
+    return ca.Function('runge_kutta_step', [x, ca.vec(u), step, p], [following, *errors]), 3
+
+
+def _combined(weights: Any, vectors: list[Any]) -> Any:
+    """Return the sum of weighted vectors; 0 for none."""
+    return sum((float(w) * v for w, v in zip(weights, vectors, strict=True) if w), 0)

@@ -1,0 +1,120 @@
+"""
+The parameters of the optimality conditions, as numbers and as symbols in one order.
+
+`Parameters` says which there are; its fields in the order of their definition make the vector
+that compiled functions take. Symbols with the same names stand for them in expressions.
+
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any, TYPE_CHECKING
+
+from flex_planner.arms.arm import Arm
+from flex_planner.base.validation import Array
+from flex_planner.dynamics.physical_parameters import PhysicalParameters
+from flex_planner.optimal_control.torque_limits import TorqueLimits
+import numpy as np
+
+if TYPE_CHECKING:  # it imports CasADi, which takes as long as a plan
+    from flex_planner.dynamics.chain import Chain
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Parameters(PhysicalParameters):
+    """
+    What may change without compiling an arm again.
+
+    Attributes
+    ----------
+    payload_mass, payload_inertia : float
+        m_p [kg] and its rotary inertia [kg m^2].
+    rigidity : numpy.ndarray, shape (n,)
+        E I of each link [N m^2].
+    stall_torque, torque_slope : numpy.ndarray, shape (n,)
+        K_1 [N m] and K_2 [N m s/rad] of eq. (15).
+    effort_weights : numpy.ndarray, shape (n,)
+        Diagonal of R.
+    position_weights, velocity_weights : numpy.ndarray, shape (n_t,)
+        Diagonals of W_1 and W_2.
+
+    """
+
+    stall_torque: Array
+    torque_slope: Array
+    effort_weights: Array
+    position_weights: Array
+    velocity_weights: Array
+
+    @classmethod
+    def of(cls, arm: Arm, *, payload_mass: float = 0.0, payload_inertia: float = 0.0,
+           effort_weights: Array | None = None, position_weights: Array | None = None,
+           velocity_weights: Array | None = None) -> Parameters:
+        """Return the parameters of an arm; weights default to R = 1, W_1 = W_2 = 0."""
+        limits = TorqueLimits.of(arm)
+
+        def default(weights: Array | None, fallback: Array) -> Array:
+            return fallback if weights is None else weights
+
+        return cls(payload_mass=payload_mass, payload_inertia=payload_inertia,
+                   rigidity=arm.flexural_rigidities(),
+                   stall_torque=limits.stall, torque_slope=limits.slope,
+                   effort_weights=default(effort_weights, np.ones(arm.n_joints)),
+                   position_weights=default(position_weights, np.zeros(arm.n_coordinates)),
+                   velocity_weights=default(velocity_weights, np.zeros(arm.n_coordinates)))
+
+    @property
+    def torque_limits(self) -> TorqueLimits:
+        """Return the motors' limits of eq. (15)."""
+        return TorqueLimits(self.stall_torque, self.torque_slope)
+
+    def stacked(self) -> Array:
+        """Return them as one vector, as the compiled optimality conditions take them."""
+        return np.concatenate([np.atleast_1d(getattr(self, name)) for name in NAMES])
+
+
+NAMES = tuple(field.name for field in fields(Parameters))
+
+
+def payload_index() -> int:
+    """Return where the payload's mass is in the vector."""
+    return NAMES.index('payload_mass')
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ParameterSymbols:
+    """
+    `Parameters` as CasADi symbols of a chain.
+
+    Attributes
+    ----------
+    values : dict of str to casadi.SX
+        By the names of the fields of `Parameters`.
+
+    """
+
+    values: dict[str, Any]
+
+    @classmethod
+    def of(cls, chain: Chain) -> ParameterSymbols:
+        """Create the symbols; payload and stiffness are those of the chain."""
+        n_t, n = chain.coordinates.numel(), chain.rigidity.numel()
+        create = type(chain.coordinates).sym
+        sizes = {'stall_torque': n, 'torque_slope': n, 'effort_weights': n,
+                 'position_weights': n_t, 'velocity_weights': n_t}
+        own = {name: create(name, size) for name, size in sizes.items()}
+        return cls({'payload_mass': chain.payload_mass, 'payload_inertia': chain.payload_inertia,
+                    'rigidity': chain.rigidity, **own})
+
+    def __getitem__(self, name: str) -> Any:
+        return self.values[name]
+
+    @property
+    def torque_limits(self) -> TorqueLimits:
+        """Return the motors' limits of eq. (15)."""
+        return TorqueLimits(self['stall_torque'], self['torque_slope'])
+
+    def stacked(self) -> list[Any]:
+        """Return the symbols in the order of `Parameters.stacked`."""
+        return [self.values[name] for name in NAMES]
