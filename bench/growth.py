@@ -14,7 +14,7 @@ from bench.model import uniform_arm
 from bench.solver import paper_problem
 from flex_planner.arms.arm import Arm, Motor
 from flex_planner.base.progress import Monitor
-from flex_planner.collocation import SolverSettings
+from flex_planner.collocation import Solver, SolverSettings
 from flex_planner.collocation.equations import collocation_residual, factorised, linearised
 from flex_planner.collocation.estimate import estimated
 from flex_planner.collocation.mesh import defects
@@ -93,7 +93,7 @@ def table(rows: list[Growth]) -> str:
 def shares(payload: float = 1.0, repeats: int = 15) -> dict[str, float]:
     """Return the time of each part of a plan on its final mesh [ms]."""
     problem = paper_problem(payload)
-    result = cold_start(problem, SolverSettings(), Monitor()).result
+    result = cold_start(problem, Solver()).result
     solution = result.solution.on_mesh(result.solution.mesh, SolverSettings().rule)
     _, mean = linearised(problem, solution, Monitor())
     system = factorised(problem, solution, mean)

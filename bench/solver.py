@@ -24,11 +24,11 @@ from bench.rivals import (
 )
 from flex_planner.arms.arm_files import load_arm
 from flex_planner.base.progress import Monitor
-from flex_planner.collocation import CollocationResult, solve, SolverSettings
+from flex_planner.collocation import CollocationResult, Solver, SolverSettings
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
 from flex_planner.optimal_control.task import postures_from_points, Task
-from flex_planner.planning.certificate import totals
+from flex_planner.optimal_control.totals import integrate_totals
 from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.strategies.initial_guesses import cold_start
 import numpy as np
@@ -96,7 +96,7 @@ def measure(payload: float) -> list[Row]:
     """Return the rows of one payload."""
     problem = paper_problem(payload)
     exact = plan_path(problem.task, model=problem.model,
-                      settings=SolverSettings(error_tolerance=1e-10))
+                      solver=Solver(SolverSettings(error_tolerance=1e-10)))
     reference = Reference.of(exact)
     rows = _rows('flex_planner', problem, reference, _cold, _warm, OURS, repeats=9)
     for name, (cold, warm, levels) in RIVALS.items():
@@ -141,15 +141,16 @@ def _searched(problem: MotionProblem, reference: Reference, cold: Runner,
 
 def _cold(problem: MotionProblem, tolerance: float, monitor: Monitor) -> Run:
     began = time.perf_counter()
-    result = cold_start(problem, SolverSettings(error_tolerance=tolerance), monitor).result
+    solver = Solver(SolverSettings(error_tolerance=tolerance), monitor)
+    result = cold_start(problem, solver).result
     return _run(problem, tolerance, result, time.perf_counter() - began)
 
 
 def _warm(problem: MotionProblem, tolerance: float, monitor: Monitor) -> Run:
-    settings = SolverSettings(error_tolerance=tolerance)
-    first = cold_start(neighbour(problem), settings, monitor).result.solution
+    solver = Solver(SolverSettings(error_tolerance=tolerance), monitor)
+    first = cold_start(neighbour(problem), solver).result.solution
     began = time.perf_counter()
-    result = solve(problem, first, settings, monitor, expected_error=tolerance)
+    result = solver.solve(problem, first, expected_error=tolerance)
     return _run(problem, tolerance, result, time.perf_counter() - began)
 
 
@@ -158,7 +159,7 @@ def _run(problem: MotionProblem, tolerance: float, result: CollocationResult,
     half = problem.size // 2
     return Run(method='flex_planner', level=tolerance, seconds=seconds,
                intervals=result.solution.intervals, costates=result.solution.nodes[0, half:],
-               cost=totals(problem, result.solution).cost, converged=result.converged,
+               cost=integrate_totals(problem, result.solution).cost, converged=result.converged,
                message=result.message)
 
 

@@ -10,25 +10,24 @@ where they will be; then values, too, are continued along a straight line.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import chain
 
 from flex_planner.base.errors import FlexPlannerError
-from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array, number
-from flex_planner.capacity.limit_search import collected, is_near, way_to, width
-from flex_planner.collocation import CollocationSolution, SolverSettings
+from flex_planner.capacity.bracket import (
+    bracket_width,
+    collect_to_limit,
+    continuation_solver,
+    is_near_limit,
+)
+from flex_planner.capacity.results import LimitResult
+from flex_planner.collocation import CollocationSolution, Solver
 from flex_planner.collocation.mesh import defects, levelled
 from flex_planner.optimal_control.motion_problem import Indices, MotionProblem
-from flex_planner.planning.strategies.price_continuation import (
-    changed,
-    durations,
-    Extremal,
-    payloads,
-    worth,
-    worth_time,
-)
+from flex_planner.planning.strategies.extremals import Extremal
+from flex_planner.planning.strategies.free_parameters import FreeParameter
+from flex_planner.planning.strategies.price_continuation import continue_in_price
 import numpy as np
 
 # of the span: nodes nearer than this to a switch are moved onto it
@@ -40,9 +39,40 @@ _MARGIN, _COARSER = 0.1, 0.5
 _MOST_RATIO = 100.0
 
 
-def check_ratio(ratio: float) -> None:
-    """Raise InvalidValueError unless motions may be continued so far."""
-    number('ratio', ratio, at_least=-_MOST_RATIO, at_most=_MOST_RATIO)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Neighbours:
+    """
+    Searches of two tasks that lie on a line with a third one, which starts from them.
+
+    Attributes
+    ----------
+    near, far : LimitResult or None
+        Of the nearer task and of the one before it; without both nothing is extrapolated.
+    ratio : float
+        Of the step from `near` to the third task to the step from `far` to `near`, within +-100.
+
+    Raises
+    ------
+    InvalidValueError
+        If the ratio breaks its bound.
+
+    """
+
+    near: LimitResult | None = None
+    far: LimitResult | None = None
+    ratio: float = 1.0
+
+    def __post_init__(self) -> None:
+        number('ratio', self.ratio, at_least=-_MOST_RATIO, at_most=_MOST_RATIO)
+
+    @property
+    def extremals(self) -> tuple[Extremal, Extremal] | None:
+        """Return the motions nearest to both limits, the farther task's first."""
+        if self.near is None or self.far is None:
+            return None
+        if not (self.near.extremals and self.far.extremals):
+            return None
+        return self.far.extremals[-1], self.near.extremals[-1]
 
 
 def step_ratio(far: float, near: float, here: float) -> float:
@@ -50,38 +80,32 @@ def step_ratio(far: float, near: float, here: float) -> float:
     return float(np.clip((here - near) / (near - far), -_MOST_RATIO, _MOST_RATIO))
 
 
-def continued_stops(problem: MotionProblem, before: Sequence[Extremal], here: Sequence[Extremal],
-                    ratio: float, accuracy: float, settings: SolverSettings, monitor: Monitor, *,
-                    payload: bool) -> list[Extremal]:
+def extrapolate_to_limit(parameter: FreeParameter, problem: MotionProblem, neighbours: Neighbours,
+                         accuracy: float, solver: Solver) -> list[Extremal]:
     """
     Return the motions up to a limit, from the one that two searches lead to; else none.
 
     Parameters
     ----------
-    problem, ratio, settings, monitor, payload
-        As of `foreseen`.
-    before, here : sequence of Extremal
-        Of the two searches, ending near the limits of their tasks.
+    parameter, problem, neighbours, solver
+        As of `extrapolate_extremal`.
     accuracy : float
         To which the limit is wanted [kg, s].
 
     """
-    if not (before and here):
-        return []
-    first = foreseen(problem, before[-1], here[-1], ratio, settings, monitor, payload=payload)
+    first = extrapolate_extremal(parameter, problem, neighbours, solver)
     if first is None:
         return []
-    family = payloads if payload else durations
-    further = () if first.stopped else family(
-        first.problem, first.result, way_to(accuracy, settings), monitor,
-        lambda value: width(accuracy, value))
-    stops = collected(chain([first], further), accuracy)
-    return stops if stops[-1].stopped or is_near(stops, accuracy) else []
+    further = () if first.interrupted else continue_in_price(
+        parameter, first.problem, first.result, continuation_solver(solver, accuracy),
+        lambda value: bracket_width(accuracy, value))
+    extremals = collect_to_limit(chain([first], further), accuracy)
+    near = extremals[-1].interrupted or is_near_limit(extremals, accuracy)
+    return extremals if near else []
 
 
-def foreseen(problem: MotionProblem, before: Extremal, here: Extremal, ratio: float,
-             settings: SolverSettings,
-             monitor: Monitor, *, payload: bool) -> Extremal | None:
+def extrapolate_extremal(parameter: FreeParameter, problem: MotionProblem,
+                         neighbours: Neighbours, solver: Solver) -> Extremal | None:
     """
     Return the motion at a limit that those of two tasks on a line lead to, or None.
 
@@ -89,50 +113,47 @@ def foreseen(problem: MotionProblem, before: Extremal, here: Extremal, ratio: fl
 
     Parameters
     ----------
+    parameter : FreeParameter
+        What is free.
     problem : MotionProblem
-        With the least payload, or the longest duration, that is of interest.
-    before, here : Extremal
-        Near the limits of the two tasks.
-    ratio : float
-        Of the step to come to the step between them.
-    settings, monitor
-        Of the solver.
-    payload : bool
-        Whether the payload is free, else the duration.
+        With the least demanding value that is of interest.
+    neighbours : Neighbours
+        The two tasks.
+    solver : Solver
+        Of the extremal.
 
     """
+    if neighbours.extremals is None:
+        return None
+    (before, here), ratio = neighbours.extremals, neighbours.ratio
     if not before.result.solution.nodes.shape[1] == here.problem.size == problem.size:
         return None
     value = max(here.value + ratio * (here.value - before.value), 0.0)
-    few = replace(settings, max_iterations=min(_FEW, settings.max_iterations))
     try:
-        near = (changed(problem, payload_mass=value) if payload
-                else changed(problem, duration=value))
-        guess = continued(thinned(before, settings), thinned(here, settings), ratio,
-                          near.task.duration)
-        found = (worth if payload else worth_time)(near, guess, here.price, few, monitor)
+        near = parameter.with_value(problem, value)
+        guess = extrapolate(thin_out(before, solver), thin_out(here, solver), ratio,
+                            near.task.duration)
+        found = parameter.solve_at_price(near, guess, here.price, solver.patient(_FEW))
     except FlexPlannerError:  # too heavy to hold, or no duration
         return None
-    if found is None or found.stopped:
+    if found is None or found.interrupted:
         return found
-    beyond = (found.value > problem.task.payload_mass if payload
-              else found.value < problem.task.duration)
-    return found if beyond else None
+    return found if parameter.improves(found.value, parameter.value(problem)) else None
 
 
-def thinned(stop: Extremal, settings: SolverSettings) -> Switched:
+def thin_out(extremal: Extremal, solver: Solver) -> SwitchedMotion:
     """Return a motion on as few intervals as its exactness needs: else meshes only grow."""
-    solution, result = stop.result.solution, stop.result
-    error = float(result.errors.max()) / (_MARGIN * settings.error_tolerance)
+    solution, result = extremal.result.solution, extremal.result
+    error = float(result.errors.max()) / (_MARGIN * solver.settings.error_tolerance)
     growth = float(np.clip(error ** (1 / (2 * solution.rule.stages)), _COARSER, 1.0))
-    mesh = levelled(solution, defects(stop.problem, solution), growth, result.switches,
-                    fewest=stop.problem.fewest_intervals(solution.rule.stages),
+    mesh = levelled(solution, defects(extremal.problem, solution), growth, result.switches,
+                    fewest=extremal.problem.fewest_intervals(solution.rule.stages),
                     most=solution.intervals)
-    return Switched.of(stop.problem, solution.on_mesh(mesh), result.switches)
+    return SwitchedMotion.of(extremal.problem, solution.on_mesh(mesh), result.switches)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Switched:
+class SwitchedMotion:
     """
     A motion with its switches.
 
@@ -153,29 +174,29 @@ class Switched:
 
     @classmethod
     def of(cls, problem: MotionProblem, solution: CollocationSolution,
-           times: Array) -> Switched:
+           times: Array) -> SwitchedMotion:
         """Find out which limit is met at each of the times."""
         values = np.abs(problem.switches(times, solution(times))) if times.size else np.zeros(
             (0, 1))
         return cls(solution, times, values.argmin(axis=1))
 
-    def lasting(self, span: float) -> Switched:
+    def stretch(self, span: float) -> SwitchedMotion:
         """Return the same motion stretched to another duration."""
         factor = span / self.solution.mesh[-1]
-        return Switched(self.solution.stretched(factor), self.times * factor, self.kinds)
+        return SwitchedMotion(self.solution.stretched(factor), self.times * factor, self.kinds)
 
 
-def continued(before: Switched, here: Switched, ratio: float,
-              span: float) -> CollocationSolution:
+def extrapolate(before: SwitchedMotion, here: SwitchedMotion, ratio: float,
+                span: float) -> CollocationSolution:
     """
-    Return what two motions lead to.
+    Return the motion that two motions lead to.
 
     Between switches that both have, both are continued along a straight line; where one of them
     has more, such as a motor that leaves its limit for a moment, the later motion is kept.
 
     Parameters
     ----------
-    before, here : Switched
+    before, here : SwitchedMotion
         Of two tasks on a line.
     ratio : float
         Of the step to come to the step between them.
@@ -183,19 +204,19 @@ def continued(before: Switched, here: Switched, ratio: float,
         Duration of the motion to come [s].
 
     """
-    first, second = before.lasting(span), here.lasting(span)
-    start, now, aim = _in_order(_matched(first, second), ratio, span)
-    there, other = _bent(second, now, aim), _bent(first, start, aim)
+    first, second = before.stretch(span), here.stretch(span)
+    start, now, aim = _order(_match(first, second), ratio, span)
+    there, other = _bend(second, now, aim), _bend(first, start, aim)
     other = other.on_mesh(there.mesh, there.rule)
     pieces = np.searchsorted(aim, there.mesh[:-1] + there.steps / 2) - 1
-    strange = np.concatenate([_strange(first, start), _strange(second, now)])
+    strange = np.concatenate([_unmatched_pieces(first, start), _unmatched_pieces(second, now)])
     share = np.where(np.isin(pieces, strange), 0.0, ratio)
     nodes = there.nodes + np.append(share, share[-1])[:, None] * (there.nodes - other.nodes)
     stages = there.stages + share[:, None, None] * (there.stages - other.stages)
     return CollocationSolution(there.mesh, nodes, stages, there.rule)
 
 
-def _matched(first: Switched, second: Switched) -> Array:
+def _match(first: SwitchedMotion, second: SwitchedMotion) -> Array:
     """Return the switches that both have, in the order of the second, shape (k, 2)."""
     pairs: list[tuple[float, float]] = []
     for kind in np.union1d(first.kinds, second.kinds):
@@ -205,7 +226,7 @@ def _matched(first: Switched, second: Switched) -> Array:
     return np.array(sorted(pairs, key=lambda pair: pair[1])).reshape(-1, 2)
 
 
-def _in_order(pairs: Array, ratio: float, span: float) -> tuple[Array, Array, Array]:
+def _order(pairs: Array, ratio: float, span: float) -> tuple[Array, Array, Array]:
     """Return both times of the pairs and those to come, ends included, each ascending."""
     kept = [(0.0, 0.0, 0.0)]
     for start, now in pairs:
@@ -225,13 +246,13 @@ def _longest(times: list[float], count: int) -> list[float]:
     return times
 
 
-def _strange(motion: Switched, breaks: Array) -> Indices:
+def _unmatched_pieces(motion: SwitchedMotion, breaks: Array) -> Indices:
     """Return the pieces between breaks that hold other switches of the motion."""
     pieces: Indices = np.searchsorted(breaks, motion.times[~np.isin(motion.times, breaks)]) - 1
     return pieces
 
 
-def _bent(motion: Switched, times: Array, aim: Array) -> CollocationSolution:
+def _bend(motion: SwitchedMotion, times: Array, aim: Array) -> CollocationSolution:
     """Return the motion with its time bent so that `times` come to lie at `aim`."""
     solution = _on_switches(motion.solution, motion.times)
     mesh: Array = np.interp(solution.mesh, times, aim)

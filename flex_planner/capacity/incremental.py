@@ -12,13 +12,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from flex_planner.base.errors import FlexPlannerError
-from flex_planner.base.progress import Monitor
-from flex_planner.collocation import CollocationResult, CollocationSolution, SolverSettings
-from flex_planner.collocation.homotopy import STOPPED
+from flex_planner.collocation import (
+    CollocationResult,
+    CollocationSolution,
+    INTERRUPTED,
+    Solver,
+)
 from flex_planner.optimal_control.motion_problem import MotionProblem
-from flex_planner.planning.certificate import final_state
-from flex_planner.planning.strategies.initial_guesses import QUICK, warm_start
-from flex_planner.planning.strategies.price_continuation import changed, on_the_way
+from flex_planner.planning.certificate import simulate_to_goal
+from flex_planner.planning.strategies.catalogue import QUICK
+from flex_planner.planning.strategies.initial_guesses import warm_start
 import numpy as np
 
 _RTOL = 1e-8
@@ -50,14 +53,13 @@ class PayloadTrial:
     result: CollocationResult = field(repr=False)
 
     @property
-    def stopped(self) -> bool:
-        """Whether the monitor ended the search here."""
-        return self.result.status in STOPPED
+    def interrupted(self) -> bool:
+        """Return whether the monitor interrupted the search here."""
+        return self.result.status in INTERRUPTED
 
 
-def raised_payload(problem: MotionProblem, first: CollocationSolution, *, step: float,
-                   accuracy: float, settings: SolverSettings,
-                   monitor: Monitor) -> Iterator[PayloadTrial]:
+def raise_payload(problem: MotionProblem, first: CollocationSolution, *, step: float,
+                  accuracy: float, solver: Solver) -> Iterator[PayloadTrial]:
     """
     Yield the payloads tried, loop (i) raising them and loop (k) halving the step.
 
@@ -71,13 +73,13 @@ def raised_payload(problem: MotionProblem, first: CollocationSolution, *, step: 
         First step [kg].
     accuracy : float
         Ends when what failed is no further from what succeeded [kg].
-    settings, monitor
-        Of the solver.
+    solver : Solver
+        Its monitor may interrupt the search.
 
     Raises
     ------
     StoppedError
-        If the monitor ended the search while a motion was re-simulated.
+        If the monitor interrupted the search while a motion was re-simulated.
 
     """
     payload, here, failed = problem.task.payload_mass, first, np.inf
@@ -86,12 +88,12 @@ def raised_payload(problem: MotionProblem, first: CollocationSolution, *, step: 
             if failed - payload <= accuracy:
                 return
             step /= 2
-        trial = _trial(problem, here, payload + step, step, settings, monitor)
+        trial = _try_payload(problem, here, payload + step, step, solver)
         if trial is None:
             failed = payload + step
             continue
         yield trial
-        if trial.stopped:
+        if trial.interrupted:
             return
         if trial.solved:
             payload, here = trial.payload, trial.result.solution
@@ -99,25 +101,26 @@ def raised_payload(problem: MotionProblem, first: CollocationSolution, *, step: 
             failed = trial.payload
 
 
-def _trial(problem: MotionProblem, start: CollocationSolution, payload: float, step: float,
-           settings: SolverSettings, monitor: Monitor) -> PayloadTrial | None:
+def _try_payload(problem: MotionProblem, start: CollocationSolution, payload: float, step: float,
+                 solver: Solver) -> PayloadTrial | None:
     """Try a payload from the motion of a lighter one, then from nothing; None if absurd."""
-    monitor.payload = payload
+    solver.monitor.payload = payload
     try:
-        heavier = changed(problem, payload_mass=payload)
+        heavier = problem.changed(payload_mass=payload)
     except FlexPlannerError:  # too heavy to hold
         return None
     result: CollocationResult | None = None
-    for _, strategy in (('', warm_start(start)), *QUICK):
-        attempt = strategy(heavier, on_the_way(settings), monitor)
+    coarse = solver.coarse()
+    for strategy in (warm_start(start), *QUICK):
+        attempt = strategy.attempt(heavier, coarse)
         if attempt is not None:
             result = attempt.result
-            if result.converged or result.status in STOPPED:
+            if result.converged or result.status in INTERRUPTED:
                 break
     assert result is not None
     error = np.inf
-    if result.status not in STOPPED:
-        final, goal = final_state(heavier, result.solution, monitor, _RTOL)
+    if result.status not in INTERRUPTED:
+        final, goal = simulate_to_goal(heavier, result.solution, solver.monitor, _RTOL)
         error = float(np.nan_to_num((final - goal) @ (final - goal) / 2, nan=np.inf))
     return PayloadTrial(payload=payload, step=step, boundary_error=error, result=result,
                         solved=result.converged and error <= problem.task.tolerance)

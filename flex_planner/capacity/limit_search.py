@@ -1,155 +1,205 @@
-"""What the searches for the largest payload and the shortest duration share."""
+"""The search for a limit: the largest payload and the shortest duration are found alike."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 from flex_planner.base.errors import FlexPlannerError
-from flex_planner.base.progress import Monitor
-from flex_planner.collocation import CollocationSolution, SolverSettings
+from flex_planner.capacity.bracket import (
+    bracket_width,
+    collect_to_limit,
+    continuation_solver,
+    is_near_limit,
+)
+from flex_planner.capacity.extrapolation import extrapolate_to_limit, Neighbours
+from flex_planner.collocation import CollocationSolution, Solver
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.planning.plan import Plan, PlanStatus
-from flex_planner.planning.plan_problem import planned
-from flex_planner.planning.strategies.initial_guesses import (
-    Attempt,
+from flex_planner.planning.plan_problem import INTERRUPTED_STATUS, plan_problem
+from flex_planner.planning.strategies.catalogue import QUICK
+from flex_planner.planning.strategies.extremals import Extremal, SearchStart
+from flex_planner.planning.strategies.first_extremals import approach_limit, transfer_extremal
+from flex_planner.planning.strategies.free_parameters import FreeParameter
+from flex_planner.planning.strategies.homotopies import (
+    drop_weights,
     has_weights,
-    QUICK,
-    Strategy,
-    weights_raised,
+    raise_weights_from,
 )
-from flex_planner.planning.strategies.limit_strategies import steady
-from flex_planner.planning.strategies.price_continuation import (
-    changed,
-    Extremal,
-    on_the_way,
-    worth,
-    worth_time,
-)
-import numpy as np
-
-_MOST_STOPS = 100
-_FINEST = 1e-6
-# of motions on the way, by accuracy of the value [1/kg, 1/s]
-_EXACTNESS = 10.0
-# share of the value that the room of a start should be
-_MIDDLE = 0.01
+from flex_planner.planning.strategies.price_continuation import continue_in_price
+from flex_planner.planning.strategies.strategy import Attempt, Strategy
 
 
-def way_to(accuracy: float, settings: SolverSettings) -> SolverSettings:
-    """Return settings for motions on the way to a limit that is wanted to an accuracy."""
-    return on_the_way(settings, _EXACTNESS * accuracy)
+class Failure(NamedTuple):
+    """Why a search ended without a motion near the limit."""
+
+    status: PlanStatus
+    message: str
 
 
-def middle(stops: Sequence[Extremal]) -> Extremal | None:
-    """Return the last motion that leaves some room: a start for searches of its kind."""
-    roomy = [stop for stop in stops if stop.room >= _MIDDLE * stop.value]
-    return roomy[-1] if roomy else next(iter(stops), None)
-
-
-def collected(stops: Iterable[Extremal], accuracy: float) -> list[Extremal]:
-    """Return the stops up to one that is near the limit, or fails, or the last."""
-    met: list[Extremal] = []
-    for stop in stops:
-        met.append(stop)
-        if not stop.result.converged or len(met) == _MOST_STOPS or is_near(met, accuracy):
-            break
-    return met
-
-
-def is_near(stops: list[Extremal], accuracy: float) -> bool:
-    """Return whether the last value is the limit, to an accuracy."""
-    last = stops[-1]
-    if not last.price:
-        return False
-    wide = width(accuracy, last.value)
-    if np.isfinite(last.room):
-        return last.room <= wide
-    return steady(stops, wide / (10 * last.value))  # a motor without limit is never full
-
-
-def width(accuracy: float, value: float) -> float:
-    """Return how wide a bracket may be: motions nearer to their limit are out of reach."""
-    return max(accuracy, _FINEST * value)
-
-
-def plan_near(problem: MotionProblem, start: CollocationSolution, settings: SolverSettings,
-              monitor: Monitor) -> Plan:
-    """Return the plan of a problem from a motion nearly its own."""
-    return planned(problem, (_found(start), *QUICK), settings, monitor)
-
-
-def plan_at(stops: list[Extremal], problem: MotionProblem, settings: SolverSettings,
-            monitor: Monitor, *,
-            payload: bool, exact: bool) -> Plan:
+class LimitSearch:
     """
-    Return the plan with the value of the last stop of a search.
-
-    Where the value leaves Newton's method no way, the price may: the last stop is then replaced
-    by the same motion, solved as exactly as a plan.
+    Follows the price of a payload or a duration to its limit, then plans there.
 
     Parameters
     ----------
-    stops : list of Extremal
-        The last one near the limit.
+    parameter : FreeParameter
+        ``PAYLOAD`` or ``DURATION``.
     problem : MotionProblem
-        That was searched, with its weights.
-    settings, monitor
-        Of the solver.
-    payload : bool
-        Whether the value is a payload, else a duration.
-    exact : bool
-        Whether the last stop was solved to be the plan.
+        Of the task, with its weights; the limit does not depend on them.
+    solver : Solver
+        Its monitor may interrupt the search.
+    accuracy : float
+        To which the limit is wanted [kg, s].
+
+    Attributes
+    ----------
+    extremals : list of Extremal
+        Motions nearer and nearer to the limit.
+    extrapolated : bool
+        Whether the last one follows from searches of two neighbours, as exact as a plan.
+    warm : bool
+        Whether the search went on from the motion that it was given.
 
     """
-    stop = stops[-1]
 
-    def there(stop: Extremal) -> MotionProblem:
-        return (changed(problem, payload_mass=stop.value) if payload
-                else changed(problem, duration=stop.value))
+    def __init__(self, parameter: FreeParameter, problem: MotionProblem, solver: Solver,
+                 accuracy: float) -> None:
+        self._parameter, self._problem, self._solver = parameter, problem, solver
+        self._accuracy = accuracy
+        self.extremals: list[Extremal] = []
+        self.extrapolated = self.warm = False
 
-    first = _found(stop.result.solution, stop if exact else None)
-    plan = planned(there(stop), (first,), settings, monitor)
-    if plan.status is not PlanStatus.NOT_CONVERGED:
-        return plan
-    again = _more_exact(stop, settings, monitor, payload=payload)
-    if again is not None:
-        found = planned(there(again), (_found(again.result.solution, again),), settings, monitor)
-        if found.status is not PlanStatus.NOT_CONVERGED:
-            stops[-1] = again
-            return found
-    found = planned(there(stop), QUICK, settings, monitor)
-    if found.status is PlanStatus.NOT_CONVERGED:
-        return replace(found, message=f'{plan.message}; {found.message}')
-    return found
+    @property
+    def last(self) -> Extremal:
+        """Return the extremal nearest to the limit."""
+        return self.extremals[-1]
 
+    @property
+    def is_near(self) -> bool:
+        """Return whether the last value is the limit, to the accuracy wanted."""
+        return is_near_limit(self.extremals, self._accuracy)
 
-def _found(start: CollocationSolution, stop: Extremal | None = None) -> tuple[str, Strategy]:
-    """Return the strategy that starts from a motion; that of a stop may be the solution."""
-    def found(problem: MotionProblem, settings: SolverSettings, monitor: Monitor) -> Attempt:
-        if stop is not None and _is_solution(stop, problem, settings):
-            return Attempt(result=stop.result)
-        return Attempt(result=weights_raised(problem, start, settings, monitor))
+    @property
+    def priced(self) -> tuple[Extremal, ...]:
+        """Return the motions of least effort, whose price is known."""
+        return tuple(one for one in self.extremals if one.price and one.result.converged)
 
-    return 'limit found', found
-
-
-def _more_exact(stop: Extremal, settings: SolverSettings, monitor: Monitor, *,
-                payload: bool) -> Extremal | None:
-    """Return the motion of a stop as exact as a plan has to be, None without success."""
-    if not stop.price:
+    def follow_price(self, start: SearchStart | None, neighbours: Neighbours) -> Failure | None:
+        """Collect extremals up to the limit; return the failure if there is no motion."""
+        self._announce()
+        self.extremals = extrapolate_to_limit(
+            self._parameter, self._parameter.easiest(drop_weights(self._problem)), neighbours,
+            self._accuracy, self._solver)
+        self.extrapolated = bool(self.extremals)
+        if not self.extrapolated:
+            self._approach(start)
+            if not (self.last.result.converged or self.last.interrupted):
+                failure = self._approach_from_plan()
+                if failure is not None:
+                    return failure
+        self.warm = self.warm or self.extrapolated
+        if self.last.interrupted:
+            return Failure(INTERRUPTED_STATUS[self.last.result.status],
+                           self.last.result.message)
         return None
-    try:
-        found = (worth if payload else worth_time)(stop.problem, stop.result.solution,
-                                                   stop.price, settings, monitor)
-    except FlexPlannerError:  # too heavy to hold, or no duration
+
+    def plan(self) -> Plan:
+        """
+        Return the plan with the value of the last extremal.
+
+        Where the value leaves Newton's method no way, the price may: the last extremal is then
+        replaced by the same motion, solved as exactly as a plan.
+
+        """
+        first = start_strategy(self.last.result.solution,
+                               self.last if self.extrapolated else None)
+        plan = plan_problem(self._at(self.last), self._solver, (first,))
+        if plan.status is not PlanStatus.NOT_CONVERGED:
+            return plan
+        again = self._solve_more_exactly(self.last)
+        if again is not None:
+            strategy = start_strategy(again.result.solution, again)
+            found = plan_problem(self._at(again), self._solver, (strategy,))
+            if found.status is not PlanStatus.NOT_CONVERGED:
+                self.extremals[-1] = again
+                return found
+        found = plan_problem(self._at(self.last), self._solver, QUICK)
+        if found.status is PlanStatus.NOT_CONVERGED:
+            return replace(found, message=f'{plan.message}; {found.message}')
+        return found
+
+    def _approach(self, start: SearchStart | None) -> None:
+        """Collect extremals from the first start that leads to a motion."""
+        solver = continuation_solver(self._solver, self._accuracy)
+        for problem in self._parameter.starts(drop_weights(self._problem)):
+            known = None if start is None else transfer_extremal(self._parameter, problem, start,
+                                                                 solver)
+            self.warm = known is not None
+            self.extremals = collect_to_limit(
+                approach_limit(self._parameter, problem, solver, first=known,
+                               target_gap=self._target_gap), self._accuracy)
+            if self.extremals[0].result.converged or self.extremals[0].interrupted:
+                return
+
+    def _approach_from_plan(self) -> Failure | None:
+        """Collect extremals from a motion that takes all strategies to find."""
+        bare = drop_weights(self._problem)
+        plan = plan_problem(bare, self._solver)
+        if plan.solution is None or not plan.solved:
+            return Failure(plan.status, plan.message)
+        solver = continuation_solver(self._solver, self._accuracy)
+        first = solver.solve(bare, plan.solution)
+        self._announce()
+        self.extremals = [Extremal(value=self._parameter.value(bare), price=0.0, result=first,
+                                   problem=bare)]
+        self.extremals += collect_to_limit(
+            continue_in_price(self._parameter, bare, first, solver, self._target_gap),
+            self._accuracy)
         return None
-    return found if found is not None and found.result.converged else None
+
+    def _announce(self) -> None:
+        """Tell the monitor that a price is followed."""
+        self._solver.monitor.phase = f'{self._parameter.name} at a rising price'
+
+    def _target_gap(self, value: float) -> float:
+        """Return the gap that is near enough."""
+        return bracket_width(self._accuracy, value)
+
+    def _at(self, extremal: Extremal) -> MotionProblem:
+        """Return the problem of the task with the value of an extremal."""
+        return self._parameter.with_value(self._problem, extremal.value)
+
+    def _solve_more_exactly(self, extremal: Extremal) -> Extremal | None:
+        """Return the same motion as exact as a plan has to be, None without success."""
+        if not extremal.price:
+            return None
+        try:
+            found = self._parameter.solve_at_price(
+                extremal.problem, extremal.result.solution, extremal.price, self._solver)
+        except FlexPlannerError:  # too heavy to hold, or no duration
+            return None
+        return found if found is not None and found.result.converged else None
 
 
-def _is_solution(stop: Extremal, problem: MotionProblem, settings: SolverSettings) -> bool:
-    """Return whether a stop is the solution of a problem, as exact as it has to be."""
-    one, other = stop.problem.task, problem.task
+def start_strategy(start: CollocationSolution, extremal: Extremal | None = None) -> Strategy:
+    """Return the strategy that starts from a motion; that of an extremal may be the solution."""
+    def attempt(problem: MotionProblem, solver: Solver) -> Attempt:
+        if extremal is not None and _is_solution(extremal, problem, solver):
+            return Attempt(result=extremal.result)
+        return Attempt(result=raise_weights_from(problem, start, solver))
+
+    return Strategy('continuation to the limit', attempt, quick=True)
+
+
+def plan_near(problem: MotionProblem, start: CollocationSolution, solver: Solver) -> Plan:
+    """Return the plan of a problem from a motion nearly its own."""
+    return plan_problem(problem, solver, (start_strategy(start), *QUICK))
+
+
+def _is_solution(extremal: Extremal, problem: MotionProblem, solver: Solver) -> bool:
+    """Return whether an extremal solves a problem, as exactly as it has to be."""
+    one, other = extremal.problem.task, problem.task
     return (not has_weights(problem) and one.payload_mass == other.payload_mass
-            and one.duration == other.duration and stop.result.converged
-            and float(stop.result.errors.max()) <= settings.error_tolerance)
+            and one.duration == other.duration and extremal.result.converged
+            and float(extremal.result.errors.max()) <= solver.settings.error_tolerance)

@@ -12,7 +12,7 @@ import tempfile
 from typing import TYPE_CHECKING
 
 from flex_planner.base.errors import InvalidValueError, RecordingError
-from flex_planner.capacity.max_payload import MaxPayload
+from flex_planner.capacity.results import MaxPayload
 from flex_planner.cli.request import Request
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.sampling import SampledPlan

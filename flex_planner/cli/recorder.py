@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 import time
 
-from flex_planner.capacity.max_payload import MaxPayload
+from flex_planner.capacity.results import MaxPayload
 from flex_planner.cli.request import Request
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.sampling import SampledPlan

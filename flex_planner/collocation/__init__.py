@@ -6,9 +6,18 @@ Knows a right-hand side, boundary rows and a mesh, and nothing of arms.
 """
 
 from flex_planner.collocation.gauss import GaussRule
+from flex_planner.collocation.homotopy import follow_homotopy
 from flex_planner.collocation.problem import BoundaryValueProblem
+from flex_planner.collocation.result import (
+    CollocationResult,
+    INTERRUPTED,
+    SolverSettings,
+    SolverStatus,
+)
 from flex_planner.collocation.solution import CollocationSolution
-from flex_planner.collocation.solver import CollocationResult, solve, SolverSettings, SolverStatus
+from flex_planner.collocation.solve import solve
+from flex_planner.collocation.solver import Backend, Solver
 
-__all__ = ['BoundaryValueProblem', 'CollocationResult', 'CollocationSolution', 'GaussRule',
-           'SolverSettings', 'SolverStatus', 'solve']
+__all__ = ['INTERRUPTED', 'Backend', 'BoundaryValueProblem', 'CollocationResult',
+           'CollocationSolution', 'GaussRule', 'Solver', 'SolverSettings', 'SolverStatus',
+           'follow_homotopy', 'solve']

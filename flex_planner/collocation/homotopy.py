@@ -5,55 +5,46 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from flex_planner.base.progress import Monitor
-from flex_planner.collocation import (
-    BoundaryValueProblem,
-    CollocationResult,
-    CollocationSolution,
-    solve,
-    SolverSettings,
-    SolverStatus,
-)
 from flex_planner.collocation.mesh import coarsened
+from flex_planner.collocation.problem import BoundaryValueProblem
+from flex_planner.collocation.result import CollocationResult, INTERRUPTED
+from flex_planner.collocation.solution import CollocationSolution
+from flex_planner.collocation.solver import Solver
 import numpy as np
 
-# on the way solutions need not be exact, and failures must be cheap
-_TOLERANCE, _DEFECT, _ITERATIONS = 0.05, 3e-3, 15
+# error that a mesh along the way is coarsened to
+_DEFECT = 3e-3
 # a mesh is refined where a step fails, and loses at most this share where one succeeds
 _FINER, _COARSER = 1.5, 0.75
 _SMALLEST_STEP = 1 / 256
 # so few iterations show that the step may grow
 _EASY = 6
 
-STOPPED = (SolverStatus.CANCELED, SolverStatus.TIMEOUT)
 
-
-def walk(problem_at: Callable[[float], BoundaryValueProblem], start: CollocationSolution,
-         settings: SolverSettings, monitor: Monitor, first_step: float) -> CollocationResult:
+def follow_homotopy(problem_at: Callable[[float], BoundaryValueProblem],
+                    start: CollocationSolution, solver: Solver,
+                    first_step: float) -> CollocationResult:
     """
-    Follow the solutions of a family of problems from 0 to 1.
+    Follow the solutions of problems that depend on a share, from 0 to 1.
 
     Parameters
     ----------
     problem_at : callable
-        The problem at a share of the way.
+        The problem at a share.
     start : CollocationSolution
         Solves the problem at 0, at least nearly.
-    settings : SolverSettings
+    solver : Solver
         Of the solution at 1.
-    monitor : Monitor
-        Watches and may stop it.
     first_step : float
-        Share of the way tried first.
+        Share tried first.
 
     """
-    here, step, point = 0.0, first_step, start
+    here, step, point, settings = 0.0, first_step, start, solver.settings
     while True:
         there = min(1.0, here + step)
         problem = problem_at(there)
-        result = solve(problem, point,
-                       settings if there == 1.0 else _cheap(settings), monitor)
-        if result.status in STOPPED:
+        result = (solver if there == 1.0 else solver.cheap()).solve(problem, point)
+        if result.status in INTERRUPTED:
             return result
         if result.converged:
             if there == 1.0:
@@ -66,7 +57,7 @@ def walk(problem_at: Callable[[float], BoundaryValueProblem], start: Collocation
             step /= 2
             point = _refined(point, settings.max_intervals)
             if step < _SMALLEST_STEP:
-                return replace(result, message=f'{result.message} at {there:.1%} of the way')
+                return replace(result, message=f'{result.message} at {there:.1%} of the homotopy')
 
 
 def _refined(point: CollocationSolution, most: int) -> CollocationSolution:
@@ -75,13 +66,3 @@ def _refined(point: CollocationSolution, most: int) -> CollocationSolution:
     count = min(int(_FINER * before), max(most, before))
     places = np.linspace(0, before, count + 1)
     return point.on_mesh(np.interp(places, np.arange(before + 1), point.mesh))
-
-
-def loose(settings: SolverSettings) -> SolverSettings:
-    """Return settings for a problem on the way."""
-    return replace(settings, error_tolerance=max(_TOLERANCE, settings.error_tolerance))
-
-
-def _cheap(settings: SolverSettings) -> SolverSettings:
-    """Return settings for a step that may fail."""
-    return replace(loose(settings), max_iterations=min(_ITERATIONS, settings.max_iterations))

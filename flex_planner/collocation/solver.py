@@ -1,304 +1,84 @@
-"""Newton on a mesh, then on better meshes, until the estimated error is small."""
+"""
+A solver of boundary-value problems as a value: settings, who watches, and the method.
+
+It is handed on as one argument. Another method is another `backend`, a function with the
+arguments of :func:`flex_planner.collocation.solve.solve`.
+
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from enum import Enum
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
 
-from flex_planner.base.progress import Monitor, StopReason
-from flex_planner.base.validation import integer, number
-from flex_planner.collocation.estimate import Estimate, estimated
-from flex_planner.collocation.gauss import FEWEST_STAGES, GaussRule, MOST_STAGES
-from flex_planner.collocation.mesh import defects, levelled, switching_times
-from flex_planner.collocation.newton import newton, NewtonOutcome
+from flex_planner.base.progress import Monitor
 from flex_planner.collocation.problem import BoundaryValueProblem
+from flex_planner.collocation.result import CollocationResult, SolverSettings
 from flex_planner.collocation.solution import CollocationSolution
-import numpy as np
-from numpy.typing import NDArray
+from flex_planner.collocation.solve import solve
 
-Array = NDArray[np.float64]
-
-# a mesh changes its number of intervals at most this much at a time
-_LARGEST_GROWTH, _SMALLEST_GROWTH = 2.5, 0.4
-# the error a new mesh is laid out for, as a share of the tolerance
-_MARGIN = 0.1
-# Newton's method stops at this share of the error expected of the mesh, and here at most
-_NEWTON_SHARE, _LOOSEST_NEWTON = 0.03, 1e-3
-# a mesh of fewer intervals may be too coarse for the mean Jacobian
-_COARSE = 100
-# where Newton's method stalls so near a solution a better mesh is tried, so many times
-_NEAR, _MOST_RESCUES = 0.2, 4
-# a mesh of which this error is expected shows where the switches are; they move so many times
-_RESOLVED, _MOST_PLACEMENTS = 1e-2, 4
+# of solutions along a homotopy: they need not be exact, and failures must be cheap
+_LOOSE_TOLERANCE, _CHEAP_ITERATIONS = 0.05, 15
+# of solutions along a continuation in a price: exact to some hundred times the value's accuracy
+_COARSE_TOLERANCE, _COARSE_ITERATIONS = 1e-2, 25
 
 
-class SolverStatus(Enum):
-    """How a solve ended; the value is shown to people."""
+class Backend(Protocol):
+    """A method that solves a boundary-value problem."""
 
-    CONVERGED = 'converged'
-    NEWTON_FAILED = "Newton's method did not converge"
-    MESH_LIMIT = 'the mesh reached its limit'
-    CANCELED = StopReason.CANCELED.value
-    TIMEOUT = StopReason.TIMEOUT.value
+    def __call__(self, problem: BoundaryValueProblem, guess: CollocationSolution,
+                 settings: SolverSettings, monitor: Monitor | None = None, *,
+                 expected_error: float = 1.0) -> CollocationResult:
+        """Solve it from a guess, see :func:`flex_planner.collocation.solve.solve`."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SolverSettings:
+@dataclass(frozen=True, slots=True)
+class Solver:
     """
-    How a boundary-value problem is solved.
+    Settings of a solver, the monitor that watches it, and its method.
 
     Parameters
     ----------
-    stages : int
-        Gauss points an interval, 2 to 11; order 2 stages.
-    intervals : int
-        Of the first mesh, 4 to `max_intervals`.
-    max_intervals : int
-        At most 20000.
-    max_iterations : int
-        Newton iterations on one mesh, 1 to 1000.
-    error_tolerance : float
-        Largest error of an unknown at the nodes relative to its magnitude, 1e-11 to 1.
-    max_meshes : int
-        Meshes tried, 1 to 100; the last one's solution is returned with status ``MESH_LIMIT`` if
-        it is not exact enough.
-
-    Raises
-    ------
-    InvalidValueError
-        If a value breaks its bound.
-
-    """
-
-    stages: int = 8
-    intervals: int = 20
-    max_intervals: int = 2000
-    max_iterations: int = 60
-    error_tolerance: float = 1e-6
-    max_meshes: int = 20
-
-    def __post_init__(self) -> None:
-        # the error estimate needs a rule of one stage more
-        integer('stages', self.stages, at_least=FEWEST_STAGES, at_most=MOST_STAGES - 1)
-        integer('max_intervals', self.max_intervals, at_least=4, at_most=20000)
-        integer('intervals', self.intervals, at_least=4, at_most=self.max_intervals)
-        integer('max_iterations', self.max_iterations, at_least=1, at_most=1000)
-        integer('max_meshes', self.max_meshes, at_least=1, at_most=100)
-        number('error_tolerance', self.error_tolerance, at_least=1e-11, at_most=1)
-
-    @property
-    def rule(self) -> GaussRule:
-        """Return the Gauss rule."""
-        return GaussRule.of(self.stages)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class CollocationResult:
-    """
-    A boundary-value problem solved, or how far it came.
-
-    Attributes
-    ----------
-    solution : CollocationSolution
-        The last point accepted; if solved, improved by its error estimate.
-    status : SolverStatus
-        Only ``CONVERGED`` is a solution.
-    errors : numpy.ndarray, shape (m,)
-        Estimated error of each unknown at the nodes relative to its magnitude; ``inf`` unless
-        Newton's method converged on the mesh.
-    residual : float
-        Largest defect of an interval, see :func:`flex_planner.collocation.mesh.defects`;
-        ``inf`` unless Newton's method converged on the mesh.
-    switches : numpy.ndarray
-        Times at which F is not smooth.
-    iterations : int
-        Newton iterations on all meshes.
-    meshes : int
-        Meshes tried.
-    message : str
-        The status in more words.
-
-    """
-
-    solution: CollocationSolution
-    status: SolverStatus
-    errors: Array
-    residual: float
-    switches: Array
-    iterations: int
-    meshes: int
-    message: str
-
-    @property
-    def converged(self) -> bool:
-        """Whether this is a solution."""
-        return self.status is SolverStatus.CONVERGED
-
-
-def solve(problem: BoundaryValueProblem, guess: CollocationSolution, settings: SolverSettings,
-          monitor: Monitor | None = None, *, expected_error: float = 1.0) -> CollocationResult:
-    """
-    Solve a two-point boundary-value problem.
-
-    Parameters
-    ----------
-    problem : BoundaryValueProblem
-        z' = F(t, z) with separated boundary conditions.
-    guess : CollocationSolution
-        Start; its mesh is the first mesh, its rule is replaced by that of the settings.
     settings : SolverSettings
         Tolerances and limits.
-    monitor : Monitor, optional
-        Watches the iterations and may stop them.
-    expected_error : float
-        Of a solution on the mesh of the guess; Newton's method need not go much further. 1 if it
-        is not known to be good for anything better.
+    monitor : Monitor
+        Receives progress, and may cancel or limit the time.
+    backend : Backend
+        The method; Gauss collocation by default.
 
     """
-    if guess.rule.stages != settings.stages:
-        guess = guess.on_mesh(guess.mesh, settings.rule)
-    return _Solver(problem, guess, settings, monitor or Monitor(), expected_error).run()
 
+    settings: SolverSettings = SolverSettings()
+    monitor: Monitor = field(default_factory=Monitor)
+    backend: Backend = solve
 
-class _Solver:
-    """The state of one call of `solve`."""
+    def solve(self, problem: BoundaryValueProblem, guess: CollocationSolution, *,
+              expected_error: float = 1.0) -> CollocationResult:
+        """Solve a problem from a guess, see :func:`flex_planner.collocation.solve.solve`."""
+        return self.backend(problem, guess, self.settings, self.monitor,
+                            expected_error=expected_error)
 
-    def __init__(self, problem: BoundaryValueProblem, guess: CollocationSolution,
-                 settings: SolverSettings, monitor: Monitor, expected: float) -> None:
-        self._problem, self._point, self._settings = problem, guess, settings
-        self._monitor = monitor
-        self._iterations, self._meshes, self._rescues = 0, 1, 0
-        self._expected, self._least, self._placements = expected, np.inf, 0
+    def watched_by(self, monitor: Monitor | None) -> Solver:
+        """Return the same solver with another monitor, if one is given."""
+        return self if monitor is None else replace(self, monitor=monitor)
 
-    def run(self) -> CollocationResult:
-        """Solve on mesh after mesh."""
-        settings = self._settings
-        while True:
-            tolerance = self._newton_tolerance()
-            outcome = newton(self._problem, self._point, tolerance=tolerance,
-                             max_iterations=settings.max_iterations, monitor=self._monitor)
-            self._iterations += outcome.iterations
-            self._point = outcome.solution
-            if not outcome.converged or outcome.system is None:
-                if self._rescued(outcome):
-                    continue
-                return self._failed(outcome)
-            switches = switching_times(self._problem, self._point)
-            if self._placed(switches):
-                continue
-            estimate = estimated(self._problem, self._point, outcome.system)
-            if tolerance > 3 * self._newton_tolerance(estimate.worst):
-                self._expected = estimate.worst  # the mesh deserves a better solution
-                continue
-            if estimate.worst <= settings.error_tolerance:
-                return self._result(estimate.improved, SolverStatus.CONVERGED, estimate, switches)
-            if not self._refine(estimate, switches):
-                return self._mesh_limit(estimate, switches)
+    def set(self, **changes: Any) -> Solver:
+        """Return the same solver with fields of its settings changed."""
+        return replace(self, settings=replace(self.settings, **changes))
 
-    def _newton_tolerance(self, expected: float | None = None) -> float:
-        """Return how far Newton's method has to go where a certain error is expected."""
-        error = max(self._expected if expected is None else expected,
-                    self._settings.error_tolerance)
-        return float(min(_NEWTON_SHARE * error, _LOOSEST_NEWTON))
+    def loose(self) -> Solver:
+        """Return a solver for solutions along a homotopy."""
+        return self.set(error_tolerance=max(_LOOSE_TOLERANCE, self.settings.error_tolerance))
 
-    def _rescued(self, outcome: NewtonOutcome) -> bool:
-        """
-        Move to a finer mesh where Newton's method failed for want of one; False if there is none.
+    def cheap(self) -> Solver:
+        """Return a solver for a step along a homotopy that may fail."""
+        return self.loose().patient(_CHEAP_ITERATIONS)
 
-        Either the mean Jacobian does not fit, or a switch inside an interval made it stall near a
-        solution; the switch gets a node.
+    def coarse(self, accuracy: float = _COARSE_TOLERANCE) -> Solver:
+        """Return a solver for solutions along a continuation, exact to an accuracy."""
+        wanted = max(min(accuracy, _COARSE_TOLERANCE), self.settings.error_tolerance)
+        return self.set(error_tolerance=wanted).patient(_COARSE_ITERATIONS)
 
-        """
-        if outcome.stopped or self._rescues >= _MOST_RESCUES:
-            return False
-        found = defects(self._problem, self._point)
-        before = self._point.intervals
-        switches: Array = np.zeros(0)
-        if outcome.coarse and before < _COARSE and np.isfinite(found).any():
-            factor = 2.0
-        elif outcome.correction <= _NEAR:
-            switches = switching_times(self._problem, self._point)
-            factor = 1.0 if self._rescues < 2 else 1.5
-            if not (switches.size or self._rescues):
-                return False
-        else:
-            return False
-        count = min(int(factor * before) + switches.size, self._settings.max_intervals)
-        if count <= before:
-            return False
-        self._rescues += 1
-        self._meshes += 1
-        self._expected = 1.0
-        mesh = levelled(self._point, found, 1.0, switches, fewest=count, most=count)
-        self._point = self._point.on_mesh(mesh)
-        return True
-
-    def _on_nodes(self, switches: Array) -> bool:
-        """
-        Return whether each switch is near enough to a node.
-
-        A switch a distance d before the end of a step h is missed by every rule, and costs
-        (d / h)^2 of what the step adds.
-
-        """
-        mesh = self._point.mesh
-        right = np.clip(np.searchsorted(mesh, switches), 1, mesh.size - 1)
-        gaps = np.minimum(switches - mesh[right - 1], mesh[right] - switches)
-        allowed = np.sqrt(self._settings.error_tolerance) * np.diff(mesh)[right - 1]
-        return bool((gaps <= np.maximum(allowed, 1e-9 * (mesh[-1] - mesh[0]))).all())
-
-    def _placed(self, switches: Array) -> bool:
-        """Move nodes to the switches of a resolved solution; False if they are there."""
-        if (self._expected > _RESOLVED or self._placements >= _MOST_PLACEMENTS
-                or self._on_nodes(switches)):
-            return False
-        self._placements += 1
-        count = self._point.intervals
-        most = min(count + switches.size, max(count, self._settings.max_intervals))
-        mesh = levelled(self._point, defects(self._problem, self._point), 1.0, switches,
-                        fewest=count, most=most)
-        self._point = self._point.on_mesh(mesh)
-        return True
-
-    def _refine(self, estimate: Estimate, switches: Array) -> bool:
-        """Move to a better mesh; False if there is none."""
-        settings, before = self._settings, self._point.intervals
-        if self._meshes - self._rescues >= settings.max_meshes:
-            return False
-        order = 2 * settings.stages
-        error = min(estimate.worst, 1e6)
-        growth = float((error / (_MARGIN * settings.error_tolerance)) ** (1 / order))
-        fewest = _SMALLEST_GROWTH * before
-        if error > 0.5 * self._least:  # the last mesh was no better: prediction fails
-            fewest = 1.3 * before
-        self._least = min(self._least, error)
-        mesh = levelled(self._point, defects(self._problem, self._point), growth, switches,
-                        fewest=min(max(4, int(np.ceil(fewest))), settings.max_intervals),
-                        most=min(int(_LARGEST_GROWTH * before), settings.max_intervals))
-        if before >= settings.max_intervals and mesh.size - 1 >= before:
-            return False
-        self._expected = min(1.0, error * (before / (mesh.size - 1)) ** order)
-        self._point = self._point.on_mesh(mesh)
-        self._meshes += 1
-        return True
-
-    def _result(self, solution: CollocationSolution, status: SolverStatus, estimate: Estimate,
-                switches: Array, message: str = '') -> CollocationResult:
-        return CollocationResult(
-            solution=solution, status=status, errors=estimate.errors,
-            residual=float(defects(self._problem, solution).max()), switches=switches,
-            iterations=self._iterations, meshes=self._meshes, message=message or status.value)
-
-    def _failed(self, outcome: NewtonOutcome) -> CollocationResult:
-        stops = {StopReason.CANCELED: SolverStatus.CANCELED,
-                 StopReason.TIMEOUT: SolverStatus.TIMEOUT}
-        status = stops[outcome.stopped] if outcome.stopped else SolverStatus.NEWTON_FAILED
-        return CollocationResult(
-            solution=outcome.solution, status=status,
-            errors=np.full(self._problem.size, np.inf), residual=np.inf, switches=np.zeros(0),
-            iterations=self._iterations, meshes=self._meshes, message=outcome.message)
-
-    def _mesh_limit(self, estimate: Estimate, switches: Array) -> CollocationResult:
-        message = (f'an error of {estimate.worst:.1e} is left on {self._point.intervals} '
-                   f'intervals, {self._settings.error_tolerance:.1e} was asked for')
-        return self._result(self._point, SolverStatus.MESH_LIMIT, estimate, switches, message)
+    def patient(self, iterations: int) -> Solver:
+        """Return a solver that gives up after so many Newton iterations on a mesh."""
+        return self.set(max_iterations=min(iterations, self.settings.max_iterations))

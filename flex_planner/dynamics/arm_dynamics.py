@@ -7,8 +7,10 @@ Arrays hold one point per row. The state is x = (q, q').
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Callable, Mapping
-from typing import Any
+import pickle
+from typing import Any, TypeVar
 
 from flex_planner.arms.arm import Arm
 from flex_planner.base.validation import Array
@@ -20,6 +22,10 @@ RungeKuttaSteps = Callable[[Array, Array, float], tuple[Array, Array, Array]]
 HeldStep = Callable[[Array, Array, float], tuple[Array, Array, Array]]
 
 RUNGE_KUTTA_STAGES = 12
+_MOST_KEPT = 16
+
+Dynamics = TypeVar('Dynamics', bound='ArmDynamics')
+_kept: OrderedDict[tuple[type, bytes], Any] = OrderedDict()
 
 
 class ArmDynamics:
@@ -40,6 +46,16 @@ class ArmDynamics:
         self.arm = arm
         self._loaded: dict[str, BatchFunction] = {}
         self.compile()
+
+    @classmethod
+    def of(cls: type[Dynamics], arm: Arm) -> Dynamics:
+        """Return the functions of an arm, the same ones for an equal arm: some arms are kept."""
+        key = cls, pickle.dumps(arm)
+        found: Dynamics = _kept.pop(key, None) or cls(arm)
+        _kept[key] = found
+        if len(_kept) > _MOST_KEPT:
+            _kept.popitem(last=False)
+        return found
 
     def __getstate__(self) -> Arm:
         """Leave the machine code behind: it is loaded again when it is needed."""

@@ -12,30 +12,21 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import product
 import time
-from typing import NamedTuple
 
 from flex_planner.base.errors import FlexPlannerError, SingularError, UnreachableError
 from flex_planner.base.processes import return_memory
 from flex_planner.base.progress import Monitor, StoppedError
 from flex_planner.capacity.extrapolation import step_ratio
-from flex_planner.capacity.min_duration import MinDuration
+from flex_planner.capacity.results import MinDuration
 from flex_planner.maps.cell_results import CellCode, CellResult
-from flex_planner.maps.cell_solver import Found, Solver, task_of
+from flex_planner.maps.cell_solver import CellSolver, Found, NearCells, task_of
 from flex_planner.maps.end_points import close
 from flex_planner.maps.study import Block, Study
 from flex_planner.optimal_control.task import Task
-from flex_planner.planning.plan_problem import STATUSES
+from flex_planner.planning.plan_problem import STOP_STATUS
 
 Index = tuple[int, ...]
 _LONGEST_MESSAGE = 300
-
-
-class Neighbours(NamedTuple):
-    """What a cell starts from: two cells on a line with it, the nearer one first; or fewer."""
-
-    near: Found | None = None
-    far: Found | None = None
-    ratio: float = 1.0
 
 
 def blocks(study: Study) -> list[Block]:
@@ -68,11 +59,11 @@ class _Block:
     """A block on its way: what was found so far, and what each cell started from."""
 
     def __init__(self, study: Study, block: Block, monitor: Monitor | None) -> None:
-        self._study, self._monitor, self._solver = study, monitor, Solver(study)
+        self._study, self._monitor, self._solver = study, monitor, CellSolver(study)
         self._cells = list(product(*(range(part.start, part.stop) for part in block)))
         self._results = {result.index: result for result in study.known_failures(block)}
         self._done: dict[Index, Found] = {}
-        self._starts: dict[Index, Neighbours] = {}
+        self._starts: dict[Index, NearCells] = {}
 
     def results(self) -> list[CellResult]:
         """Return what became of the cells."""
@@ -88,7 +79,7 @@ class _Block:
     def _try_again(self, index: Index) -> None:
         """Solve a cell once more, unless it would start as it did."""
         first = self._results[index]
-        start = _neighbours(self._study, index, self._study.task(index), self._done)
+        start = _near_cells(self._study, index, self._study.task(index), self._done)
         if start == self._starts[index]:
             return
         second = self._added(index)
@@ -102,7 +93,7 @@ class _Block:
             limited.canceled = self._monitor.canceled
         result = self._solved(index, limited)
         return_memory()
-        start = self._starts.get(index, Neighbours())
+        start = self._starts.get(index, NearCells())
         return replace(result, message=result.message[:_LONGEST_MESSAGE],
                        warm=start.near is not None, seconds=time.monotonic() - began)
 
@@ -110,14 +101,14 @@ class _Block:
         """Solve a cell; whatever happens is a result."""
         try:
             task = self._study.task(index)
-            start = self._starts[index] = _neighbours(self._study, index, task, self._done)
-            found = self._solver.solve(index, task, monitor, *start)
+            start = self._starts[index] = _near_cells(self._study, index, task, self._done)
+            found = self._solver.solve(index, task, monitor, start)
             result = self._solver.result(index, found)
             if result.code is CellCode.SOLVED or isinstance(found, MinDuration):
                 self._done[index] = found
             return result
         except StoppedError as stop:
-            return CellResult(index=index, code=CellCode.of(STATUSES[stop.reason]),
+            return CellResult(index=index, code=CellCode.of(STOP_STATUS[stop.reason]),
                               message=str(stop))
         except (UnreachableError, SingularError) as error:
             return CellResult(index=index, code=CellCode.UNREACHABLE, message=str(error))
@@ -128,10 +119,10 @@ class _Block:
                               message=f'{type(error).__name__}: {error}')
 
 
-def _neighbours(study: Study, index: Index, task: Task,
-                done: dict[Index, Found]) -> Neighbours:
+def _near_cells(study: Study, index: Index, task: Task,
+                done: dict[Index, Found]) -> NearCells:
     """Return the cells that a cell starts from."""
-    best = Neighbours()
+    best = NearCells()
     for axis in reversed(range(len(index))):  # along a line of the block where there is one
         for back in (1, -1):
             near, far = (_there(index, axis, steps * back, task, done) for steps in (1, 2))
@@ -139,9 +130,9 @@ def _neighbours(study: Study, index: Index, task: Task,
                 continue
             if far is not None and type(far) is type(near):
                 here, values = index[axis], study.axes[axis].values
-                return Neighbours(near, far, step_ratio(
+                return NearCells(near, far, step_ratio(
                     values[here - 2 * back], values[here - back], values[here]))
-            best = best if best.near is not None else Neighbours(near)
+            best = best if best.near is not None else NearCells(near)
     return best
 
 

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 import math
-from typing import Any, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.progress import Monitor
-from flex_planner.capacity.extrapolation import thinned
-from flex_planner.capacity.max_payload import find_max_payload, MaxPayload
-from flex_planner.capacity.min_duration import find_min_duration, MinDuration
-from flex_planner.collocation import SolverSettings
+from flex_planner.capacity.extrapolation import Neighbours, thin_out
+from flex_planner.capacity.max_payload import find_max_payload
+from flex_planner.capacity.min_duration import find_min_duration
+from flex_planner.capacity.results import LimitResult, MaxPayload, MinDuration
+from flex_planner.collocation import Solver, SolverSettings
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.maps.cell_results import CellCode, CellResult
 from flex_planner.maps.kept_motions import KeptMotion
@@ -22,8 +23,7 @@ from flex_planner.optimal_control.motion_problem import MotionProblem, task_para
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_path
-from flex_planner.planning.strategies.first_extremals import first_motion
-from flex_planner.planning.strategies.price_continuation import on_the_way
+from flex_planner.planning.strategies.first_extremals import solve_first
 from flex_planner.simulation.comparison import finely_sampled
 from flex_planner.simulation.execution import execute_plan, ExecutionMode, Setting
 from flex_planner.simulation.joint_control import Gains
@@ -47,7 +47,15 @@ class Vibration:
 Found: TypeAlias = MaxPayload | MinDuration | Plan | Vibration
 
 
-class Solver:
+class NearCells(NamedTuple):
+    """What a cell starts from: two cells on a line with it, the nearer one first; or fewer."""
+
+    near: Found | None = None
+    far: Found | None = None
+    ratio: float = 1.0
+
+
+class CellSolver:
     """
     Solves the cells of a study.
 
@@ -61,10 +69,10 @@ class Solver:
     def __init__(self, study: Study) -> None:
         self._study, self._model = study, ArmModel(study.arm)
 
-    def solve(self, index: tuple[int, ...], task: Task, monitor: Monitor, near: Any, far: Any,
-              ratio: float) -> Found:
+    def solve(self, index: tuple[int, ...], task: Task, monitor: Monitor,
+              start: NearCells) -> Found:
         """
-        Return what was found for the task of a cell, from what was found for neighbours.
+        Solve the task of a cell, starting from cells near it.
 
         Raises
         ------
@@ -76,22 +84,18 @@ class Solver:
         """
         study, model = self._study, self._model
         problem = MotionProblem(model, task, task_parameters(task))
-        settings = _settings(problem)
+        solver = Solver(_settings(problem), monitor)
         if study.quantity is Quantity.MAX_PAYLOAD:
-            return self._payload(problem, settings, monitor, near, far, ratio)
+            return self._find_payload(problem, solver, start)
         if study.quantity is Quantity.MIN_DURATION:
-            return find_min_duration(task, model=model, settings=settings, monitor=monitor,
-                                     accuracy=study.accuracy, start_from=near, before=far,
-                                     ratio=ratio)
-        plan = plan_path(task, model=model, settings=settings, monitor=monitor,
-                         start_from=_plan_of(near))
+            return find_min_duration(task, model=model, solver=solver, accuracy=study.accuracy,
+                                     start_from=_neighbours(start))
+        plan = plan_path(task, model=model, solver=solver, start_from=_plan_of(start.near))
         if study.quantity is Quantity.MIN_EFFORT or not plan.solved:
             return plan
         return self._shaken(index, task, plan, monitor)
 
-    def _payload(self, problem: MotionProblem, settings: SolverSettings, monitor: Monitor,
-                 near: Any,
-                 far: Any, ratio: float) -> Found:
+    def _find_payload(self, problem: MotionProblem, solver: Solver, start: NearCells) -> Found:
         """
         Return the largest payload, or the shortest duration where that is too long.
 
@@ -99,20 +103,16 @@ class Solver:
         of such cells that costs a few iterations.
 
         """
-        task, late = problem.task, isinstance(near, MinDuration)
-        if self._says_much and (late or _may_be_none(problem, settings, near, far, ratio,
-                                                     monitor)):
+        task, late = problem.task, isinstance(start.near, MinDuration)
+        if self._says_much and (late or _may_be_none(problem, solver, start)):
             shortest = find_min_duration(
-                task, model=self._model, settings=settings, monitor=monitor,
-                accuracy=_SHORT * task.duration, start_from=near if late else None,
-                before=far if late else None, ratio=ratio)
+                task, model=self._model, solver=solver, accuracy=_SHORT * task.duration,
+                start_from=_neighbours(start) if late else None)
             if shortest.solved and shortest.lower > task.duration:
                 return shortest
-        if late:
-            near = far = None
-        return find_max_payload(task, model=self._model, settings=settings, monitor=monitor,
-                                accuracy=self._study.accuracy, start_from=near, before=far,
-                                ratio=ratio)
+        return find_max_payload(task, model=self._model, solver=solver,
+                                accuracy=self._study.accuracy,
+                                start_from=None if late else _neighbours(start))
 
     @property
     def _says_much(self) -> bool:
@@ -159,21 +159,27 @@ def _settings(problem: MotionProblem) -> SolverSettings:
     return replace(settings, max_intervals=most)
 
 
-def _may_be_none(problem: MotionProblem, settings: SolverSettings, near: MaxPayload | None,
-                 far: MaxPayload | None, ratio: float, monitor: Monitor) -> bool:
+def _neighbours(start: NearCells) -> Neighbours:
+    """Return the searches among the cells that a cell starts from."""
+    near, far = (one if isinstance(one, LimitResult) else None for one in (start.near, start.far))
+    return Neighbours(near=near, far=far, ratio=start.ratio)
+
+
+def _may_be_none(problem: MotionProblem, solver: Solver, start: NearCells) -> bool:
     """Return whether neighbours, or a first trial, let expect that nothing can be carried."""
-    if near is None:
-        return not first_motion(problem, on_the_way(settings), monitor).converged
-    slope = near.payload - far.payload if far is not None else -near.payload / 2
-    return near.payload + 2 * ratio * slope < problem.task.payload_mass
+    near, far = start.near, start.far
+    if not isinstance(near, MaxPayload):
+        return not solve_first(problem, solver.coarse()).converged
+    slope = near.payload - far.payload if isinstance(far, MaxPayload) else -near.payload / 2
+    return near.payload + 2 * start.ratio * slope < problem.task.payload_mass
 
 
 def _kept(found: Found, plan: Plan) -> KeptMotion | None:
     """Return what others may start from: near a limit, the last motion but one on the way."""
-    if isinstance(found, MaxPayload) and found.stops:
-        stop = found.stops[-2:][0]
-        motion = thinned(stop, on_the_way(SolverSettings()))
-        return KeptMotion.of(stop.problem, motion.solution, stop.price)
+    if isinstance(found, MaxPayload) and found.extremals:
+        extremal = found.extremals[-2:][0]
+        motion = thin_out(extremal, Solver().coarse())
+        return KeptMotion.of(extremal.problem, motion.solution, extremal.price)
     return None if plan.solution is None else KeptMotion.of(plan.problem, plan.solution)
 
 

@@ -15,7 +15,7 @@ from flex_planner.collocation import CollocationSolution, GaussRule
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
 from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.optimal_control.task import Task
-from flex_planner.planning.strategies.price_continuation import SearchStart
+from flex_planner.planning.strategies.extremals import SearchStart
 import numpy as np
 from numpy.typing import NDArray
 

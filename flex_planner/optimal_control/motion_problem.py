@@ -4,32 +4,28 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from flex_planner.base.errors import InvalidTaskError, NoEquilibriumError
 from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationSolution, GaussRule
-from flex_planner.dynamics.statics import equilibrium, natural_modes
+from flex_planner.dynamics.statics import natural_modes
 from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.boundary_conditions import BoundaryConditions
 from flex_planner.optimal_control.parameters import Parameters
-from flex_planner.optimal_control.task import MAX_PAYLOAD, Task
+from flex_planner.optimal_control.task import Task
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 Indices = NDArray[np.intp]
 
 # of the highest natural frequency; an exact solution takes two or three times as many
 _POINTS_PER_CYCLE = 5.0
-# share of its stall torque by which a motor is said to be too weak for a buckled arm
-_OVERLOADED = 1e3
 
 
 class MotionProblem:
     """
     The optimality conditions of a task.
 
-    The unknowns are z = (q, q', psi_1, psi_2), 4 n_t of them. The state is given at the start.
-    At the goal each coordinate and rate is either given, eq. (16), or weighs in the cost by the
-    terminal term of eq. (6), whose derivative is its costate there (transversality).
+    The unknowns are z = (q, q', psi_1, psi_2), 4 n_t of them; `BoundaryConditions` says what holds
+    at both ends.
 
     Parameters
     ----------
@@ -42,12 +38,10 @@ class MotionProblem:
 
     Attributes
     ----------
-    start, goal : numpy.ndarray, shape (2 n_t,)
-        States at both ends, bent as gravity bends the arm at rest.
-    goal_weights : numpy.ndarray, shape (2 n_t,)
-        Diagonals of W_p and W_v of eq. (6); infinite where the goal must be met.
-    holding_torque : numpy.ndarray, shape (n,)
-        Holds the arm at the goal [N m].
+    ends : BoundaryConditions
+        Rows at both ends.
+    start, goal, goal_weights, holding_torque : numpy.ndarray
+        Of `ends`.
     p : numpy.ndarray
         Stacked parameters.
     explicit : numpy.ndarray of int
@@ -65,18 +59,12 @@ class MotionProblem:
         self.p = parameters.stacked()
         n_t = model.arm.n_coordinates
         self.size = 4 * n_t
-        start, _ = equilibrium(model, task.start_positions, parameters)
-        goal, self.holding_torque = equilibrium(model, task.goal_positions, parameters)
-        if task.ends_at_rest:
-            _check_holding(self.holding_torque, parameters)
-        self.start = np.concatenate([start, task.start_velocities])
-        self.goal = np.concatenate([goal, task.goal_velocities])
-        self.goal_weights = np.concatenate([task.goal_position_weights,
-                                            task.goal_velocity_weights])
+        self.ends = BoundaryConditions(model, task, parameters)
+        self.start, self.goal = self.ends.start, self.ends.goal
+        self.goal_weights = self.ends.goal_weights
+        self.holding_torque = self.ends.holding_torque
         self.scale = self._scale()
         self.explicit: Indices = np.r_[0:n_t, 2 * n_t:3 * n_t]
-        self._left_rows = np.eye(2 * n_t, 4 * n_t)
-        self._right_rows = _transversality(self.goal_weights)
 
     def rate(self, t: Array, z: Array) -> Array:
         """Return z'; the problem does not depend on time."""
@@ -94,18 +82,21 @@ class MotionProblem:
 
     def left(self, z: Array) -> tuple[Array, Array]:
         """Return the initial conditions of eq. (16)."""
-        return z[:self.start.size] - self.start, self._left_rows
+        return self.ends.left(z)
 
     def right(self, z: Array) -> tuple[Array, Array]:
         """Return the final conditions of eq. (16), or transversality of eq. (6)."""
-        half = self.goal.size
-        miss = np.concatenate([z[:half] - self.goal, z[half:]])
-        residual: Array = self._right_rows @ miss
-        return residual, self._right_rows
+        return self.ends.right(z)
 
     def reached(self, end: Array) -> Array:
         """Return the state (2 n_t,) that a motion ending in `end` is to reach."""
-        return np.where(np.isinf(self.goal_weights), self.goal, end)
+        return self.ends.reached(end)
+
+    def changed(self, **changes: float) -> MotionProblem:
+        """Return the problem of the same task changed in payload or duration."""
+        task = replace(self.task, **changes)  # type: ignore[arg-type]
+        parameters = replace(self.parameters, payload_mass=task.payload_mass)
+        return MotionProblem(self.model, task, parameters)
 
     def fewest_intervals(self, stages: int) -> int:
         """Return the intervals of a mesh that resolves nothing finely but overlooks nothing."""
@@ -149,50 +140,6 @@ class MotionProblem:
         scale: Array = np.concatenate([positions, positions / duration,
                                        velocity_costates / duration, velocity_costates]) / 10
         return scale
-
-
-def _transversality(weights: Array) -> Array:
-    """Return the rows of ``x - goal = 0``, or of ``psi - W (x - goal) = 0`` for finite W."""
-    given = np.isinf(weights)
-    states = np.where(given, 1.0, -np.where(given, 0.0, weights))
-    return np.hstack([np.diag(states), np.diag(np.where(given, 0.0, 1.0))])
-
-
-def _check_holding(torque: Array, parameters: Parameters) -> None:
-    """Refuse a goal at which the arm would sink as soon as it has arrived."""
-    for i, (needed, stall) in enumerate(zip(torque, parameters.stall_torque, strict=True), 1):
-        if abs(needed) > stall:
-            raise InvalidTaskError(
-                f'joint {i} needs {abs(needed):.4g} N m to hold the arm with its payload at the '
-                f'goal, but the stall torque of its motor is {stall:.4g} N m')
-
-
-def holding_limit(problem: MotionProblem) -> tuple[float, int]:
-    """
-    Return the payload [kg] that the motors just hold at the goal, and the joint that is first.
-
-    The payload is infinite where gravity does not load the joints, or motors have no limits.
-
-    """
-    model, parameters = problem.model, problem.parameters
-
-    def load(payload: float) -> Array:
-        """Return the share of the stall torque that each motor needs."""
-        try:
-            torque = equilibrium(model, problem.task.goal_positions,
-                                 replace(parameters, payload_mass=payload))[1]
-        except NoEquilibriumError:
-            return np.full(model.arm.n_joints, _OVERLOADED)
-        share: Array = np.abs(torque) / parameters.stall_torque
-        return share
-
-    heavy = 1.0
-    while load(heavy).max() < 1:
-        heavy *= 2
-        if heavy > MAX_PAYLOAD:
-            return np.inf, 0
-    limit = float(brentq(lambda payload: load(payload).max() - 1, 0.0, heavy, xtol=1e-12))
-    return limit, int(load(limit).argmax())
 
 
 def task_parameters(task: Task) -> Parameters:

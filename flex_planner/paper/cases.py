@@ -8,7 +8,8 @@ import math
 from flex_planner.arms.arm import Arm, Joint, Link, Motor, Node
 from flex_planner.arms.arm_files import load_arm
 from flex_planner.base.errors import FlexPlannerError
-from flex_planner.capacity.max_payload import find_max_payload, MaxPayload
+from flex_planner.capacity.max_payload import find_max_payload
+from flex_planner.capacity.results import MaxPayload
 from flex_planner.optimal_control.task import postures_from_points, Task
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_path

@@ -12,8 +12,39 @@ from flex_planner.dynamics.integration import integrate
 from flex_planner.dynamics.statics import residual_vibration
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.planned_torque import PlannedTorque
-from flex_planner.planning.plan import Certificate
 import numpy as np
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Certificate:
+    """
+    How exactly a plan meets its conditions; ``inf`` where nothing was found out.
+
+    Attributes
+    ----------
+    collocation_residual : float
+        Largest defect of a mesh interval relative to the unknowns.
+    boundary_error : float
+        Left side of eq. (17) with W_p = W_v = 1, at the end of the re-simulation.
+    hamiltonian_drift : float
+        Spread of H over the motion relative to its largest term; 0 on an extremal.
+    tip_error : float
+        Distance of the re-simulated tip from the goal [m].
+    residual_vibration : float
+        Largest bending after the joints are locked at the end of the re-simulation [m].
+    state_error, costate_error : float
+        Estimated largest error of states and costates at the nodes of the mesh, relative to
+        the largest value of each.
+
+    """
+
+    collocation_residual: float = np.inf
+    boundary_error: float = np.inf
+    hamiltonian_drift: float = np.inf
+    tip_error: float = np.inf
+    residual_vibration: float = np.inf
+    state_error: float = np.inf
+    costate_error: float = np.inf
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,7 +87,7 @@ def certify(problem: MotionProblem, result: CollocationResult, monitor: Monitor,
     """
     if not np.isclose(result.solution.mesh[-1], problem.task.duration, rtol=1e-12):
         raise ValueError('the solution does not last as long as its task')
-    final, reached = final_state(problem, result.solution, monitor, rtol)
+    final, reached = simulate_to_goal(problem, result.solution, monitor, rtol)
     if not np.isfinite(final).all():
         return Certificate(collocation_residual=result.residual)
     arm, n_t = problem.model.arm, problem.model.arm.n_coordinates
@@ -72,8 +103,8 @@ def certify(problem: MotionProblem, result: CollocationResult, monitor: Monitor,
         costate_error=float(result.errors[2 * n_t:].max()))
 
 
-def final_state(problem: MotionProblem, solution: CollocationSolution, monitor: Monitor,
-                rtol: float) -> tuple[Array, Array]:
+def simulate_to_goal(problem: MotionProblem, solution: CollocationSolution, monitor: Monitor,
+                     rtol: float) -> tuple[Array, Array]:
     """
     Return where the planned torque leads, and where it should, shape (2 n_t,) each.
 
@@ -103,42 +134,3 @@ def hamiltonian_drift(problem: MotionProblem, solution: CollocationSolution) -> 
     powers = np.abs(z[:, half:] * problem.rate(times, z)[:, :half]).max(axis=1)
     size = max(float(np.max(controls.cost_rate)), float(np.max(powers)), np.finfo(float).tiny)
     return float(np.ptp(controls.hamiltonian)) / size
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Totals:
-    """
-    Integrals over a motion, as in `Plan`.
-
-    J of eq. (6), effort [N^2 m^2 s], energy [J], and the share of time of each motor on its limit.
-
-    """
-
-    cost: float
-    effort: float
-    energy: float
-    saturation: Array
-
-
-def totals(problem: MotionProblem, solution: CollocationSolution) -> Totals:
-    """Return cost, effort and energy, by Gauss quadrature on the mesh."""
-    n, n_t = problem.model.arm.n_joints, problem.model.arm.n_coordinates
-    z = solution.stage_values().reshape(-1, problem.size)
-    controls = problem.model.controls(z, problem.p)
-    weights = (solution.steps[:, None] * solution.rule.weights).ravel()
-
-    def integral(values: Array) -> float:
-        return float(weights @ values)
-
-    power = np.abs(controls.torque * z[:, n_t:n_t + n]).sum(axis=1)
-    saturated = controls.torque != controls.free_torque
-    return Totals(cost=integral(controls.cost_rate) + _terminal_cost(problem, solution),
-                  effort=integral((controls.torque ** 2).sum(axis=1)), energy=integral(power),
-                  saturation=weights @ saturated / problem.task.duration)
-
-
-def _terminal_cost(problem: MotionProblem, solution: CollocationSolution) -> float:
-    """Return the first terms of eq. (6), and the price of the duration."""
-    miss = solution.nodes[-1, :problem.goal.size] - problem.goal
-    weights = np.where(np.isinf(problem.goal_weights), 0.0, problem.goal_weights)
-    return float(weights @ miss**2 / 2 + problem.task.time_weight * problem.task.duration)

@@ -13,6 +13,7 @@ from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import Task
 from flex_planner.optimal_control.torque_limits import TorqueLimits
+from flex_planner.planning.certificate import Certificate
 from flex_planner.planning.objectives import ObjectiveSearch
 import numpy as np
 
@@ -27,38 +28,6 @@ class PlanStatus(Enum):
     OBJECTIVE_NOT_MET = 'an objective cannot be met, this is the closest motion'
     TIMEOUT = 'time limit reached'
     CANCELED = 'canceled'
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Certificate:
-    """
-    How exactly a plan meets its conditions; ``inf`` where nothing was found out.
-
-    Attributes
-    ----------
-    collocation_residual : float
-        Largest defect of a mesh interval relative to the unknowns.
-    boundary_error : float
-        Left side of eq. (17) with W_p = W_v = 1, at the end of the re-simulation.
-    hamiltonian_drift : float
-        Spread of H over the motion relative to its largest term; 0 on an extremal.
-    tip_error : float
-        Distance of the re-simulated tip from the goal [m].
-    residual_vibration : float
-        Largest bending after the joints are locked at the end of the re-simulation [m].
-    state_error, costate_error : float
-        Estimated largest error of states and costates at the nodes of the mesh, relative to
-        the largest value of each.
-
-    """
-
-    collocation_residual: float = np.inf
-    boundary_error: float = np.inf
-    hamiltonian_drift: float = np.inf
-    tip_error: float = np.inf
-    residual_vibration: float = np.inf
-    state_error: float = np.inf
-    costate_error: float = np.inf
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -11,12 +11,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from flex_planner.base.progress import Monitor, StoppedError
+from flex_planner.base.progress import StoppedError
 from flex_planner.base.validation import Array
-from flex_planner.collocation import CollocationResult, CollocationSolution, solve, SolverSettings
-from flex_planner.collocation.homotopy import STOPPED, walk
+from flex_planner.collocation import (
+    CollocationResult,
+    CollocationSolution,
+    follow_homotopy,
+    INTERRUPTED,
+    Solver,
+)
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
-from flex_planner.planning.certificate import totals
+from flex_planner.optimal_control.totals import integrate_totals
 from flex_planner.planning.objectives import (
     Margin,
     Objective,
@@ -25,8 +30,9 @@ from flex_planner.planning.objectives import (
     WeightTrial,
 )
 from flex_planner.planning.plan import Plan, PlanStatus
-from flex_planner.planning.plan_problem import LADDER, planned, STATUSES
-from flex_planner.planning.strategies.initial_guesses import Strategy, warm_start
+from flex_planner.planning.plan_problem import plan_problem, STOP_STATUS
+from flex_planner.planning.strategies.catalogue import CATALOGUE
+from flex_planner.planning.strategies.initial_guesses import warm_start
 import numpy as np
 
 # first weight: what it adds to the cost, as a share; for R the share itself
@@ -44,8 +50,7 @@ _IDLE, _IDLE_TURNS, _MOST_TURNS = 0.9, 2, 30
 _INSIDE, _NEARLY = 0.1, 0.9
 
 
-def adapted(plan: Plan, objectives: Objectives, settings: SolverSettings,
-            monitor: Monitor) -> Plan:
+def adapt_weights(plan: Plan, objectives: Objectives, solver: Solver) -> Plan:
     """
     Return the plan with the smallest weights that meet the objectives.
 
@@ -55,8 +60,8 @@ def adapted(plan: Plan, objectives: Objectives, settings: SolverSettings,
         Solved, with the weights of the task.
     objectives : Objectives
         Checked against the task.
-    settings, monitor
-        Of the solver.
+    solver : Solver
+        Its monitor may interrupt the search.
 
     Returns
     -------
@@ -68,20 +73,19 @@ def adapted(plan: Plan, objectives: Objectives, settings: SolverSettings,
     assert plan.solution is not None
     if not objectives.limited(plan.arm):
         return replace(plan, objectives=ObjectiveSearch(objectives=objectives, met=True))
-    search = _Search(plan.problem, plan.solution, objectives, settings, monitor)
+    search = _Search(plan.problem, plan.solution, objectives, solver)
     try:
         met = search.run()
         if not search.trials:
             return replace(plan, objectives=ObjectiveSearch(objectives=objectives, met=True))
         best = search.best
-        monitor.phase = 'plan with the weights found'
-        rungs: tuple[tuple[str, Strategy], ...] = (
-            ('weights adapted', warm_start(best.solution)), *LADDER)
-        found = planned(best.problem, rungs, settings, monitor)
-    except StoppedError as stop:
-        return Plan(task=plan.task, status=STATUSES[stop.reason], message=str(stop),
+        solver.monitor.phase = 'plan with the weights found'
+        strategies = (warm_start(best.solution, 'weights adapted'), *CATALOGUE)
+        found = plan_problem(best.problem, solver, strategies)
+    except StoppedError as error:
+        return Plan(task=plan.task, status=STOP_STATUS[error.reason], message=str(error),
                     strategy=plan.strategy, problem=plan.problem, solution=None,
-                    iterations=monitor.iteration, planning_time=monitor.elapsed)
+                    iterations=solver.monitor.iteration, planning_time=solver.monitor.elapsed)
     report = ObjectiveSearch(objectives=objectives, met=met, trials=tuple(search.trials),
                              margins=search.margins() if met else ())
     found = replace(found, objectives=report)
@@ -109,9 +113,9 @@ class _Search:
     """Weights tried, and the motions that they led to."""
 
     def __init__(self, problem: MotionProblem, solution: CollocationSolution,
-                 objectives: Objectives, settings: SolverSettings, monitor: Monitor) -> None:
+                 objectives: Objectives, solver: Solver) -> None:
         self._base, self._objectives = problem, objectives
-        self._settings, self._monitor = settings, monitor
+        self._solver = solver
         self._limited = objectives.limited(problem.model.arm)
         self._below: dict[Objective, _Point] = {}
         self._patterns = {objective: objectives.pattern(objective, problem.model.arm)
@@ -136,7 +140,7 @@ class _Search:
             before = here
             for objective in self._limited:
                 if here.shares[objective] > 1 or here.weights[objective]:
-                    self._monitor.phase = f'weight of {objective.value}'
+                    self._solver.monitor.phase = f'weight of {objective.value}'
                     found = self._smallest(objective, here)
                     if found is None:
                         return False
@@ -197,7 +201,7 @@ class _Search:
         """Return motions that violate and that meet an objective; None for one that is not."""
         first = self._first_weight(objective)
         if here.shares[objective] > 1:
-            return self._raised(objective, here, first)
+            return self._raise(objective, here, first)
         above, factor = here, 1 + self._objectives.weight_tolerance
         while above.weights[objective]:
             weight = above.weights[objective] / factor
@@ -207,8 +211,8 @@ class _Search:
             above, factor = found, _FACTOR
         return None, above
 
-    def _raised(self, objective: Objective, here: _Point,
-                first: float) -> tuple[_Point, _Point | None]:
+    def _raise(self, objective: Objective, here: _Point,
+               first: float) -> tuple[_Point, _Point | None]:
         """
         Raise a weight until its objective is met, or given up.
 
@@ -226,15 +230,15 @@ class _Search:
             gained = below.shares[objective] - found.shares[objective]
             # were the gains to go on falling by this ratio, they would add up to this
             if gained < 0 and below.weights[objective]:
-                return below, self._least(objective, weight / _FACTOR**2, weight, below)
+                return below, self._find_between(objective, weight / _FACTOR**2, weight, below)
             ratio = gained / before if 0 < gained < before else 0.0
             hope = gained * ratio / (1 - ratio) if ratio or gained <= 0 else np.inf
             idle = idle + 1 if hope < found.shares[objective] - 1 else 0
             below, weight, before = found, weight * _FACTOR, gained
         return below, None
 
-    def _least(self, objective: Objective, low: float, high: float,
-               near: _Point) -> _Point | None:
+    def _find_between(self, objective: Objective, low: float, high: float,
+                      near: _Point) -> _Point | None:
         """Return a motion that meets an objective with a weight between two, if there is one."""
         ends, known = [np.log(low), np.log(high)], dict[float, _Point | None]()
         while ends[1] - ends[0] > np.log(_FINEST_FACTOR):
@@ -256,18 +260,18 @@ class _Search:
         """Return the weight that is tried first."""
         if objective is Objective.TORQUE_SHARES:
             return _FIRST_SHARE
-        cost = totals(self._base, self.best.solution).cost
-        trial = self._weighted({objective: 1.0})
-        added = totals(trial, self.best.solution).cost - cost
+        cost = integrate_totals(self._base, self.best.solution).cost
+        trial = self._with_weights({objective: 1.0})
+        added = integrate_totals(trial, self.best.solution).cost - cost
         return _FIRST_SHARE * cost / max(added, 1e-12)
 
     def _at(self, objective: Objective, weight: float, near: _Point) -> _Point | None:
         """Solve with a weight, from a motion with another; None if that fails."""
         weights = {**near.weights, objective: weight}
-        problem = self._weighted(weights)
-        result = self._solved(problem, near)
+        problem = self._with_weights(weights)
+        result = self._solve(problem, near)
         if not result.converged:
-            self._monitor.check()
+            self._solver.monitor.check()
             self.trials.append(WeightTrial(objective=objective, weight=weight, share=np.inf,
                                            met=False))
             return None
@@ -279,22 +283,23 @@ class _Search:
                                        met=share <= 1))
         return point
 
-    def _solved(self, problem: MotionProblem, near: _Point) -> CollocationResult:
+    def _solve(self, problem: MotionProblem, near: _Point) -> CollocationResult:
         """Solve from a motion with other weights, at once or step by step."""
-        result = solve(problem, near.solution, self._settings, self._monitor)
-        if result.converged or result.status in STOPPED:
+        result = self._solver.solve(problem, near.solution)
+        if result.converged or result.status in INTERRUPTED:
             return result
         first, last = near.problem.parameters, problem.parameters
 
-        def at(way: float) -> MotionProblem:
+        def at(share: float) -> MotionProblem:
             parameters = replace(
-                last, velocity_weights=_blend(first.velocity_weights, last.velocity_weights, way),
-                effort_weights=_blend(first.effort_weights, last.effort_weights, way))
+                last,
+                velocity_weights=_blend(first.velocity_weights, last.velocity_weights, share),
+                effort_weights=_blend(first.effort_weights, last.effort_weights, share))
             return MotionProblem(problem.model, problem.task, parameters)
 
-        return walk(at, near.solution, self._settings, self._monitor, first_step=0.5)
+        return follow_homotopy(at, near.solution, self._solver, first_step=0.5)
 
-    def _weighted(self, weights: dict[Objective, float]) -> MotionProblem:
+    def _with_weights(self, weights: dict[Objective, float]) -> MotionProblem:
         """Return the problem of the task with weights added."""
         task, arm = self._base.task, self._base.model.arm
         n, velocity, effort = arm.n_joints, task.velocity_weights.copy(), task.effort_weights
@@ -316,11 +321,11 @@ class _Search:
         return _Point(weights=weights, problem=problem, solution=solution, shares=shares)
 
 
-def _blend(first: Array, last: Array, way: float) -> Array:
-    """Return weights a share of the way: in equal ratios where both are positive."""
+def _blend(first: Array, last: Array, share: float) -> Array:
+    """Return weights between two, by a share: in equal ratios where both are positive."""
     both = (first > 0) & (last > 0)
     ratio = np.where(both, last, 1.0) / np.where(both, first, 1.0)
-    blend: Array = np.where(both, first * ratio**way, first + (last - first) * way)
+    blend: Array = np.where(both, first * ratio**share, first + (last - first) * share)
     return blend
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from flex_planner.base.validation import Array
-from flex_planner.capacity.max_payload import MaxPayload, PayloadMethod
+from flex_planner.capacity.results import MaxPayload, PayloadMethod
 from flex_planner.plotting.figures import finish, save, say
 from flex_planner.plotting.motion import draw_tip, draw_torques, Motion
 from matplotlib.axes import Axes

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from flex_planner.capacity.max_payload import MaxPayload
-from flex_planner.planning.plan import Certificate, Peaks, Plan, PlanStatus
+from flex_planner.capacity.results import MaxPayload
+from flex_planner.planning.certificate import Certificate
+from flex_planner.planning.plan import Peaks, Plan, PlanStatus
 import numpy as np
 
 Row = tuple[str, str]

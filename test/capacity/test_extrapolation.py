@@ -9,13 +9,10 @@ from typing import TypeVar
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.inverse_kinematics import inverse_kinematics
 from flex_planner.base.errors import InvalidValueError
-from flex_planner.capacity.extrapolation import continued, Switched
-from flex_planner.capacity.max_payload import find_max_payload, MaxPayload
-from flex_planner.capacity.min_duration import (
-    find_min_duration,
-    MinDuration,
-    payload_against_duration,
-)
+from flex_planner.capacity.extrapolation import extrapolate, Neighbours, SwitchedMotion
+from flex_planner.capacity.max_payload import find_max_payload
+from flex_planner.capacity.min_duration import find_min_duration, payload_against_duration
+from flex_planner.capacity.results import MaxPayload, MinDuration
 from flex_planner.collocation import CollocationSolution, GaussRule
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.task import Task
@@ -45,7 +42,7 @@ def continued_along(tasks: list[Task], search: Callable[..., Found]) -> list[Fou
     for task in tasks:
         near = found[-1] if found else None
         far = found[-2] if len(found) > 1 else None
-        found.append(search(task, start_from=near, before=far))
+        found.append(search(task, start_from=Neighbours(near=near, far=far)))
     return found
 
 
@@ -102,7 +99,8 @@ def test_uneven_steps_take_their_ratio(rigid_arm: Arm, paper_task: TaskFactory) 
     far, near, there = (towards(rigid_arm, paper_task, y) for y in (0.4, 0.41, 0.435))
     first = find_max_payload(far, model=model)
     second = find_max_payload(near, model=model, start_from=first)
-    right = find_max_payload(there, model=model, start_from=second, before=first, ratio=2.5)
+    right = find_max_payload(there, model=model, start_from=Neighbours(
+        near=second, far=first, ratio=2.5))
     assert right.payload == pytest.approx(find_max_payload(there, model=model).payload, abs=1e-3)
     assert right.iterations <= 12
 
@@ -114,8 +112,8 @@ def test_line_that_leads_nowhere_costs_no_answer(rigid_arm: Arm, paper_task: Tas
     elsewhere = towards(rigid_arm, paper_task, -0.3)
     expected = find_max_payload(elsewhere, model=model)
     for ratio in (1.0, 50.0, -50.0):
-        found = find_max_payload(elsewhere, model=model, start_from=second, before=first,
-                                 ratio=ratio)
+        found = find_max_payload(elsewhere, model=model, start_from=Neighbours(
+            near=second, far=first, ratio=ratio))
         assert found.solved, found.message
         assert found.payload == pytest.approx(expected.payload, abs=1e-3)
 
@@ -124,17 +122,15 @@ def test_searches_of_another_arm_are_left_aside(rigid_arm: Arm, ei50_arm: Arm,
                                                 paper_task: TaskFactory) -> None:
     first, second = (find_max_payload(task) for task in line(rigid_arm, paper_task, 2))
     task = towards(ei50_arm, paper_task, 0.425)
-    found = find_max_payload(task, start_from=second, before=first)
+    found = find_max_payload(task, start_from=Neighbours(near=second, far=first))
     assert found.solved, found.message
     assert found.payload == pytest.approx(find_max_payload(task).payload, abs=1e-3)
 
 
 @pytest.mark.parametrize('ratio', [np.nan, 101.0, -101.0])
-def test_ratio_out_of_bounds_is_refused(rigid_arm: Arm, paper_task: TaskFactory,
-                                        ratio: float) -> None:
-    for search in (find_max_payload, find_min_duration):
-        with pytest.raises(InvalidValueError, match='ratio is'):
-            search(paper_task(rigid_arm), ratio=ratio)
+def test_ratio_out_of_bounds_is_refused(ratio: float) -> None:
+    with pytest.raises(InvalidValueError, match='ratio is'):
+        Neighbours(ratio=ratio)
 
 
 def test_payload_against_duration_continues(rigid_arm: Arm, paper_task: TaskFactory) -> None:
@@ -170,14 +166,14 @@ def bent_line(switch: float, slope: float, intervals: int = 8) -> CollocationSol
     return CollocationSolution.from_values(mesh, values[:, None], GaussRule.of(4))
 
 
-def switched(switch: float, slope: float, *others: float) -> Switched:
+def switched(switch: float, slope: float, *others: float) -> SwitchedMotion:
     times = np.sort(np.array([switch, *others]))
     kinds = (times != switch).astype(int)
-    return Switched(bent_line(switch, slope), times, kinds)
+    return SwitchedMotion(bent_line(switch, slope), times, kinds)
 
 
 def test_corner_is_where_the_line_of_corners_leads() -> None:
-    guess = continued(switched(0.3, 1.0), switched(0.35, 1.1), 1.0, 1.0)
+    guess = extrapolate(switched(0.3, 1.0), switched(0.35, 1.1), 1.0, 1.0)
     t = np.linspace(0, 1, 101)
     # before the corner 0; after it values at the same share of the way are continued
     assert np.abs(guess(t[t <= 0.4])).max() < 1e-12
@@ -189,22 +185,22 @@ def test_corner_is_where_the_line_of_corners_leads() -> None:
 
 def test_corner_of_one_motion_only_is_kept() -> None:
     here = switched(0.35, 1.1, 0.6, 0.62)
-    guess = continued(switched(0.3, 1.0), here, 1.0, 1.0)
+    guess = extrapolate(switched(0.3, 1.0), here, 1.0, 1.0)
     t = np.linspace(0.41, 1, 60)
     share = (t - 0.4) / 0.6
     np.testing.assert_allclose(guess(t)[:, 0], 1.1 * share * 0.65, atol=1e-12)
 
 
 def test_corners_that_would_cross_stay_apart() -> None:
-    before = Switched(bent_line(0.5, 1.0), np.array([0.3, 0.5]), np.array([0, 1]))
-    here = Switched(bent_line(0.5, 1.0), np.array([0.44, 0.5]), np.array([0, 1]))
-    guess = continued(before, here, 1.0, 1.0)
+    before = SwitchedMotion(bent_line(0.5, 1.0), np.array([0.3, 0.5]), np.array([0, 1]))
+    here = SwitchedMotion(bent_line(0.5, 1.0), np.array([0.44, 0.5]), np.array([0, 1]))
+    guess = extrapolate(before, here, 1.0, 1.0)
     assert (np.diff(guess.mesh) > 0).all()
     assert np.isfinite(guess.nodes).all()
 
 
 def test_motion_of_another_duration_is_stretched() -> None:
-    guess = continued(switched(0.3, 1.0), switched(0.3, 1.0), 1.0, 2.0)
+    guess = extrapolate(switched(0.3, 1.0), switched(0.3, 1.0), 1.0, 2.0)
     assert guess.mesh[-1] == 2.0
     np.testing.assert_allclose(guess(np.array([0.6, 2.0]))[:, 0], [0.0, 0.7], atol=1e-12)
 
@@ -212,8 +208,10 @@ def test_motion_of_another_duration_is_stretched() -> None:
 def test_motions_with_other_numbers_of_stages_go_together() -> None:
     before = switched(0.3, 1.0)
     finer = before.solution.on_mesh(before.solution.mesh, GaussRule.of(7))
-    guess = continued(Switched(finer, before.times, before.kinds), switched(0.35, 1.1), 1.0, 1.0)
-    same = continued(before, switched(0.35, 1.1), 1.0, 1.0)
+    guess = extrapolate(SwitchedMotion(finer, before.times, before.kinds), switched(0.35, 1.1),
+                        1.0,
+                        1.0)
+    same = extrapolate(before, switched(0.35, 1.1), 1.0, 1.0)
     assert guess.rule.stages == 4
     t = np.linspace(0, 1, 101)
     np.testing.assert_allclose(guess(t), same(t), atol=1e-12)
@@ -222,8 +220,8 @@ def test_motions_with_other_numbers_of_stages_go_together() -> None:
 def test_kind_of_a_switch_is_the_limit_that_is_met(rigid_arm: Arm,
                                                    paper_task: TaskFactory) -> None:
     found = find_max_payload(paper_task(rigid_arm))
-    stop = found.stops[-1]
-    motion = Switched.of(stop.problem, stop.result.solution,
-                         stop.result.switches)
+    stop = found.extremals[-1]
+    motion = SwitchedMotion.of(stop.problem, stop.result.solution,
+                               stop.result.switches)
     assert set(motion.kinds) <= {0, 1, 2, 3}
     assert {0, 2} <= set(motion.kinds)

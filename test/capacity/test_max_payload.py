@@ -12,8 +12,9 @@ from flex_planner.arms.arm import Arm, Joint, Link, Motor
 from flex_planner.base.errors import InvalidTaskError, InvalidValueError
 from flex_planner.base.progress import Monitor, Progress
 from flex_planner.base.validation import Array
-from flex_planner.capacity.max_payload import find_max_payload, MaxPayload, PayloadMethod
-from flex_planner.collocation import SolverSettings
+from flex_planner.capacity.max_payload import find_max_payload
+from flex_planner.capacity.results import MaxPayload, PayloadMethod
+from flex_planner.collocation import Solver, SolverSettings
 from flex_planner.dynamics.integration import PiecewisePolynomial, simulate
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectResult, DirectSettings
@@ -150,7 +151,7 @@ def test_weights_do_not_matter(rigid_model: ArmModel, paper_task: TaskFactory,
     assert found.solved, found.message
     assert found.payload <= LIMITS['rigid'] <= found.upper
     # room counts efforts as they weigh
-    assert all(stop.value < LIMITS['rigid'] < stop.value + stop.room for stop in found.stops)
+    assert all(stop.value < LIMITS['rigid'] < stop.value + stop.gap for stop in found.extremals)
 
 
 def test_weights_do_not_matter_where_links_bend(ei5_model: ArmModel,
@@ -280,7 +281,7 @@ def test_payload_of_the_front_costs_what_its_plan_costs(
     front, h, costs = search_of('rigid').front, 1e-3, []
     for k in (0, -2, -1, 1, 2):
         task = paper_task(rigid_model.arm, front.payloads[0] + k * h)
-        costs.append(plan_path(task, model=rigid_model, settings=EXACT).cost)
+        costs.append(plan_path(task, model=rigid_model, solver=Solver(EXACT)).cost)
     # J is stationary: the square of the errors of the motion
     assert front.efforts[0] == pytest.approx(costs[0], rel=1e-7)
     price = np.array([1, -8, 8, -1]) @ costs[1:] / (12 * h)
@@ -309,16 +310,16 @@ def test_front_scales_with_the_weights_of_effort(rigid_model: ArmModel,
 
 @every_arm
 def test_room_bounds_the_limit_at_every_stop(search_of: SearchFactory, name: str) -> None:
-    stops = search_of(name).stops
-    assert all(stop.value < LIMITS[name] < stop.value + stop.room for stop in stops)
-    assert all(np.diff([stop.room for stop in stops]) < 0)
+    stops = search_of(name).extremals
+    assert all(stop.value < LIMITS[name] < stop.value + stop.gap for stop in stops)
+    assert all(np.diff([stop.gap for stop in stops]) < 0)
 
 
 @pytest.mark.parametrize('duration', [1.05, 2.0, 10.0])
 def test_room_bounds_the_limit_of_one_link(duration: float) -> None:
-    stops = find_max_payload(one_link(duration), accuracy=1e-4).stops
+    stops = find_max_payload(one_link(duration), accuracy=1e-4).extremals
     assert len(stops) > 1
-    assert all(stop.value < duration**2 - 1 < stop.value + stop.room for stop in stops)
+    assert all(stop.value < duration**2 - 1 < stop.value + stop.gap for stop in stops)
 
 
 # Impossible motions
@@ -439,14 +440,14 @@ def test_search_that_found_nothing_is_no_start_but_no_harm(rigid_model: ArmModel
                                monitor=Monitor(time_limit=0.0))
     task = paper_task(rigid_model.arm)
     found = find_max_payload(task, model=rigid_model, start_from=nothing)
-    assert nothing.middle is None
+    assert nothing.restart_point is None
     assert found.iterations == find_max_payload(task, model=rigid_model).iterations
 
 
 def test_start_for_others_leaves_room(search_of: SearchFactory) -> None:
-    middle = search_of('ei5').middle
+    middle = search_of('ei5').restart_point
     assert middle is not None
-    assert 0.01 < middle.room / middle.value < 0.1
+    assert 0.01 < middle.gap / middle.value < 0.1
 
 
 # Progress
@@ -458,11 +459,11 @@ def test_direct_search_reports_phases_and_payloads(rigid_model: ArmModel,
     found = find_max_payload(paper_task(rigid_model.arm), model=rigid_model,
                              monitor=Monitor(report=reports.append))
     assert list(dict.fromkeys(each.phase for each in reports)) == ['payload at a rising price',
-                                                                   'limit found']
+                                                                   'continuation to the limit']
     assert [each.iteration for each in reports] == list(range(1, found.iterations + 1))
     payloads = [each.payload for each in reports]
     assert payloads == sorted(payloads)
-    assert {stop.value for stop in found.stops[:-1]} <= set(payloads)
+    assert {stop.value for stop in found.extremals[:-1]} <= set(payloads)
     assert found.planning_time > 0
 
 
@@ -520,7 +521,7 @@ def test_trials_are_recorded_in_order(raised_search: MaxPayload) -> None:
         assert trial.payload == carried + trial.step
         assert trial.payload < failed
         assert trial.solved is trial.result.converged
-        assert not trial.stopped
+        assert not trial.interrupted
         carried, failed = (trial.payload, failed) if trial.solved else (carried, trial.payload)
     # the upper end is the least payload that failed
     assert (carried, failed) == (raised_search.payload, raised_search.upper)
@@ -528,11 +529,11 @@ def test_trials_are_recorded_in_order(raised_search: MaxPayload) -> None:
 
 def test_methods_fill_only_what_is_theirs(raised_search: MaxPayload,
                                           search_of: SearchFactory) -> None:
-    assert (raised_search.front.payloads.size, raised_search.stops) == (0, ())
-    assert raised_search.middle is None
+    assert (raised_search.front.payloads.size, raised_search.extremals) == (0, ())
+    assert raised_search.restart_point is None
     direct = search_of('rigid')
     assert (direct.trials, direct.method) == ((), PayloadMethod.DIRECT)
-    assert direct.front.payloads.size == len(direct.stops) > 0
+    assert direct.front.payloads.size == len(direct.extremals) > 0
 
 
 def test_first_step_may_be_larger_than_the_answer(rigid_model: ArmModel,
@@ -659,7 +660,8 @@ def test_direct_search_is_stopped_wherever_it_is(rigid_model: ArmModel,
     task = paper_task(rigid_model.arm)
     assert_stopped_at(
         lambda monitor: find_max_payload(task, model=rigid_model, monitor=monitor),
-        {('payload at a rising price', False), ('limit found', False), ('limit found', True)})
+        {('payload at a rising price', False), ('continuation to the limit', False),
+         ('continuation to the limit', True)})
 
 
 def test_direct_search_is_stopped_at_every_payload(rigid_model: ArmModel,
@@ -675,7 +677,8 @@ def test_direct_search_is_stopped_at_every_payload(rigid_model: ArmModel,
 
 
 def test_paper_search_is_stopped_wherever_it_is() -> None:
-    task, phases = lifted_to(0.0, 2.0), ('cold start', 'payload raised', 'limit found')
+    task, phases = lifted_to(0.0, 2.0), ('cold start', 'payload raised',
+                                         'continuation to the limit')
     assert_stopped_at(
         lambda monitor: raised(task, step=0.3, accuracy=0.3, monitor=monitor),
         {(phase, simulating) for phase in phases for simulating in (False, True)})
@@ -683,7 +686,7 @@ def test_paper_search_is_stopped_wherever_it_is() -> None:
 
 def test_search_for_the_reason_is_stopped(rigid_model: ArmModel, paper_task: TaskFactory) -> None:
     monitor = Monitor()
-    monitor.canceled = lambda: monitor.phase == 'payload walked up'
+    monitor.canceled = lambda: monitor.phase == 'continuation in payload'
     found = find_max_payload(paper_task(rigid_model.arm, duration=0.6), model=rigid_model,
                              monitor=monitor)
     assert_stopped(found, PlanStatus.CANCELED)
@@ -702,7 +705,7 @@ def test_search_of_an_arm_that_bends_is_stopped(ei5_model: ArmModel, paper_task:
 def test_search_is_stopped_in_the_plan_with_what_the_motor_holds() -> None:
     task = lifted_to(0.0, 2.0)
     assert_stopped_at(lambda monitor: find_max_payload(task, monitor=monitor),
-                      {('limit found', True)})
+                      {('continuation to the limit', True)})
 
 
 def test_time_limit_that_has_passed_leaves_nothing(rigid_model: ArmModel,
@@ -710,7 +713,7 @@ def test_time_limit_that_has_passed_leaves_nothing(rigid_model: ArmModel,
     found = find_max_payload(paper_task(rigid_model.arm), model=rigid_model,
                              monitor=Monitor(time_limit=0.0))
     assert_stopped(found, PlanStatus.TIMEOUT)
-    assert (found.plan, found.upper, found.stops) == (None, inf, ())
+    assert (found.plan, found.upper, found.extremals) == (None, inf, ())
 
 
 def test_plan_of_a_search_is_a_plan_like_others(rigid_model: ArmModel, paper_task: TaskFactory,

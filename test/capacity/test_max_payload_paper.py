@@ -6,7 +6,8 @@ from collections.abc import Callable
 import math
 
 from flex_planner.arms.arm import Arm, Link
-from flex_planner.capacity.max_payload import find_max_payload, MaxPayload, PayloadMethod
+from flex_planner.capacity.max_payload import find_max_payload
+from flex_planner.capacity.results import MaxPayload, PayloadMethod
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.task import postures_from_points, Task
 from flex_planner.planning.plan import peaks

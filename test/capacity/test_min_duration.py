@@ -11,11 +11,8 @@ from flex_planner.arms.arm import Arm, Joint, Link, Motor
 from flex_planner.base.errors import InvalidSizeError, InvalidTaskError, InvalidValueError
 from flex_planner.base.progress import Monitor, Progress
 from flex_planner.capacity.max_payload import find_max_payload
-from flex_planner.capacity.min_duration import (
-    find_min_duration,
-    MinDuration,
-    payload_against_duration,
-)
+from flex_planner.capacity.min_duration import find_min_duration, payload_against_duration
+from flex_planner.capacity.results import MinDuration
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectSettings
 from flex_planner.optimal_control.task import Task
@@ -153,9 +150,9 @@ def test_less_time_is_not_enough_and_a_little_more_is(rigid_model: ArmModel,
 def test_room_bounds_the_limit_at_every_stop(request: pytest.FixtureRequest,
                                              paper_task: TaskFactory, name: str) -> None:
     model = request.getfixturevalue(f'{name}_model')
-    stops = find_min_duration(paper_task(model.arm), model=model, accuracy=1e-3).stops
+    stops = find_min_duration(paper_task(model.arm), model=model, accuracy=1e-3).extremals
     assert len(stops) > 1
-    assert all(stop.value - stop.room < SHORTEST[name] < stop.value for stop in stops)
+    assert all(stop.value - stop.gap < SHORTEST[name] < stop.value for stop in stops)
     assert all(np.diff([stop.value for stop in stops]) < 0)
     assert all(np.diff([stop.price for stop in stops]) > 0)
 
@@ -196,7 +193,7 @@ def test_search_reports_its_phases(rigid_model: ArmModel, paper_task: TaskFactor
     found = find_min_duration(paper_task(rigid_model.arm), model=rigid_model,
                               monitor=Monitor(report=reports.append))
     assert list(dict.fromkeys(each.phase for each in reports)) == ['duration at a rising price',
-                                                                   'limit found']
+                                                                   'continuation to the limit']
     assert len(reports) == found.iterations
     assert found.planning_time > 0
 
@@ -322,8 +319,9 @@ def test_bad_accuracy_is_named_with_its_bound(rigid_model: ArmModel, paper_task:
 
 @both_stops
 @pytest.mark.parametrize(('phase', 'iterations'), [
-    ('duration at a rising price', 0), ('duration at a rising price', 20), ('limit found', 0),
-    ('limit found', 1)])
+    ('duration at a rising price', 0), ('duration at a rising price', 20),
+    ('continuation to the limit', 0),
+    ('continuation to the limit', 1)])
 def test_search_is_stopped_wherever_it_is(rigid_model: ArmModel, paper_task: TaskFactory,
                                           phase: str, iterations: int, status: PlanStatus) -> None:
     monitor = stopped_in(phase, status, iterations)
@@ -366,4 +364,4 @@ def test_search_is_stopped_in_its_last_simulation(rigid_model: ArmModel, paper_t
     monitor.canceled = due
     found = find_min_duration(task, model=rigid_model, monitor=monitor)
     assert_stopped(found, status)
-    assert (monitor.phase, found.iterations) == ('limit found', whole)
+    assert (monitor.phase, found.iterations) == ('continuation to the limit', whole)

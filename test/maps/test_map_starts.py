@@ -19,7 +19,8 @@ from flex_planner.maps.study import load_study, StudyError
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
 from flex_planner.optimal_control.task import postures_from_points, Task
-from flex_planner.planning.plan_path import plan_path, WARM_START
+from flex_planner.planning.plan_path import plan_path
+from flex_planner.planning.strategies.initial_guesses import WARM_START
 from map_support import filled, STUDY
 import numpy as np
 import pytest

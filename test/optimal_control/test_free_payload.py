@@ -8,8 +8,8 @@ from typing import Any
 from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationSolution
 from flex_planner.optimal_control.arm_model import ArmModel
-from flex_planner.optimal_control.free_payload import FreeDurationProblem, PayloadProblem
-from flex_planner.optimal_control.motion_problem import task_parameters
+from flex_planner.optimal_control.free_duration import FreeDurationProblem
+from flex_planner.optimal_control.free_payload import FreePayloadProblem
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_path
@@ -19,7 +19,7 @@ import pytest
 
 PlanFactory = Callable[..., Plan]
 TaskFactory = Callable[..., Task]
-Extended = FreeDurationProblem | PayloadProblem
+Extended = FreeDurationProblem | FreePayloadProblem
 
 inf = np.inf
 # kept clear of the corners at which a motor switches [N m]
@@ -53,8 +53,8 @@ def extended(plan: Plan, which: type[Any]) -> tuple[Extended, CollocationSolutio
     """Return a problem with an unknown more, and a point of it that is no solution."""
     problem = problem_of(plan.model, plan.task)
     made = (FreeDurationProblem(problem) if which is FreeDurationProblem
-            else PayloadProblem(plan.model, plan.task, task_parameters(plan.task), 3.0))
-    return made, made.extended(solution_of(plan))
+            else FreePayloadProblem(plan.problem, 3.0))
+    return made, made.extend(solution_of(plan))
 
 
 def differences(function: Callable[[Array], Array], z: Array, steps: Array) -> Array:
@@ -85,7 +85,7 @@ def smooth_points(problem: Extended, solution: CollocationSolution,
 
 
 @every_case
-@pytest.mark.parametrize('which', [FreeDurationProblem, PayloadProblem])
+@pytest.mark.parametrize('which', [FreeDurationProblem, FreePayloadProblem])
 def test_jacobian_is_the_derivative_of_the_rate(plan: Callable[[str], Plan], name: str,
                                                 which: type[Any]) -> None:
     problem, solution = extended(plan(name), which)
@@ -103,7 +103,7 @@ def test_jacobian_is_the_derivative_of_the_rate(plan: Callable[[str], Plan], nam
 
 
 @every_case
-@pytest.mark.parametrize('which', [FreeDurationProblem, PayloadProblem])
+@pytest.mark.parametrize('which', [FreeDurationProblem, FreePayloadProblem])
 def test_the_unknown_more_does_not_change_on_the_way(plan: Callable[[str], Plan], name: str,
                                                      which: type[Any]) -> None:
     problem, solution = extended(plan(name), which)
@@ -119,7 +119,7 @@ GOALS: list[dict[str, list[float]]] = [
 
 @every_case
 @pytest.mark.parametrize('goal', GOALS, ids=['given', 'weighted'])
-@pytest.mark.parametrize('which', [FreeDurationProblem, PayloadProblem])
+@pytest.mark.parametrize('which', [FreeDurationProblem, FreePayloadProblem])
 def test_rows_are_derivatives_of_the_conditions(
         plan: Callable[[str], Plan], crane_task: Task, name: str, goal: dict[str, list[float]],
         which: type[Any]) -> None:
@@ -127,16 +127,16 @@ def test_rows_are_derivatives_of_the_conditions(
     values = {field: getattr(task, field) for field in (
         'arm', 'start_positions', 'goal_positions', 'duration', 'payload_mass')}
     problem = problem_of(plan(name).model, Task(**values, **goal))
-    made = (FreeDurationProblem(problem) if which is FreeDurationProblem else PayloadProblem(
-        problem.model, problem.task, problem.parameters, 3.0))
-    solution = made.extended(solution_of(plan(name)))
+    made = (FreeDurationProblem(problem) if which is FreeDurationProblem else FreePayloadProblem(
+        problem, 3.0))
+    solution = made.extend(solution_of(plan(name)))
     steps = steps_of(made)
-    if which is PayloadProblem:
+    if which is FreePayloadProblem:
         steps[-2] = 1e-2  # the change of the sag is itself taken from differences
     for side, z in ((made.left, solution.nodes[0]), (made.right, solution.nodes[-1])):
         residual, rows = side(z)
         found = differences(lambda at, side=side: side(at)[0], z, steps)
-        if which is PayloadProblem:
+        if which is FreePayloadProblem:
             # the second derivative of the sag, some millimetres a square kilogram, is left out
             assert abs(found[-1, -2]) < 0.02 * np.abs(z).max()
             assert rows[-1, -2] == 0
@@ -150,7 +150,7 @@ def test_rows_are_derivatives_of_the_conditions(
 
 def test_payload_bends_the_ends_under_gravity_only(plan: Callable[[str], Plan]) -> None:
     for name, bends in (('rigid', False), ('ei5', False), ('crane', True)):
-        made, solution = extended(plan(name), PayloadProblem)
+        made, solution = extended(plan(name), FreePayloadProblem)
         for side, z in ((made.left, solution.nodes[0]), (made.right, solution.nodes[-1])):
             assert side(z)[1][:, -2].any() == bends
 
@@ -160,32 +160,32 @@ def test_duration_is_added_and_taken_away(plan: Callable[[str], Plan], name: str
     made, solution = extended(plan(name), FreeDurationProblem)
     assert isinstance(made, FreeDurationProblem)
     assert solution.mesh[[0, -1]].tolist() == [0, 1]
-    before, after = solution_of(plan(name)), made.restricted(solution)
+    before, (_, after) = solution_of(plan(name)), made.restrict(solution)
     np.testing.assert_allclose(after.mesh, before.mesh, rtol=1e-15)
     np.testing.assert_array_equal(after.nodes, before.nodes)
     np.testing.assert_allclose(after.stages, before.stages, rtol=1e-15)
-    shorter = made.fixed(0.5)
+    shorter = made.fix(0.5)
     assert (shorter.task.duration, shorter.model) == (0.5, plan(name).model)
 
 
 @every_case
 def test_payload_is_added_and_taken_away(plan: Callable[[str], Plan], name: str) -> None:
-    made, solution = extended(plan(name), PayloadProblem)
-    assert isinstance(made, PayloadProblem)
-    mass, after = made.restricted(solution)
+    made, solution = extended(plan(name), FreePayloadProblem)
+    assert isinstance(made, FreePayloadProblem)
+    mass, after = made.restrict(solution)
     assert mass == plan(name).task.payload_mass
     np.testing.assert_array_equal(after.nodes, solution_of(plan(name)).nodes)
     np.testing.assert_array_equal(after.stages, solution_of(plan(name)).stages)
     # nu gathers the share of the payload
     share = share_of(plan(name).problem, solution_of(plan(name)))
     assert solution.nodes[[0, -1], -1] == pytest.approx([0, -share], rel=1e-12)
-    heavier = made.with_payload(0.3)
+    heavier = made.fix(0.3)
     assert (heavier.task.payload_mass, heavier.parameters.payload_mass) == (0.3, 0.3)
     assert heavier.p[0] == 0.3
 
 
 @every_case
-@pytest.mark.parametrize('which', [FreeDurationProblem, PayloadProblem])
+@pytest.mark.parametrize('which', [FreeDurationProblem, FreePayloadProblem])
 def test_switches_are_those_of_the_motion(plan: Callable[[str], Plan], name: str,
                                           which: type[Any]) -> None:
     made, solution = extended(plan(name), which)
@@ -195,7 +195,7 @@ def test_switches_are_those_of_the_motion(plan: Callable[[str], Plan], name: str
 
 
 def test_switches_know_the_payload_of_the_iterate(plan: Callable[[str], Plan]) -> None:
-    made, solution = extended(plan('rigid'), PayloadProblem)
+    made, solution = extended(plan('rigid'), FreePayloadProblem)
     heavier = solution.nodes.copy()
     heavier[:, -2] += 1
     assert not np.allclose(made.switches(solution.mesh, heavier),

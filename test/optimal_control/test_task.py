@@ -10,7 +10,7 @@ from typing import Any
 from flex_planner.arms.arm import Arm, Joint, Link, Motor
 from flex_planner.base.errors import InvalidSizeError, InvalidValueError, NotFiniteError
 from flex_planner.base.validation import Array
-from flex_planner.collocation import SolverSettings
+from flex_planner.collocation import Solver, SolverSettings
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import Plan, PlanStatus
@@ -296,9 +296,9 @@ def test_derivative_of_the_cost_by_the_payload_is_the_integral_of_its_share(
         price: float | None) -> None:
     model, h = request.getfixturevalue(f'{name}_model'), 4e-3
     settings = SolverSettings(error_tolerance=1e-8)
-    plan = plan_path(paper_task(model.arm, 5.5), model=model, settings=settings)
+    plan = plan_path(paper_task(model.arm, 5.5), model=model, solver=Solver(settings))
     assert plan.saturation.min() > 0.2
-    costs = [plan_path(paper_task(model.arm, 5.5 + k * h), model=model, settings=settings,
+    costs = [plan_path(paper_task(model.arm, 5.5 + k * h), model=model, solver=Solver(settings),
                        start_from=plan).cost for k in (-2, -1, 1, 2)]
     # of fourth order; costs have eleven digits
     slope = np.array([1, -8, 8, -1]) @ costs / (12 * h)

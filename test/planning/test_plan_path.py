@@ -13,6 +13,7 @@ from flex_planner.base.progress import Monitor
 from flex_planner.collocation import (
     CollocationResult,
     CollocationSolution,
+    Solver,
     SolverSettings,
     SolverStatus,
 )
@@ -22,8 +23,13 @@ from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.planned_torque import PlannedTorque
 from flex_planner.optimal_control.task import Task
 from flex_planner.optimal_control.torque_limits import TorqueLimits
-from flex_planner.planning.certificate import CertificateLimits, certify, hamiltonian_drift
-from flex_planner.planning.plan import Certificate, peaks, Plan, PlanStatus
+from flex_planner.planning.certificate import (
+    Certificate,
+    CertificateLimits,
+    certify,
+    hamiltonian_drift,
+)
+from flex_planner.planning.plan import peaks, Plan, PlanStatus
 from flex_planner.planning.plan_path import plan_path
 import numpy as np
 from plan_checks import SAME_COST, solution_of
@@ -177,7 +183,7 @@ def test_hamiltonian_is_constant_on_the_extremal(plan_of: PlanFactory, case: Cas
 def test_hamiltonian_of_a_saturated_motion_is_constant_to_rounding_on_a_finer_mesh(
         rigid_model: ArmModel, paper_task: TaskFactory) -> None:
     plan = plan_path(paper_task(rigid_model.arm, 5.5), model=rigid_model,
-                     settings=SolverSettings(error_tolerance=1e-8))
+                     solver=Solver(SolverSettings(error_tolerance=1e-8)))
     assert plan.certificate.hamiltonian_drift < 1e-14
 
 
@@ -298,7 +304,7 @@ def test_motion_about_an_unstable_posture_is_simulated_as_exactly_as_it_was_plan
     arm = Arm(name='upright', links=(Link(length=0.8, linear_density=2.0),), joints=(Joint(),),
               gravity=[0.0, -9.81])
     task = Task(arm=arm, start_positions=[1.2], goal_positions=[1.9], duration=4.0)
-    plan = plan_path(task, settings=SolverSettings(stages=6, max_intervals=60))
+    plan = plan_path(task, solver=Solver(SolverSettings(stages=6, max_intervals=60)))
     assert plan.solved, plan.message
     assert plan.certificate.tip_error <= 1e-5
 

@@ -9,37 +9,40 @@ import time
 from typing import Any
 
 from flex_planner.base.progress import Monitor, Progress
-from flex_planner.collocation import CollocationResult, SolverSettings, SolverStatus
+from flex_planner.collocation import CollocationResult, Solver, SolverSettings, SolverStatus
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import Task
-from flex_planner.planning.plan import Certificate, Plan, PlanStatus
-from flex_planner.planning.plan_path import LADDER, plan_path
-from flex_planner.planning.strategies.initial_guesses import Attempt, cold_start, Strategy
+from flex_planner.planning.certificate import Certificate
+from flex_planner.planning.plan import Plan, PlanStatus
+from flex_planner.planning.plan_path import plan_path
+from flex_planner.planning.strategies.catalogue import CATALOGUE
+from flex_planner.planning.strategies.initial_guesses import cold_start
+from flex_planner.planning.strategies.strategy import Attempt, Strategy
 from plan_checks import problem_of, SAME_COST
 import pytest
 
 PlanFactory = Callable[..., Plan]
 TaskFactory = Callable[..., Task]
+Attempting = Callable[[MotionProblem, Solver], Attempt | None]
 
 
-def failed(result: CollocationResult, message: str, evidence: str = '') -> Strategy:
+def failed(result: CollocationResult, message: str, evidence: str = '') -> Attempting:
     """Return a strategy that fails."""
     attempt = Attempt(result=replace(result, status=SolverStatus.NEWTON_FAILED, message=message),
                       evidence=evidence)
-    return lambda problem, settings, monitor: attempt
+    return lambda problem, solver: attempt
 
 
 @pytest.fixture
 def result(rigid_model: ArmModel, paper_task: TaskFactory) -> CollocationResult:
     problem = problem_of(rigid_model, paper_task(rigid_model.arm))
-    return cold_start(problem, SolverSettings(), Monitor()).result
+    return cold_start(problem, Solver()).result
 
 
-def planned(monkeypatch: pytest.MonkeyPatch, model: ArmModel, task: Task,
-            *rungs: tuple[str, Strategy], **others: Any) -> Plan:
-    monkeypatch.setattr('flex_planner.planning.plan_path.LADDER', rungs)
-    return plan_path(task, model=model, **others)
+def planned(model: ArmModel, task: Task, *named: tuple[str, Attempting], **others: Any) -> Plan:
+    """Plan with strategies of given names alone."""
+    return plan_path(task, model=model, strategies=[Strategy(*each) for each in named], **others)
 
 
 def unsolved(plan: Plan) -> bool:
@@ -50,19 +53,19 @@ def unsolved(plan: Plan) -> bool:
             and all(number == math.inf for number in numbers))
 
 
-def test_ladder_goes_on_to_the_first_that_solves(
-        monkeypatch: pytest.MonkeyPatch, rigid_model: ArmModel, paper_task: TaskFactory,
+def test_strategies_are_tried_until_one_solves_to_the_first_that_solves(
+        rigid_model: ArmModel, paper_task: TaskFactory,
         result: CollocationResult) -> None:
-    plan = planned(monkeypatch, rigid_model, paper_task(rigid_model.arm),
+    plan = planned(rigid_model, paper_task(rigid_model.arm),
                    ('first', failed(result, 'lost')), ('nothing', lambda *rest: None),
                    ('second', cold_start), ('third', failed(result, 'not tried')))
     assert (plan.solved, plan.strategy) == (True, 'second')
 
 
 def test_all_failures_are_told_with_their_names(
-        monkeypatch: pytest.MonkeyPatch, rigid_model: ArmModel, paper_task: TaskFactory,
+        rigid_model: ArmModel, paper_task: TaskFactory,
         result: CollocationResult) -> None:
-    plan = planned(monkeypatch, rigid_model, paper_task(rigid_model.arm),
+    plan = planned(rigid_model, paper_task(rigid_model.arm),
                    ('first', failed(result, 'lost')), ('nothing', lambda *rest: None),
                    ('second', failed(result, 'lost too')))
     assert (plan.status, plan.strategy) == (PlanStatus.NOT_CONVERGED, 'first, second')
@@ -73,10 +76,10 @@ def test_all_failures_are_told_with_their_names(
         plan.uniform_samples(2)
 
 
-def test_evidence_ends_the_ladder(
-        monkeypatch: pytest.MonkeyPatch, rigid_model: ArmModel, paper_task: TaskFactory,
+def test_evidence_ends_the_trials(
+        rigid_model: ArmModel, paper_task: TaskFactory,
         result: CollocationResult) -> None:
-    plan = planned(monkeypatch, rigid_model, paper_task(rigid_model.arm),
+    plan = planned(rigid_model, paper_task(rigid_model.arm),
                    ('first', failed(result, 'lost', 'too much')), ('second', cold_start))
     assert (plan.status, plan.strategy) == (PlanStatus.INFEASIBLE, 'first')
     assert plan.message == 'too much'
@@ -84,13 +87,13 @@ def test_evidence_ends_the_ladder(
 
 
 def test_monitor_hears_the_name_of_each_strategy(
-        monkeypatch: pytest.MonkeyPatch, rigid_model: ArmModel, paper_task: TaskFactory) -> None:
+        rigid_model: ArmModel, paper_task: TaskFactory) -> None:
     lines: list[Progress] = []
 
-    def hasty(problem: MotionProblem, settings: SolverSettings, monitor: Monitor) -> Attempt:
-        return cold_start(problem, replace(settings, max_iterations=1), monitor)
+    def hasty(problem: MotionProblem, solver: Solver) -> Attempt:
+        return cold_start(problem, solver.set(max_iterations=1))
 
-    plan = planned(monkeypatch, rigid_model, paper_task(rigid_model.arm, 5.8), ('first', hasty),
+    plan = planned(rigid_model, paper_task(rigid_model.arm, 5.8), ('first', hasty),
                    ('second', hasty), ('third', cold_start), monitor=Monitor(report=lines.append))
     assert list(dict.fromkeys(line.phase for line in lines)) == ['first', 'second', 'third']
     assert len(lines) == lines[-1].iteration == plan.iterations
@@ -99,18 +102,18 @@ def test_monitor_hears_the_name_of_each_strategy(
 # Stopped, and out of limits
 
 
-@pytest.mark.parametrize(('label', 'strategy'), LADDER, ids=[label for label, _ in LADDER])
+@pytest.mark.parametrize('strategy', CATALOGUE, ids=[each.name for each in CATALOGUE])
 def test_every_strategy_is_canceled_between_its_iterations(
-        monkeypatch: pytest.MonkeyPatch, ei5_model: ArmModel, paper_task: TaskFactory,
-        label: str, strategy: Strategy) -> None:
+        ei5_model: ArmModel, paper_task: TaskFactory,
+        strategy: Strategy) -> None:
     for last in (0, 1, 3):
         monitor = Monitor()
         monitor.canceled = lambda count=last, watch=monitor: watch.iteration >= count
-        plan = planned(monkeypatch, ei5_model, paper_task(ei5_model.arm, w_2=10.0),
-                       (label, strategy), monitor=monitor)
+        plan = planned(ei5_model, paper_task(ei5_model.arm, w_2=10.0),
+                       (strategy.name, strategy.attempt), monitor=monitor)
         assert (plan.status, plan.message) == (PlanStatus.CANCELED, 'canceled')
         # IPOPT asks after an iteration
-        assert plan.iterations in (last, last + (label == 'direct collocation'))
+        assert plan.iterations in (last, last + (strategy.name == 'direct collocation'))
         assert unsolved(plan)
 
 
@@ -146,11 +149,10 @@ def test_time_limit_is_obeyed(ei50_model: ArmModel, paper_task: TaskFactory) -> 
     assert unsolved(plan)
 
 
-def test_mesh_limit_is_told(monkeypatch: pytest.MonkeyPatch, ei50_model: ArmModel,
-                            paper_task: TaskFactory) -> None:
+def test_mesh_limit_is_told(ei50_model: ArmModel, paper_task: TaskFactory) -> None:
     # 114 intervals are needed
-    plan = planned(monkeypatch, ei50_model, paper_task(ei50_model.arm),
-                   ('cold start', cold_start), settings=SolverSettings(max_intervals=60))
+    plan = planned(ei50_model, paper_task(ei50_model.arm),
+                   ('cold start', cold_start), solver=Solver(SolverSettings(max_intervals=60)))
     assert plan.status is PlanStatus.NOT_CONVERGED
     assert unsolved(plan)
     assert plan.message.startswith('cold start: an error of ')
@@ -160,8 +162,8 @@ def test_mesh_limit_is_told(monkeypatch: pytest.MonkeyPatch, ei50_model: ArmMode
 def test_solution_within_its_tolerance_needs_no_more_intervals(
         rigid_model: ArmModel, paper_task: TaskFactory) -> None:
     problem = problem_of(rigid_model, paper_task(rigid_model.arm, 5.5))
-    result = cold_start(problem, SolverSettings(max_intervals=20, error_tolerance=0.05),
-                        Monitor()).result
+    result = cold_start(problem, Solver(SolverSettings(
+        max_intervals=20, error_tolerance=0.05))).result
     assert result.errors.max() < 0.05
     assert result.converged, result.message
 
@@ -169,7 +171,7 @@ def test_solution_within_its_tolerance_needs_no_more_intervals(
 def test_no_mesh_is_larger_than_its_limit(ei50_model: ArmModel, paper_task: TaskFactory) -> None:
     lines: list[Progress] = []
     plan_path(paper_task(ei50_model.arm), model=ei50_model,
-              settings=SolverSettings(intervals=20, max_intervals=20),
+              solver=Solver(SolverSettings(intervals=20, max_intervals=20)),
               monitor=Monitor(report=lines.append))
     assert max(line.intervals for line in lines) <= 20
 
@@ -191,6 +193,6 @@ def test_tolerance_that_no_motion_meets_fails_the_certificate(
 def test_mesh_too_coarse_for_the_certificate_is_refined(
         rigid_model: ArmModel, paper_task: TaskFactory, tolerance: float) -> None:
     settings = SolverSettings(stages=2, intervals=4, error_tolerance=tolerance)
-    plan = plan_path(paper_task(rigid_model.arm), model=rigid_model, settings=settings)
+    plan = plan_path(paper_task(rigid_model.arm), model=rigid_model, solver=Solver(settings))
     assert plan.solved, plan.message
     assert 4 <= plan.mesh_intervals < 60

@@ -13,8 +13,8 @@ from flex_planner.base.errors import InvalidTaskError
 from flex_planner.base.progress import Monitor
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.task import Task
-from flex_planner.planning.certificate import CertificateLimits
-from flex_planner.planning.plan import Certificate, Plan, PlanStatus
+from flex_planner.planning.certificate import Certificate, CertificateLimits
+from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_path import plan_path
 from hypothesis import given, Phase, settings
 from hypothesis import strategies as st

@@ -7,7 +7,7 @@ from typing import Any
 
 from flex_planner.arms.arm import Arm, Joint, Motor
 from flex_planner.capacity.incremental import PayloadTrial
-from flex_planner.capacity.max_payload import MaxPayload, PayloadFront, PayloadMethod
+from flex_planner.capacity.results import MaxPayload, PayloadFront, PayloadMethod
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import PlanStatus
 from flex_planner.plotting import draw_max_payload, draw_motion, Execution, Motion

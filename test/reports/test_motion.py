@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from flex_planner.arms.arm import Arm
-from flex_planner.capacity.max_payload import MaxPayload, PayloadMethod
+from flex_planner.capacity.results import MaxPayload, PayloadMethod
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import PlanStatus
 from flex_planner.reports.motion import (

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 import sys
 
 from flex_planner.base.progress import Monitor
-from flex_planner.capacity.max_payload import find_max_payload, MaxPayload, PayloadMethod
+from flex_planner.capacity.max_payload import find_max_payload
+from flex_planner.capacity.results import MaxPayload, PayloadMethod
 from flex_planner.cli.options import Commands
 from flex_planner.cli.outputs import add_outputs, Outputs
 from flex_planner.cli.progress_line import watched

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 from flex_planner.base.validation import Array
-from flex_planner.capacity.max_payload import find_max_payload, MaxPayload, PayloadMethod
+from flex_planner.capacity.max_payload import find_max_payload
+from flex_planner.capacity.results import MaxPayload, PayloadMethod
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.paper.cases import (
     ACCURACY,

@@ -1,165 +1,145 @@
-"""Where families of motions start: near their end, if the same arm made rigid shows the way."""
+"""Where a continuation starts: near its end, if the same arm made rigid leads there."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 from flex_planner.base.errors import FlexPlannerError
-from flex_planner.base.progress import Monitor
-from flex_planner.collocation import CollocationResult, CollocationSolution, SolverSettings
-from flex_planner.collocation.homotopy import STOPPED
+from flex_planner.collocation import (
+    CollocationResult,
+    CollocationSolution,
+    INTERRUPTED,
+    Solver,
+)
 from flex_planner.optimal_control.motion_problem import MotionProblem
+from flex_planner.planning.strategies.extremals import Extremal, SearchStart
+from flex_planner.planning.strategies.free_parameters import FreeParameter, PAYLOAD
+from flex_planner.planning.strategies.homotopies import raise_weights
 from flex_planner.planning.strategies.initial_guesses import (
     cold_start,
-    DIRECTLY,
-    lifted,
+    lift,
+    lift_rigid_motion,
     rigid_problem,
 )
-from flex_planner.planning.strategies.ipopt_continuation import hard_payloads
+from flex_planner.planning.strategies.ipopt_continuation import continue_by_ipopt
 from flex_planner.planning.strategies.price_continuation import (
-    changed,
-    durations,
-    Enough,
-    Extremal,
-    Family,
-    no_aim,
-    payloads,
-    SearchStart,
-    worth,
-    worth_time,
+    continue_in_price,
+    no_target,
+    TargetGap,
 )
 
 # largest mesh of a first motion, in units of the coarsest that overlooks nothing
-_FIRST_MESHES = 4
+_FIRST_MESHES, _FIRST_INTERVALS, _FIRST_ITERATIONS = 4, 200, 15
 # a rigid motion is lifted when its payload is so near to its limit, and few before are tried
 _LIFT, _LIFTS, _MOST_RIGID = 0.03, 3, 15
 
 
-def heaviest(problem: MotionProblem, settings: SolverSettings, monitor: Monitor, *,
-             first: Extremal | None = None, enough: Enough = no_aim) -> Iterator[Extremal]:
+def approach_limit(parameter: FreeParameter, problem: MotionProblem, solver: Solver, *,
+                   first: Extremal | None = None,
+                   target_gap: TargetGap = no_target) -> Iterator[Extremal]:
     """
-    Yield heavier and heavier payloads from that of the problem on.
+    Yield motions nearer and nearer to a limit, from the value of the problem on.
 
-    A flexible arm starts from the heavy end of the same arm made rigid: where the payload is free
+    A flexible arm starts from the far end of the same arm made rigid: where the payload is free
     at a price its motion is near, while with a given payload the phase of what rings is not.
-    Where that fails it starts from the payload of the problem. A first motion that is known, see
-    `taken_over`, spares all that.
+    Where that fails it starts from the value of the problem. A first motion that is known, see
+    `transfer_extremal`, spares all that.
 
     """
-    return _family(problem, payloads, settings, monitor, first, enough)
-
-
-def quickest(problem: MotionProblem, settings: SolverSettings, monitor: Monitor, *,
-             first: Extremal | None = None, enough: Enough = no_aim) -> Iterator[Extremal]:
-    """Yield shorter and shorter durations from that of the problem on, see `heaviest`."""
-    return _family(problem, durations, settings, monitor, first, enough)
-
-
-def _family(problem: MotionProblem, family: Family, settings: SolverSettings, monitor: Monitor,
-            first: Extremal | None, enough: Enough) -> Iterator[Extremal]:
-    """Yield the motions of a family, the first one included."""
-    payload = family is payloads
     if first is None and problem.model.arm.n_modes:
-        rigid = _rigid_stops(problem, family, settings, monitor)
-        first = _lifted_first(problem, rigid, payload, settings, monitor)
-        if first is None and rigid and payload:
+        rigid = _rigid_extremals(parameter, problem, solver)
+        first = _lift_extremal(parameter, problem, rigid, solver)
+        if first is None and rigid and parameter is PAYLOAD:
             price, found = rigid[-1].price, False
-            for stop in hard_payloads(problem, price, settings, monitor, enough):
+            for extremal in continue_by_ipopt(problem, price, solver, target_gap):
                 found = True
-                yield stop
+                yield extremal
             if found:
                 return
     if first is None:
-        result = first_motion(problem, settings, monitor)
-        first = Extremal(value=problem.task.payload_mass if payload else problem.task.duration,
-                         price=0.0, problem=problem, result=result)
+        first = Extremal(value=parameter.value(problem), price=0.0, problem=problem,
+                         result=solve_first(problem, solver))
     yield first
     if first.result.converged:
-        yield from family(first.problem, first.result, settings, monitor, enough)
+        yield from continue_in_price(parameter, first.problem, first.result, solver, target_gap)
 
 
-def _rigid_stops(problem: MotionProblem, family: Family, settings: SolverSettings,
-                 monitor: Monitor) -> list[Extremal]:
+def _rigid_extremals(parameter: FreeParameter, problem: MotionProblem,
+                     solver: Solver) -> list[Extremal]:
     """Return the motions of the same arm made rigid up to one that is near its limit."""
     rigid = rigid_problem(problem)
-    first = cold_start(rigid, settings, monitor).result
-    stops: list[Extremal] = []
+    first = cold_start(rigid, solver).result
+    extremals: list[Extremal] = []
     if not first.converged:
-        return stops
-    for stop in family(rigid, first, settings, monitor, lambda value: _LIFT * value):
-        stops.append(stop)
-        if stop.stopped or stop.room < _LIFT * stop.value or len(stops) == _MOST_RIGID:
+        return extremals
+    for extremal in continue_in_price(parameter, rigid, first, solver,
+                                      lambda value: _LIFT * value):
+        extremals.append(extremal)
+        if (extremal.interrupted or extremal.gap < _LIFT * extremal.value
+                or len(extremals) == _MOST_RIGID):
             break
-    return stops
+    return extremals
 
 
-def _lifted_first(problem: MotionProblem, stops: list[Extremal], payload: bool,
-                  settings: SolverSettings,
-                  monitor: Monitor) -> Extremal | None:
+def _lift_extremal(parameter: FreeParameter, problem: MotionProblem, rigid: list[Extremal],
+                   solver: Solver) -> Extremal | None:
     """Return the flexible motion at the price of a rigid one that is near its limit, or None."""
-    for stop in reversed(stops[-_LIFTS:]):
-        if stop.stopped:
-            return stop
-        found = taken_over(problem, SearchStart.of(stop), settings, monitor, payload=payload)
+    for extremal in reversed(rigid[-_LIFTS:]):
+        if extremal.interrupted:
+            return extremal
+        found = transfer_extremal(parameter, problem, SearchStart.of(extremal), solver)
         if found is not None:
             return found
     return None
 
 
-def taken_over(problem: MotionProblem, start: SearchStart, settings: SolverSettings,
-               monitor: Monitor, *,
-               payload: bool) -> Extremal | None:
+def transfer_extremal(parameter: FreeParameter, problem: MotionProblem, start: SearchStart,
+                      solver: Solver) -> Extremal | None:
     """
     Return the motion at the price of another arm's or task's; None if there is none beyond.
 
     Parameters
     ----------
+    parameter : FreeParameter
+        What is free.
     problem : MotionProblem
-        With the least payload, or the longest duration, that is of interest.
+        With the least demanding value that is of interest.
     start : SearchStart
         Of the other arm or task.
-    settings, monitor
-        Of the solver.
-    payload : bool
-        Whether the payload is free, else the duration.
+    solver : Solver
+        Of the extremal.
 
     """
-    solution, price = start.solution, start.price
+    solution = start.solution
     if solution.nodes.shape[1] not in (problem.size, 4 * problem.model.arm.n_joints):
         return None  # of an arm with other modes
     try:
-        if payload:
-            near = changed(problem, payload_mass=start.value)
-            found = worth(near, _fitted(near, solution, settings), price, settings, monitor)
-            beyond = found is not None and found.value > problem.task.payload_mass
-        else:
-            near = changed(problem, duration=start.value)
-            found = worth_time(near, _fitted(near, solution, settings), price, settings, monitor)
-            beyond = found is not None and found.value < problem.task.duration
+        near = parameter.with_value(problem, start.value)
+        found = parameter.solve_at_price(near, _fit(near, solution, solver), start.price, solver)
     except FlexPlannerError:  # too heavy to hold
         return None
-    return found if beyond or (found is not None and found.stopped) else None
+    if found is None or found.interrupted:
+        return found
+    return found if parameter.improves(found.value, parameter.value(problem)) else None
 
 
-def _fitted(problem: MotionProblem, solution: CollocationSolution,
-            settings: SolverSettings) -> CollocationSolution:
+def _fit(problem: MotionProblem, solution: CollocationSolution,
+         solver: Solver) -> CollocationSolution:
     """Return a motion of the same or of a rigid arm as a guess, stretched to the duration."""
     guess = solution.stretched(problem.task.duration / solution.mesh[-1])
-    return guess if guess.nodes.shape[1] == problem.size else lifted(problem, guess, settings)
+    return guess if guess.nodes.shape[1] == problem.size else lift(problem, guess, solver)
 
 
-def first_motion(problem: MotionProblem, settings: SolverSettings,
-                 monitor: Monitor) -> CollocationResult:
+def solve_first(problem: MotionProblem, solver: Solver) -> CollocationResult:
     """Return the first solution that strategies find, or the last failure: soon."""
-    most = max(_FIRST_MESHES * problem.fewest_intervals(settings.stages), 200)
-    quick = replace(settings, max_iterations=min(15, settings.max_iterations),
-                    max_intervals=min(most, settings.max_intervals),
-                    intervals=min(most, settings.intervals))
-    result = cold_start(problem, quick, monitor).result
-    for _, strategy in DIRECTLY[1:]:
-        if result.converged or result.status in STOPPED:
+    settings = solver.settings
+    most = max(_FIRST_MESHES * problem.fewest_intervals(settings.stages), _FIRST_INTERVALS)
+    quick = solver.patient(_FIRST_ITERATIONS).set(
+        max_intervals=min(most, settings.max_intervals), intervals=min(most, settings.intervals))
+    result = cold_start(problem, quick).result
+    for attempt in (lift_rigid_motion, raise_weights):
+        if result.converged or result.status in INTERRUPTED:
             break
-        attempt = strategy(problem, quick, monitor)
-        result = result if attempt is None else attempt.result
+        tried = attempt(problem, quick)
+        result = result if tried is None else tried.result
     return result

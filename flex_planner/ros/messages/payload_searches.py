@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.validation import number
-from flex_planner.capacity.max_payload import MaxPayload, PayloadMethod
+from flex_planner.capacity.results import MaxPayload, PayloadMethod
 from flex_planner.optimal_control.task import MAX_PAYLOAD
 from flex_planner.ros.messages.plans import failure_report, report_from_plan, STATUS_CODES
 from flex_planner.ros.settings.planner import MAX_ACCURACY, MIN_ACCURACY, PlannerSettings

@@ -14,8 +14,9 @@ from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import Plan
-from flex_planner.planning.plan_path import plan_path, WARM_START
+from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.sampling import sample_plan, SampledPlan
+from flex_planner.planning.strategies.initial_guesses import WARM_START
 from flex_planner.ros.messages.payload_searches import (
     report_from_search,
     search_message,
@@ -117,7 +118,7 @@ class Planning:
         def planned(task: Task, monitor: Monitor) -> Outcome:
             monitor.payload = task.payload_mass
             cell = self._starts.near(task, searched=False)
-            plan = plan_path(task, model=self._model, settings=settings.solver(),
+            plan = plan_path(task, model=self._model, solver=settings.solver(),
                              monitor=monitor, objectives=objectives_from_message(message),
                              start_from=cell.motion.solution() if cell else None)
             report = report_from_plan(plan)
@@ -148,7 +149,7 @@ class Planning:
             options = search_options(request, settings)
             cell = self._starts.near(task, searched=True)
             found = find_max_payload(
-                task, model=self._model, settings=settings.solver(), monitor=monitor,
+                task, model=self._model, solver=settings.solver(), monitor=monitor,
                 method=options.method, accuracy=options.accuracy, step=options.step,
                 start_from=cell.motion.start() if cell else None)
             report = report_from_search(found)
@@ -198,8 +199,8 @@ class Planning:
                 ticket.settings, ticket.stamp_ns, message, outcome.report, outcome.trajectory,
                 outcome.plan, outcome.reference, ticket.stopping, search=outcome.search)
         except Exception as error:
-            foreseen = isinstance(error, FlexPlannerError)
-            _LOG.error('recording failed: %s', error, exc_info=not foreseen)
+            extrapolate_extremal = isinstance(error, FlexPlannerError)
+            _LOG.error('recording failed: %s', error, exc_info=not extrapolate_extremal)
             outcome.report.recording = ''
             if outcome.report.error_code != PlanReport.NONE:
                 return outcome

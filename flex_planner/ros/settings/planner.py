@@ -9,7 +9,7 @@ from pathlib import Path
 from flex_planner.arms.arm import Arm
 from flex_planner.base.errors import InvalidSizeError, InvalidValueError
 from flex_planner.base.validation import vector
-from flex_planner.collocation import SolverSettings
+from flex_planner.collocation import Solver, SolverSettings
 from flex_planner.optimal_control.task import MAX_PAYLOAD
 from flex_planner.planning.sampling import SamplingSettings
 from flex_planner.ros.runtime.parameters import described
@@ -108,11 +108,11 @@ class PlannerSettings:
             raise InvalidSizeError('joint_names', f'{len(self.joint_names)} names',
                                    f'a list of {count} names')
 
-    def solver(self) -> SolverSettings:
-        """Return the settings of the boundary-value solver."""
-        return SolverSettings(stages=self.stages, intervals=self.intervals,
-                              max_intervals=self.max_intervals, max_iterations=self.max_iterations,
-                              error_tolerance=self.error_tolerance)
+    def solver(self) -> Solver:
+        """Return the solver of boundary-value problems."""
+        return Solver(SolverSettings(
+            stages=self.stages, intervals=self.intervals, max_intervals=self.max_intervals,
+            max_iterations=self.max_iterations, error_tolerance=self.error_tolerance))
 
     def sampling(self) -> SamplingSettings:
         """Return how trajectories are sampled."""

@@ -19,7 +19,7 @@ from flex_planner.arms.arm_files import load_arm
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.progress import Monitor, Progress
 from flex_planner.base.validation import Array
-from flex_planner.collocation import GaussRule, SolverSettings
+from flex_planner.collocation import GaussRule, Solver, SolverSettings
 from flex_planner.dynamics.statics import equilibrium
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.direct.ipopt import (
@@ -66,7 +66,7 @@ def plan_of(request: pytest.FixtureRequest, paper_task: TaskFactory) -> PlanFact
         if key not in known:
             model = request.getfixturevalue(f'{arm}_model')
             known[key] = plan_path(paper_task(model.arm, payload_mass), model=model,
-                                   settings=SolverSettings(error_tolerance=1e-9))
+                                   solver=Solver(SolverSettings(error_tolerance=1e-9)))
         return known[key]
 
     return plan

@@ -20,7 +20,7 @@ from flex_planner.optimal_control.direct.ipopt import (
 )
 from flex_planner.optimal_control.direct.mesh import Mesh, SCHEMES
 from flex_planner.optimal_control.direct.programme import Programme
-from flex_planner.optimal_control.free_payload import PayloadProblem
+from flex_planner.optimal_control.free_payload import FreePayloadProblem
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan_path import plan_path
@@ -61,10 +61,11 @@ def worth(problem: MotionProblem, price: float) -> float:
     task = replace(problem.task, payload_mass=5.0)
     plan = plan_path(task, model=problem.model)
     settings = SolverSettings(error_tolerance=1e-8)
-    ahead = PayloadProblem(problem.model, task, plan.problem.parameters, price)
-    found = solve(ahead, ahead.extended(solution_of(plan)), settings)
+    ahead = FreePayloadProblem(
+        MotionProblem(problem.model, task, plan.problem.parameters), price)
+    found = solve(ahead, ahead.extend(solution_of(plan)), settings)
     assert found.converged, found.message
-    return ahead.restricted(found.solution)[0]
+    return ahead.restrict(found.solution)[0]
 
 
 # Optimum

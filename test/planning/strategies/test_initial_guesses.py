@@ -12,23 +12,25 @@ from flex_planner.base.progress import Monitor
 from flex_planner.collocation import (
     CollocationResult,
     CollocationSolution,
+    follow_homotopy,
     solve,
+    Solver,
     SolverSettings,
     SolverStatus,
 )
-from flex_planner.collocation.homotopy import walk
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import Task
-from flex_planner.planning.certificate import totals
+from flex_planner.optimal_control.totals import integrate_totals
 from flex_planner.planning.plan import Plan
-from flex_planner.planning.plan_path import LADDER, plan_path
+from flex_planner.planning.plan_path import plan_path
+from flex_planner.planning.strategies.catalogue import CATALOGUE
+from flex_planner.planning.strategies.homotopies import raise_weights
 from flex_planner.planning.strategies.initial_guesses import (
-    Attempt,
-    cold_start,
-    Strategy,
+    lift_rigid_motion,
     warm_start,
 )
+from flex_planner.planning.strategies.strategy import Strategy
 import numpy as np
 from plan_checks import problem_of, SAME_COST, solution_of
 import pytest
@@ -38,10 +40,10 @@ TaskFactory = Callable[..., Task]
 
 # what adds nothing to a task: the rigid arm does not bend, and makes the motion in time
 NOTHING_TO_ADD = {
-    'rigid': {'rigid motion lifted', 'vibration weights walked down', 'stiffness walked down'},
+    'rigid': {'rigid motion first', 'homotopy in vibration weights', 'homotopy in stiffness'},
     'ei5': set[str]()}
-each_strategy = pytest.mark.parametrize(('label', 'strategy'), LADDER,
-                                        ids=[label for label, _ in LADDER])
+BY_NAME = {strategy.name: strategy for strategy in CATALOGUE}
+each_strategy = pytest.mark.parametrize('strategy', CATALOGUE, ids=list(BY_NAME))
 
 
 # One by one
@@ -51,40 +53,38 @@ each_strategy = pytest.mark.parametrize(('label', 'strategy'), LADDER,
 @each_strategy
 def test_every_strategy_solves_the_task_of_the_paper_alone(
         request: pytest.FixtureRequest, plan_of: PlanFactory, paper_task: TaskFactory,
-        label: str, strategy: Strategy, name: str) -> None:
+        strategy: Strategy, name: str) -> None:
     model = request.getfixturevalue(f'{name}_model')
     problem, monitor = problem_of(model, paper_task(model.arm, w_2=10.0)), Monitor()
-    attempt = strategy(problem, SolverSettings(), monitor)
-    if label in NOTHING_TO_ADD[name]:
+    attempt = strategy.attempt(problem, Solver(monitor=monitor))
+    if strategy.name in NOTHING_TO_ADD[name]:
         assert attempt is None
         return
     assert attempt is not None
     assert (attempt.result.status, attempt.evidence) == (SolverStatus.CONVERGED, '')
-    cost = totals(problem, attempt.result.solution).cost
+    cost = integrate_totals(problem, attempt.result.solution).cost
     assert cost == pytest.approx(plan_of(name, 1.0, 10.0).cost, rel=SAME_COST)
     assert monitor.iteration <= 140  # 132 for the walk in payload of EI = 5
 
 
-@pytest.mark.parametrize('label', ['weights walked up', 'payload walked up'])
+@pytest.mark.parametrize('label', ['homotopy in the weights', 'continuation in payload'])
 def test_walk_in_what_a_task_has_not_adds_nothing(
         rigid_model: ArmModel, paper_task: TaskFactory, label: str) -> None:
     problem = problem_of(rigid_model, paper_task(rigid_model.arm, payload_mass=0.0))
-    assert dict(LADDER)[label](problem, SolverSettings(), Monitor()) is None
+    assert BY_NAME[label].attempt(problem, Solver()) is None
 
 
 def test_lifted_guess_is_the_rigid_motion_with_straight_links(
-        ei5_model: ArmModel, paper_task: TaskFactory, plan_of: PlanFactory,
-        monkeypatch: pytest.MonkeyPatch) -> None:
+        ei5_model: ArmModel, paper_task: TaskFactory, plan_of: PlanFactory) -> None:
     guesses: list[CollocationSolution] = []
 
     def watched(problem: MotionProblem, guess: CollocationSolution,
-                *rest: Any) -> CollocationResult:
+                *rest: Any, **options: Any) -> CollocationResult:
         guesses.append(guess)
-        return solve(problem, guess, *rest)
+        return solve(problem, guess, *rest, **options)
 
-    monkeypatch.setattr('flex_planner.planning.strategies.initial_guesses.solve', watched)
     problem = problem_of(ei5_model, paper_task(ei5_model.arm, w_2=10.0))
-    dict(LADDER)['rigid motion lifted'](problem, SolverSettings(), Monitor())
+    lift_rigid_motion(problem, Solver(backend=watched))
     rigid = solution_of(plan_of('rigid', 1.0, 10.0))
     joints = np.array([0, 1, 6, 7, 12, 13, 18, 19])
     times, lifted = np.linspace(0, 1, 7), guesses[-1]
@@ -94,44 +94,40 @@ def test_lifted_guess_is_the_rigid_motion_with_straight_links(
 
 
 def test_rigid_motion_takes_the_weights_and_velocities_of_the_joints(
-        ei5_model: ArmModel, paper_task: TaskFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+        ei5_model: ArmModel, paper_task: TaskFactory) -> None:
     tasks: list[Task] = []
 
-    def watched(problem: MotionProblem, settings: SolverSettings, monitor: Monitor) -> Attempt:
+    def watched(problem: MotionProblem, *rest: Any, **options: Any) -> CollocationResult:
         tasks.append(problem.task)
-        return cold_start(problem, settings, monitor)
+        return solve(problem, *rest, **options)
 
-    monkeypatch.setattr('flex_planner.planning.strategies.initial_guesses.cold_start', watched)
     numbers = {'position_weights': [1, 2, 3, 4, 5, 6], 'velocity_weights': [6, 5, 4, 3, 2, 1],
                'start_velocities': [0.1, 0.2, 0.01, 0, 0, 0], 'goal_velocities': [0.3, 0.4],
                'goal_position_weights': [math.inf, 7, 8, 9, 10, 11],
                'goal_velocity_weights': [12, 13]}
     task = paper_task(ei5_model.arm, **numbers)
-    dict(LADDER)['rigid motion lifted'](problem_of(ei5_model, task), SolverSettings(), Monitor())
+    lift_rigid_motion(problem_of(ei5_model, task), Solver(backend=watched))
     for name, values in numbers.items():
         assert getattr(tasks[0], name).tolist() == values[:2]
     assert tasks[0].arm.n_modes == 0
 
 
 def test_large_weights_are_walked_up_from_none(
-        rigid_model: ArmModel, paper_task: TaskFactory, plan_of: PlanFactory,
-        monkeypatch: pytest.MonkeyPatch) -> None:
+        rigid_model: ArmModel, paper_task: TaskFactory, plan_of: PlanFactory) -> None:
     weights: list[float] = []
 
-    def watched(problem: MotionProblem, *rest: Any) -> CollocationResult:
+    def watched(problem: MotionProblem, *rest: Any, **options: Any) -> CollocationResult:
         weights.append(float(problem.parameters.velocity_weights.max()))
-        return solve(problem, *rest)
+        return solve(problem, *rest, **options)
 
-    for module in ('planning.strategies.initial_guesses', 'collocation.homotopy'):
-        monkeypatch.setattr(f'flex_planner.{module}.solve', watched)
     problem = problem_of(rigid_model, paper_task(rigid_model.arm, w_2=1400.0))
-    attempt = dict(LADDER)['weights walked up'](problem, SolverSettings(), Monitor())
+    attempt = raise_weights(problem, Solver(backend=watched))
     assert attempt is not None
     assert attempt.result.converged
     assert (weights[0], weights[-1]) == (0.0, 1400.0)
     assert 1 <= weights[1] <= 10
     assert weights == sorted(weights)  # no step failed
-    assert totals(problem, attempt.result.solution).cost == pytest.approx(
+    assert integrate_totals(problem, attempt.result.solution).cost == pytest.approx(
         plan_of('rigid', 1.0, 1400.0).cost, rel=SAME_COST)
 
 
@@ -160,7 +156,7 @@ def test_solution_solves_its_own_task_at_once(ei5_model: ArmModel, paper_task: T
 def test_plan_may_start_one_of_another_rule_or_stiffness(
         ei50_model: ArmModel, paper_task: TaskFactory, plan_of: PlanFactory) -> None:
     plan = plan_path(paper_task(ei50_model.arm), model=ei50_model, start_from=plan_of('ei5'),
-                     settings=SolverSettings(stages=5))
+                     solver=Solver(SolverSettings(stages=5)))
     assert (plan.solved, plan.strategy) == (True, 'warm start')
     assert plan.cost == pytest.approx(plan_of('ei50').cost, rel=SAME_COST)
 
@@ -169,7 +165,7 @@ def test_plan_of_an_arm_with_other_coordinates_is_no_start(
         rigid_model: ArmModel, paper_task: TaskFactory, plan_of: PlanFactory) -> None:
     task = paper_task(rigid_model.arm)
     strategy = warm_start(solution_of(plan_of('ei5')))
-    assert strategy(problem_of(rigid_model, task), SolverSettings(), Monitor()) is None
+    assert strategy.attempt(problem_of(rigid_model, task), Solver()) is None
     plan = plan_path(task, model=rigid_model, start_from=plan_of('ei5'))
     assert (plan.solved, plan.strategy) == (True, 'cold start')
 
@@ -200,10 +196,11 @@ def test_walk_reaches_the_end_exactly_in_growing_steps(
         rigid_model: ArmModel, paper_task: TaskFactory, plan_of: PlanFactory) -> None:
     ways: list[float] = []
     family = heavier(rigid_model, paper_task(rigid_model.arm), 5.5, ways)
-    result = walk(family, solution_of(plan_of('rigid')), SolverSettings(), Monitor(), 0.1)
+    result = follow_homotopy(family, solution_of(plan_of('rigid')), Solver(),
+                             0.1)
     assert result.converged
     assert ways == pytest.approx([0.1, 0.3, 0.7, 1.0])
-    cost = totals(family(1.0), result.solution).cost
+    cost = integrate_totals(family(1.0), result.solution).cost
     assert cost == pytest.approx(plan_of('rigid', 5.5).cost, rel=SAME_COST)
 
 
@@ -217,10 +214,10 @@ def test_walk_to_where_nothing_is_says_how_far_it_came() -> None:
 
     nothing = CollocationSolution.from_values(np.linspace(0, 1, 21), np.zeros((21, 2)),
                                               settings.rule)
-    result = walk(at, nothing, settings, Monitor(), first_step=1.0)
+    result = follow_homotopy(at, nothing, Solver(settings), first_step=1.0)
     assert result.status is not SolverStatus.CONVERGED
     assert ways[:2] == [1.0, 0.5]  # halved where it failed
-    percent = float(result.message.rpartition(' at ')[2].removesuffix('% of the way'))
+    percent = float(result.message.rpartition(' at ')[2].removesuffix('% of the homotopy'))
     # where the last step, twice the smallest of 1/256 or less, failed; rounded to 0.1 %
     assert 3.5138307 / 5 - 5e-4 < percent / 100 < 3.5138307 / 5 + 2 / 256 + 5e-4
 
@@ -231,5 +228,5 @@ def test_walk_is_stopped(rigid_model: ArmModel, paper_task: TaskFactory, plan_of
     monitor = Monitor()
     monitor.canceled = lambda: monitor.iteration >= last
     family = heavier(rigid_model, paper_task(rigid_model.arm), 9.0, [])
-    result = walk(family, solution_of(plan_of('rigid')), SolverSettings(), monitor, 0.2)
+    result = follow_homotopy(family, solution_of(plan_of('rigid')), Solver(monitor=monitor), 0.2)
     assert (result.status, monitor.iteration) == (SolverStatus.CANCELED, last)

@@ -8,12 +8,12 @@ from dataclasses import replace
 from flex_planner.arms.arm import Arm
 from flex_planner.base.progress import Monitor
 from flex_planner.capacity.max_payload import find_max_payload
-from flex_planner.collocation import SolverSettings, SolverStatus
+from flex_planner.collocation import Solver, SolverStatus
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import PlanStatus
-from flex_planner.planning.strategies.ipopt_continuation import hard_payloads
+from flex_planner.planning.strategies.ipopt_continuation import continue_by_ipopt
 import numpy as np
 from plan_checks import problem_of, tip_miss
 import pytest
@@ -49,7 +49,7 @@ def test_clamped_arm_carries_what_direct_collocation_says(problem: MotionProblem
 @pytest.mark.parametrize('limit', [0.0, 0.5])
 def test_search_stops_in_time(problem: MotionProblem, limit: float) -> None:
     monitor = Monitor(time_limit=limit)
-    stops = list(hard_payloads(problem, 300.0, SolverSettings(), monitor, lambda value: 0.0))
+    stops = list(continue_by_ipopt(problem, 300.0, Solver(monitor=monitor), lambda value: 0.0))
     assert stops[-1].result.status is SolverStatus.TIMEOUT
     assert monitor.elapsed < limit + 3
 

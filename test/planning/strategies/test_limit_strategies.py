@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import islice
 import math
@@ -10,23 +10,28 @@ from typing import Any
 
 from flex_planner.arms.arm import Arm, Joint, Link, Motor
 from flex_planner.base.progress import Monitor
-from flex_planner.collocation import CollocationResult, solve, SolverSettings, SolverStatus
+from flex_planner.collocation import solve, Solver, SolverSettings, SolverStatus
 from flex_planner.optimal_control.arm_model import ArmModel
-from flex_planner.optimal_control.free_payload import PayloadProblem
-from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
+from flex_planner.optimal_control.free_payload import FreePayloadProblem
+from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_path import plan_path
-from flex_planner.planning.strategies.initial_guesses import Attempt, cold_start
-from flex_planner.planning.strategies.limit_strategies import walked_duration, walked_payload
-from flex_planner.planning.strategies.price_continuation import durations, Extremal, payloads
+from flex_planner.planning.strategies.extremals import Extremal
+from flex_planner.planning.strategies.free_parameters import DURATION, FreeParameter, PAYLOAD
+from flex_planner.planning.strategies.initial_guesses import cold_start
+from flex_planner.planning.strategies.limit_strategies import (
+    continue_in_duration,
+    continue_in_payload,
+)
+from flex_planner.planning.strategies.price_continuation import continue_in_price
+from flex_planner.planning.strategies.strategy import Attempt
 import numpy as np
 from plan_checks import costates, problem_of, share_of, solution_of
 import pytest
 
 PlanFactory = Callable[..., Plan]
 TaskFactory = Callable[..., Task]
-Search = Callable[[MotionProblem, CollocationResult, SolverSettings, Monitor], Iterator[Extremal]]
 
 # limits of section 5.3's motion: kg in 1 s, and s with 1 kg
 HEAVIEST = {'rigid': 5.85514, 'ei5': 5.7418}
@@ -36,11 +41,12 @@ EXACT = SolverSettings(error_tolerance=1e-8)
 WAY = 1e-6
 
 
-def stops_of(search: Search, problem: MotionProblem, share: float = 1e-5) -> list[Extremal]:
+def stops_of(parameter: FreeParameter, problem: MotionProblem,
+             share: float = 1e-5) -> list[Extremal]:
     """Return the stops on the way to a limit, until one changes the value less than a share."""
-    first = cold_start(problem, SolverSettings(), Monitor()).result
+    first = cold_start(problem, Solver()).result
     stops: list[Extremal] = []
-    for stop in search(problem, first, SolverSettings(), Monitor()):
+    for stop in continue_in_price(parameter, problem, first, Solver()):
         stops.append(stop)
         if len(stops) > 1 and abs(stop.value / stops[-2].value - 1) < share:
             break
@@ -67,7 +73,7 @@ def model_of(request: pytest.FixtureRequest, name: str) -> ArmModel:
 def test_payload_grows_to_the_heaviest(request: pytest.FixtureRequest, paper_task: TaskFactory,
                                        name: str) -> None:
     model = model_of(request, name)
-    stops = stops_of(payloads, problem_of(model, paper_task(model.arm)))
+    stops = stops_of(PAYLOAD, problem_of(model, paper_task(model.arm)))
     assert stops[-1].value == pytest.approx(HEAVIEST[name], rel=2e-5)
     assert stops[-1].value == pytest.approx({'rigid': 5.855, 'ei5': 5.742}[name], abs=1e-3)
     assert all(np.diff([1.0, *(stop.value for stop in stops)]) > 0)
@@ -80,7 +86,7 @@ def test_payload_grows_to_the_heaviest(request: pytest.FixtureRequest, paper_tas
 def test_duration_falls_to_the_shortest(request: pytest.FixtureRequest, paper_task: TaskFactory,
                                         name: str) -> None:
     model = model_of(request, name)
-    stops = stops_of(durations, problem_of(model, paper_task(model.arm)))
+    stops = stops_of(DURATION, problem_of(model, paper_task(model.arm)))
     assert stops[-1].value == pytest.approx(SHORTEST[name], rel=2e-5)
     assert all(np.diff([1.0, *(stop.value for stop in stops)]) < 0)
     assert all(np.diff([stop.price for stop in stops]) > 0)
@@ -92,9 +98,9 @@ def test_limits_of_one_link_have_their_closed_form() -> None:
     # bang-bang: u_max T^2 = 4 M d
     T, u_max, d = 2.0, 2.0, 0.5
     model = ArmModel(one_link(T, 0.0).arm)
-    stops = stops_of(payloads, problem_of(model, one_link(T, 0.0)))
+    stops = stops_of(PAYLOAD, problem_of(model, one_link(T, 0.0)))
     assert stops[-1].value == pytest.approx(u_max * T**2 / (4 * d) - 1, rel=1e-5)
-    stops = stops_of(durations, problem_of(model, one_link(T, 0.5)))
+    stops = stops_of(DURATION, problem_of(model, one_link(T, 0.5)))
     assert stops[-1].value == pytest.approx(2 * math.sqrt(1.5 * d / u_max), rel=1e-5)
 
 
@@ -103,13 +109,13 @@ def test_motion_without_limits_has_none() -> None:
     task = replace(one_link(2.0, 0.0), arm=Arm(
         name='free', links=(Link(length=1.0, linear_density=3.0),), joints=(Joint(),)))
     problem = problem_of(ArmModel(task.arm), task)
-    first = cold_start(problem, SolverSettings(), Monitor()).result
-    search = payloads(problem, first, SolverSettings(), Monitor())
+    first = cold_start(problem, Solver()).result
+    search = continue_in_price(PAYLOAD, problem, first, Solver())
     stops = list(islice(search, 4))
     np.testing.assert_allclose([stop.value for stop in stops],
                                [stop.price / 0.375 - 1 for stop in stops], rtol=WAY)
     assert stops[-1].value > 1e4
-    assert all(stop.room == math.inf for stop in stops)
+    assert all(stop.gap == math.inf for stop in stops)
 
 
 # Priced
@@ -119,11 +125,12 @@ def test_motion_without_limits_has_none() -> None:
 def test_price_at_a_stop_is_what_more_payload_costs(
         request: pytest.FixtureRequest, paper_task: TaskFactory, name: str) -> None:
     model, h = model_of(request, name), 1e-3
-    stops = stops_of(payloads, problem_of(model, paper_task(model.arm)), share=0.2)
+    stops = stops_of(PAYLOAD, problem_of(model, paper_task(model.arm)), share=0.2)
     stop = next(stop for stop in stops if stop.value > 5)
     assert stop.value < 5.8  # both motors saturate
-    start = plan_path(paper_task(model.arm, stop.value), model=model, settings=EXACT)
-    costs = [plan_path(paper_task(model.arm, stop.value + k * h), model=model, settings=EXACT,
+    start = plan_path(paper_task(model.arm, stop.value), model=model, solver=Solver(EXACT))
+    costs = [plan_path(paper_task(model.arm, stop.value + k * h), model=model,
+                       solver=Solver(EXACT),
                        start_from=start).cost for k in (-2, -1, 1, 2)]
     assert np.array([1, -8, 8, -1]) @ costs / (12 * h) == pytest.approx(stop.price, rel=WAY)
     assert share_of(start.problem, solution_of(start)) == pytest.approx(stop.price, rel=WAY)
@@ -133,10 +140,10 @@ def test_price_at_a_stop_is_what_more_payload_costs(
 def test_price_at_a_stop_is_what_less_time_costs(
         request: pytest.FixtureRequest, paper_task: TaskFactory, name: str) -> None:
     model, h = model_of(request, name), 5e-4
-    stops = stops_of(durations, problem_of(model, paper_task(model.arm)), share=0.2)
+    stops = stops_of(DURATION, problem_of(model, paper_task(model.arm)), share=0.2)
     stop = next(stop for stop in stops if stop.value < 0.8)
     costs = [plan_path(paper_task(model.arm, duration=stop.value + k * h), model=model,
-                       settings=EXACT).cost for k in (-2, -1, 1, 2)]
+                       solver=Solver(EXACT)).cost for k in (-2, -1, 1, 2)]
     assert np.array([-1, 8, -8, 1]) @ costs / (12 * h) == pytest.approx(stop.price, rel=1e-5)
 
 
@@ -150,9 +157,9 @@ def crane_task(crane_arm: Arm) -> Task:
 def test_price_under_gravity_counts_how_the_payload_bends_the_ends(
         crane_model: ArmModel, crane_task: Task) -> None:
     h, mass = 4e-3, crane_task.payload_mass
-    plan = plan_path(crane_task, model=crane_model, settings=EXACT)
+    plan = plan_path(crane_task, model=crane_model, solver=Solver(EXACT))
     costs = [plan_path(replace(crane_task, payload_mass=mass + k * h), model=crane_model,
-                       settings=EXACT, start_from=plan).cost for k in (-2, -1, 1, 2)]
+                       solver=Solver(EXACT), start_from=plan).cost for k in (-2, -1, 1, 2)]
     price = np.array([1, -8, 8, -1]) @ costs / (12 * h)
     starts, goals = ([problem_of(crane_model, replace(crane_task, payload_mass=mass + k * h))
                       for k in (-1, 1)] for _ in range(2))
@@ -163,21 +170,21 @@ def test_price_under_gravity_counts_how_the_payload_bends_the_ends(
         share + costates(plan, 0.0) @ bent[0] - costates(plan, 1.0) @ bent[1], rel=1e-6)
     assert abs(price - share) > 0.02
     # at this price the payload is worth its effort
-    problem = PayloadProblem(crane_model, crane_task, task_parameters(crane_task), float(price))
-    found = solve(problem, problem.extended(solution_of(plan)), SolverSettings())
+    problem = FreePayloadProblem(problem_of(crane_model, crane_task), float(price))
+    found = solve(problem, problem.extend(solution_of(plan)), SolverSettings())
     assert found.converged
-    assert problem.restricted(found.solution)[0] == pytest.approx(mass, rel=1e-6)
+    assert problem.restrict(found.solution)[0] == pytest.approx(mass, rel=1e-6)
     assert found.iterations <= 3
 
 
 def test_price_of_a_payload_raised_by_itself_counts_the_ends(crane_model: ArmModel,
                                                              crane_task: Task) -> None:
     # at the first stops no step in price succeeds
-    first = cold_start(problem_of(crane_model, crane_task), SolverSettings(), Monitor()).result
-    stop = next(payloads(problem_of(crane_model, crane_task), first, SolverSettings(), Monitor()))
+    first = cold_start(problem_of(crane_model, crane_task), Solver()).result
+    stop = next(continue_in_price(PAYLOAD, problem_of(crane_model, crane_task), first, Solver()))
     h = 2e-3
     less, more = (plan_path(replace(crane_task, payload_mass=stop.value + k), model=crane_model,
-                            settings=EXACT).cost for k in (-h, h))
+                            solver=Solver(EXACT)).cost for k in (-h, h))
     assert (more - less) / (2 * h) == pytest.approx(stop.price, rel=1e-3)
 
 
@@ -185,13 +192,13 @@ def test_price_of_a_payload_raised_by_itself_counts_the_ends(crane_model: ArmMod
 
 
 EVIDENCE = [
-    ('rigid', {'payload_mass': 5.86}, 'payload walked up',
+    ('rigid', {'payload_mass': 5.86}, 'continuation in payload',
      'the arm carries at most 5.855 kg from start to goal in 1 s, and 5.86 kg were asked for'),
-    ('ei5', {'payload_mass': 20.0}, 'payload walked up',
+    ('ei5', {'payload_mass': 20.0}, 'continuation in payload',
      'the arm carries at most 5.742 kg from start to goal in 1 s, and 20 kg were asked for'),
-    ('rigid', {'duration': 0.3}, 'duration walked down',
+    ('rigid', {'duration': 0.3}, 'continuation in duration',
      'the motion takes at least 0.6421 s with 1 kg, and 0.3 s were asked for'),
-    ('ei5', {'duration': 0.3}, 'duration walked down',
+    ('ei5', {'duration': 0.3}, 'continuation in duration',
      'the motion takes at least 0.6495 s with 1 kg, and 0.3 s were asked for')]
 
 
@@ -224,19 +231,19 @@ def test_motion_next_to_its_limit_is_solved(request: pytest.FixtureRequest,
 
 
 @pytest.mark.parametrize('name', HEAVIEST)
-@pytest.mark.parametrize('search', [walked_payload, walked_duration])
+@pytest.mark.parametrize('search', [continue_in_payload, continue_in_duration])
 def test_feasible_motion_is_never_called_impossible(
         request: pytest.FixtureRequest, paper_task: TaskFactory, name: str,
         search: Callable[..., Attempt | None]) -> None:
     model = model_of(request, name)
     for share in (0.5, 0.99, 0.999, 0.9999):
-        by_mass = search is walked_payload
+        by_mass = search is continue_in_payload
         task = paper_task(model.arm, share * HEAVIEST[name] if by_mass else 1.0,
                           duration=1.0 if by_mass else SHORTEST[name] / share)
-        attempt = search(problem_of(model, task), SolverSettings(), Monitor())
+        attempt = search(problem_of(model, task), Solver())
         # the rigid arm makes it in time: then there is no search in time
         assert attempt is None or attempt.evidence == ''
-        assert attempt is not None or (name, search) == ('ei5', walked_duration)
+        assert attempt is not None or (name, search) == ('ei5', continue_in_duration)
         if attempt is not None:
             assert attempt.result.converged
 
@@ -245,7 +252,7 @@ def test_motion_a_hundred_thousandth_from_its_limit_is_not_called_impossible(
         ei5_model: ArmModel, paper_task: TaskFactory) -> None:
     # the cold start solves 5.7415 kg, and 5.74182 kg are on the way to the limit
     problem = problem_of(ei5_model, paper_task(ei5_model.arm, 5.74177))
-    attempt = walked_payload(problem, SolverSettings(), Monitor())
+    attempt = continue_in_payload(problem, Solver())
     assert attempt is not None
     assert attempt.evidence == ''
 
@@ -281,14 +288,14 @@ def test_payload_tried_on_the_way_may_be_too_heavy_to_hold() -> None:
               gravity=[0, -9.81])
     task = Task(arm=arm, start_positions=[-0.5], goal_positions=[0.0], duration=2.0)
     # 0.46 kg are the most that the motor holds at the goal
-    assert stops_of(payloads, problem_of(ArmModel(arm), task))[-1].value <= 0.4617
+    assert stops_of(PAYLOAD, problem_of(ArmModel(arm), task))[-1].value <= 0.4617
 
 
 def test_payload_of_an_iterate_may_be_too_heavy_for_the_links(crane_model: ArmModel,
                                                               crane_task: Task) -> None:
     problem = problem_of(crane_model, crane_task)
-    first = cold_start(problem, SolverSettings(), Monitor()).result
-    search = payloads(problem, first, SolverSettings(), Monitor())
+    first = cold_start(problem, Solver()).result
+    search = continue_in_price(PAYLOAD, problem, first, Solver())
     # steps that lead there fail, and nothing is raised
     values = [stop.value for stop in islice(search, 4)]
     assert values == sorted(values)
@@ -306,7 +313,8 @@ def test_duration_tried_on_the_way_may_be_too_long() -> None:
 
 
 @pytest.mark.parametrize(('changes', 'phase'), [
-    ({'payload_mass': 20.0}, 'payload walked up'), ({'duration': 0.3}, 'duration walked down')])
+    ({'payload_mass': 20.0}, 'continuation in payload'),
+    ({'duration': 0.3}, 'continuation in duration')])
 @pytest.mark.parametrize('status', [PlanStatus.CANCELED, PlanStatus.TIMEOUT])
 def test_search_for_a_limit_is_stopped(
         rigid_model: ArmModel, paper_task: TaskFactory, changes: dict[str, float], phase: str,
@@ -330,13 +338,13 @@ def test_search_for_a_limit_is_stopped(
         assert plan.iterations <= seen[0] + patience + 1
 
 
-@pytest.mark.parametrize('search', [payloads, durations])
+@pytest.mark.parametrize('parameter', [PAYLOAD, DURATION], ids=lambda each: each.name)
 def test_stopped_search_says_so_and_ends(rigid_model: ArmModel, paper_task: TaskFactory,
-                                         search: Search) -> None:
+                                         parameter: FreeParameter) -> None:
     problem, monitor = problem_of(rigid_model, paper_task(rigid_model.arm)), Monitor()
-    first = cold_start(problem, SolverSettings(), monitor).result
+    first = cold_start(problem, Solver(monitor=monitor)).result
     monitor.canceled = lambda: monitor.iteration >= 20
-    stops = list(search(problem, first, SolverSettings(), monitor))
+    stops = list(continue_in_price(parameter, problem, first, Solver(monitor=monitor)))
     assert stops[-1].result.status is SolverStatus.CANCELED
     assert all(stop.result.converged for stop in stops[:-1])
     assert len(stops) > 1

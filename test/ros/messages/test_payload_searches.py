@@ -9,7 +9,8 @@ from typing import Any
 from flex_planner.arms.arm import Arm
 from flex_planner.base.errors import FlexPlannerError, InvalidValueError, NotFiniteError
 from flex_planner.base.progress import Monitor
-from flex_planner.capacity.max_payload import find_max_payload, MaxPayload, PayloadMethod
+from flex_planner.capacity.max_payload import find_max_payload
+from flex_planner.capacity.results import MaxPayload, PayloadMethod
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import PlanStatus

@@ -1,0 +1,146 @@
+"""What searches for a limit return: the largest payload, the shortest duration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+from flex_planner.base.validation import Array
+from flex_planner.capacity.bracket import restart_point
+from flex_planner.capacity.incremental import PayloadTrial
+from flex_planner.optimal_control.task import Task
+from flex_planner.planning.plan import Plan, PlanStatus
+from flex_planner.planning.strategies.extremals import Extremal
+import numpy as np
+
+
+class PayloadMethod(Enum):
+    """How the maximum payload is found; the value is shown to people."""
+
+    DIRECT = 'payload as an unknown at a rising price'
+    INCREMENTAL = 'payload raised step by step'
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PayloadFront:
+    """
+    The cost of each payload met on the way to the largest.
+
+    Attributes
+    ----------
+    payloads : numpy.ndarray, shape (k,)
+        Ascending [kg].
+    efforts : numpy.ndarray, shape (k,)
+        Least integral of R-weighted squared torques that carries it, J of eq. (6) without
+        weights but R [N^2 m^2 s].
+    prices : numpy.ndarray, shape (k,)
+        dJ/dm_p [N^2 m^2 s/kg].
+
+    """
+
+    payloads: Array = field(default_factory=lambda: np.zeros(0))
+    efforts: Array = field(default_factory=lambda: np.zeros(0))
+    prices: Array = field(default_factory=lambda: np.zeros(0))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LimitResult:
+    """
+    The outcome of a search for a limit, whether it succeeded or not.
+
+    Attributes
+    ----------
+    task : Task
+        What was asked.
+    status : PlanStatus
+        ``SOLVED`` if the limit is in the bracket.
+    message : str
+        The status in more words.
+    plan : Plan or None
+        The motion at the end of the bracket that is possible.
+    extremals : tuple of Extremal
+        Motions with values nearer and nearer to the limit, with their prices.
+    warm : bool
+        Whether it went on from the motion that it was given to start from.
+    iterations : int
+        Newton iterations.
+    planning_time : float
+        [s].
+
+    """
+
+    task: Task
+    status: PlanStatus
+    message: str
+    plan: Plan | None = None
+    extremals: tuple[Extremal, ...] = field(default=(), repr=False)
+    warm: bool = False
+    iterations: int = 0
+    planning_time: float = 0.0
+
+    @property
+    def solved(self) -> bool:
+        """Return whether the limit is known to the accuracy asked for."""
+        return self.status is PlanStatus.SOLVED
+
+    @property
+    def restart_point(self) -> Extremal | None:
+        """Return the last motion that leaves some gap: a start for searches of its kind."""
+        return restart_point(self.extremals)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MaxPayload(LimitResult):
+    """
+    The outcome of a search for the maximum payload, see `LimitResult`.
+
+    Its status is ``INFEASIBLE`` if not even the task's own payload can be carried.
+
+    Attributes
+    ----------
+    method : PayloadMethod
+        How it was searched.
+    payload : float
+        Lower end of the bracket: the largest payload with a certified plan; 0 if there is
+        none [kg].
+    upper : float
+        Upper end: too much, see `Extremal.gap`, or a payload without a solution; ``inf`` if
+        unknown [kg].
+    limiting_joint : int or None
+        Index of the joint whose motor is on its limit for the largest share of the time, see
+        `Plan.saturation`, or that can hold no more at the goal.
+    held : bool
+        Whether the limit is what the motors hold at the goal.
+    front : PayloadFront
+        Payloads and their cost; empty if not searched by the direct method.
+    trials : tuple of PayloadTrial
+        Payloads tried; empty if not searched by the incremental method.
+
+    """
+
+    method: PayloadMethod
+    payload: float = 0.0
+    upper: float = np.inf
+    limiting_joint: int | None = None
+    held: bool = False
+    front: PayloadFront = field(default_factory=PayloadFront)
+    trials: tuple[PayloadTrial, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MinDuration(LimitResult):
+    """
+    The outcome of a search for the shortest duration, see `LimitResult`.
+
+    Attributes
+    ----------
+    duration : float
+        Upper end of the bracket: the shortest with a certified plan; ``inf`` if there is
+        none [s].
+    lower : float
+        Lower end: too short, see `Extremal.gap`; 0 if unknown [s].
+
+    """
+
+    duration: float = np.inf
+    lower: float = 0.0

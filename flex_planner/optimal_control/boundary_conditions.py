@@ -1,0 +1,171 @@
+"""States at both ends of a motion: eq. (16), the terminal cost of eq. (6), and how they bend."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from flex_planner.base.errors import InvalidTaskError, NoEquilibriumError
+from flex_planner.base.validation import Array
+from flex_planner.collocation.linear import SingularSystemError
+from flex_planner.dynamics.statics import equilibrium
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.parameters import Parameters
+from flex_planner.optimal_control.task import MAX_PAYLOAD, Task
+import numpy as np
+from scipy.optimize import brentq
+
+# share of its stall torque by which a motor is said to be too weak for a buckled arm
+_OVERLOADED = 1e3
+# of a payload, for differences [kg]
+_NUDGE = 1e-4
+
+
+class BoundaryConditions:
+    """
+    Boundary rows of the optimality conditions of a task.
+
+    The state is given at the start. At the goal each coordinate and rate is either given,
+    eq. (16), or weighs in the cost by the terminal term of eq. (6), whose derivative is its
+    costate there (transversality).
+
+    Parameters
+    ----------
+    model : ArmModel
+        n joints, n_t coordinates.
+    task : Task
+        Start and goal.
+    parameters : Parameters
+        Payload, stiffness and limits.
+
+    Attributes
+    ----------
+    start, goal : numpy.ndarray, shape (2 n_t,)
+        States at both ends, bent as gravity bends the arm at rest.
+    goal_weights : numpy.ndarray, shape (2 n_t,)
+        Diagonals of W_p and W_v of eq. (6); infinite where the goal must be met.
+    holding_torque : numpy.ndarray, shape (n,)
+        Holds the arm at the goal [N m].
+
+    Raises
+    ------
+    InvalidTaskError
+        If a motor is too weak to hold the arm at a goal where it comes to rest.
+
+    """
+
+    def __init__(self, model: ArmModel, task: Task, parameters: Parameters) -> None:
+        n_t = model.arm.n_coordinates
+        start, _ = equilibrium(model, task.start_positions, parameters)
+        goal, self.holding_torque = equilibrium(model, task.goal_positions, parameters)
+        if task.ends_at_rest:
+            _check_holding(self.holding_torque, parameters)
+        self.start = np.concatenate([start, task.start_velocities])
+        self.goal = np.concatenate([goal, task.goal_velocities])
+        self.goal_weights = np.concatenate([task.goal_position_weights,
+                                            task.goal_velocity_weights])
+        self._left_rows = np.eye(2 * n_t, 4 * n_t)
+        self._right_rows = _transversality(self.goal_weights)
+
+    def left(self, z: Array) -> tuple[Array, Array]:
+        """Return the initial conditions of eq. (16) and their rows."""
+        return z[:self.start.size] - self.start, self._left_rows
+
+    def right(self, z: Array) -> tuple[Array, Array]:
+        """Return the final conditions of eq. (16), or transversality of eq. (6), and rows."""
+        half = self.goal.size
+        miss = np.concatenate([z[:half] - self.goal, z[half:]])
+        residual: Array = self._right_rows @ miss
+        return residual, self._right_rows
+
+    def reached(self, end: Array) -> Array:
+        """Return the state (2 n_t,) that a motion ending in `end` is to reach."""
+        return np.where(np.isinf(self.goal_weights), self.goal, end)
+
+
+def _transversality(weights: Array) -> Array:
+    """Return the rows of ``x - goal = 0``, or of ``psi - W (x - goal) = 0`` for finite W."""
+    given = np.isinf(weights)
+    states = np.where(given, 1.0, -np.where(given, 0.0, weights))
+    return np.hstack([np.diag(states), np.diag(np.where(given, 0.0, 1.0))])
+
+
+def _check_holding(torque: Array, parameters: Parameters) -> None:
+    """Refuse a goal at which the arm would sink as soon as it has arrived."""
+    for i, (needed, stall) in enumerate(zip(torque, parameters.stall_torque, strict=True), 1):
+        if abs(needed) > stall:
+            raise InvalidTaskError(
+                f'joint {i} needs {abs(needed):.4g} N m to hold the arm with its payload at the '
+                f'goal, but the stall torque of its motor is {stall:.4g} N m')
+
+
+def holding_limit(model: ArmModel, task: Task, parameters: Parameters) -> tuple[float, int]:
+    """
+    Return the payload [kg] that the motors just hold at the goal, and the joint that is first.
+
+    The payload is infinite where gravity does not load the joints, or motors have no limits.
+
+    """
+    def load(payload: float) -> Array:
+        """Return the share of the stall torque that each motor needs."""
+        try:
+            torque = equilibrium(model, task.goal_positions,
+                                 replace(parameters, payload_mass=payload))[1]
+        except NoEquilibriumError:
+            return np.full(model.arm.n_joints, _OVERLOADED)
+        share: Array = np.abs(torque) / parameters.stall_torque
+        return share
+
+    heavy = 1.0
+    while load(heavy).max() < 1:
+        heavy *= 2
+        if heavy > MAX_PAYLOAD:
+            return np.inf, 0
+    limit = float(brentq(lambda payload: load(payload).max() - 1, 0.0, heavy, xtol=1e-12))
+    return limit, int(load(limit).argmax())
+
+
+class PayloadEnds:
+    """
+    States at both ends, and how they change with the payload.
+
+    Parameters
+    ----------
+    model, task, parameters
+        As of `BoundaryConditions`.
+    conditions : BoundaryConditions
+        With the payload of the task.
+
+    """
+
+    def __init__(self, model: ArmModel, task: Task, parameters: Parameters,
+                 conditions: BoundaryConditions) -> None:
+        self._model, self._task, self._parameters = model, task, parameters
+        self._given = conditions.start, conditions.goal
+        self._bent = bool(model.arm.n_modes and model.arm.gravity.any())
+
+    def at(self, end: int, payload: float) -> tuple[Array, Array]:
+        """
+        Return state and its derivative by the payload at the start (0) or the goal (1).
+
+        Raises
+        ------
+        SingularSystemError
+            If the arm does not come to rest: the payload of an iterate may be absurd.
+
+        """
+        given = self._given[end]
+        if not self._bent:
+            return given, np.zeros_like(given)
+        try:
+            states = [self._state(end, payload + change) for change in (0.0, -_NUDGE, _NUDGE)]
+        except NoEquilibriumError as error:
+            raise SingularSystemError(str(error)) from None
+        change: Array = (states[2] - states[1]) / (2 * _NUDGE)
+        return states[0], change
+
+    def _state(self, end: int, payload: float) -> Array:
+        task = self._task
+        positions = (task.start_positions, task.goal_positions)[end]
+        rates = (task.start_velocities, task.goal_velocities)[end]
+        parameters = replace(self._parameters, payload_mass=payload)
+        return np.concatenate([equilibrium(self._model, positions, parameters)[0], rates])

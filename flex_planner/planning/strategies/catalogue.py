@@ -1,0 +1,34 @@
+"""The strategies that lead to a plan, in the order in which they are tried."""
+
+from __future__ import annotations
+
+from flex_planner.planning.strategies.homotopies import (
+    lower_vibration_price,
+    raise_weights,
+    soften_links,
+)
+from flex_planner.planning.strategies.initial_guesses import (
+    coarse_mesh,
+    cold_start,
+    direct_collocation,
+    lift_rigid_motion,
+)
+from flex_planner.planning.strategies.limit_strategies import (
+    continue_in_duration,
+    continue_in_payload,
+)
+from flex_planner.planning.strategies.strategy import Strategy
+
+# the limits come before the thorough strategies: to refuse a task should not take minutes
+CATALOGUE: tuple[Strategy, ...] = (
+    Strategy('cold start', cold_start, quick=True),
+    Strategy('rigid motion first', lift_rigid_motion, quick=True),
+    Strategy('homotopy in the weights', raise_weights, quick=True),
+    Strategy('coarse mesh first', coarse_mesh, quick=True),
+    Strategy('continuation in payload', continue_in_payload, shows_infeasibility=True),
+    Strategy('continuation in duration', continue_in_duration, shows_infeasibility=True),
+    Strategy('homotopy in vibration weights', lower_vibration_price),
+    Strategy('homotopy in stiffness', soften_links),
+    Strategy('direct collocation', direct_collocation),
+)
+QUICK = tuple(strategy for strategy in CATALOGUE if strategy.quick)

@@ -1,0 +1,134 @@
+"""
+Homotopies to a motion: in the weights, in a price on vibration, in the stiffness of the links.
+
+Each function is the `attempt` of a `Strategy`, see `catalogue`.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from flex_planner.collocation import (
+    CollocationResult,
+    CollocationSolution,
+    follow_homotopy,
+    Solver,
+)
+from flex_planner.optimal_control.motion_problem import MotionProblem
+from flex_planner.planning.strategies.strategy import Attempt
+import numpy as np
+
+# the smallest weight that a homotopy starts with, and what one in stiffness starts with
+_FIRST_WEIGHT, _STIFFER = 1.0, 10.0
+# first price of the kinetic energy of bending [1/s], and how far it falls before it is dropped
+_CALM, _DECADES = 1.0, 5.0
+# of the first mesh of a homotopy
+_FIRST_INTERVALS = 60
+
+
+def raise_weights(problem: MotionProblem, solver: Solver) -> Attempt | None:
+    """Start without position and velocity weights and raise them tenfold at a time."""
+    if not has_weights(problem):
+        return None
+    at, first_step = _weighted(problem)
+    return _follow_from_line(at, solver, first_step)
+
+
+def raise_weights_from(problem: MotionProblem, solution: CollocationSolution,
+                       solver: Solver) -> CollocationResult:
+    """Start from the motion of the same task without position and velocity weights."""
+    if not has_weights(problem):
+        return solver.solve(problem, solution)
+    at, first_step = _weighted(problem)
+    return follow_homotopy(at, solution, solver, first_step)
+
+
+def has_weights(problem: MotionProblem) -> bool:
+    """Return whether anything but effort counts."""
+    parameters = problem.parameters
+    return bool(parameters.position_weights.any() or parameters.velocity_weights.any())
+
+
+def drop_weights(problem: MotionProblem) -> MotionProblem:
+    """Return the problem with nothing but effort to count."""
+    return _weighted(problem)[0](0.0)
+
+
+def _weighted(problem: MotionProblem) -> tuple[Callable[[float], MotionProblem], float]:
+    """Return the problem with its weights raised by a share, and the first share."""
+    parameters = problem.parameters
+    weights = np.concatenate([parameters.position_weights, parameters.velocity_weights])
+    decades = np.log10(max(float(weights.max()) / _FIRST_WEIGHT, 1.0))
+
+    def at(share: float) -> MotionProblem:
+        scale = 10.0 ** (decades * (share - 1)) if share else 0.0
+        return _with(problem, position_weights=scale * parameters.position_weights,
+                     velocity_weights=scale * parameters.velocity_weights)
+
+    return at, 1 / (1 + decades)
+
+
+def lower_vibration_price(problem: MotionProblem, solver: Solver) -> Attempt | None:
+    """
+    Start with a price on the bending rates, which keeps the links from ringing, and lower it.
+
+    Links that bend at their ends are driven by the hub torques so directly that a motion of
+    least effort lets them ring. Many motions that ring are stationary, or nearly so; the one
+    without is alone.
+
+    """
+    if not problem.model.arm.n_modes:
+        return None
+    return _follow_from_line(_calmed(problem), solver, first_step=1 / _DECADES)
+
+
+def soften_links(problem: MotionProblem, solver: Solver) -> Attempt | None:
+    """Start with stiffer links and a price on the bending rates; soften, then lower the price."""
+    if not problem.model.arm.n_modes:
+        return None
+    calmed = _calmed(problem)(0.0)
+
+    def softened(share: float) -> MotionProblem:
+        stiffer = _STIFFER ** (1 - share)
+        return _with(calmed, rigidity=stiffer * problem.parameters.rigidity)
+
+    soft = _follow_from_line(softened, solver.loose(), first_step=0.25)
+    if not soft.result.converged:
+        return soft
+    return Attempt(result=follow_homotopy(_calmed(problem), soft.result.solution, solver,
+                                          first_step=1 / _DECADES))
+
+
+def _calmed(problem: MotionProblem) -> Callable[[float], MotionProblem]:
+    """Return the problem with a price on the kinetic energy of bending, falling to none."""
+    n = problem.model.arm.n_joints
+    mass = np.diag(problem.model.mass_and_energy(
+        problem.start[None], problem.parameters.physical)[0][0])
+    added = np.concatenate([np.zeros(n), mass[n:]])
+
+    def at(share: float) -> MotionProblem:
+        price = _CALM * 10.0 ** (-_DECADES * share) if share < 1 else 0.0
+        weights = problem.parameters.velocity_weights + price * added
+        return _with(problem, velocity_weights=weights)
+
+    return at
+
+
+def _with(problem: MotionProblem, **changes: Any) -> MotionProblem:
+    """Return a problem with other parameters."""
+    return MotionProblem(problem.model, problem.task, replace(problem.parameters, **changes))
+
+
+def _follow_from_line(problem_at: Callable[[float], MotionProblem], solver: Solver,
+                      first_step: float) -> Attempt:
+    """Solve the first problem from a straight line and walk from there."""
+    first = problem_at(0.0)
+    guess = first.straight_line(min(_FIRST_INTERVALS, solver.settings.max_intervals),
+                                solver.settings.rule)
+    result = solver.loose().solve(first, guess)
+    if result.converged:
+        result = follow_homotopy(problem_at, result.solution, solver, first_step)
+    return Attempt(result=result)
