@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 import math
+from typing import TYPE_CHECKING
 
 from flex_planner.arms.beam_eigenmodes import TipLoad
 from flex_planner.arms.mode_shapes import FAMILIES, LinkModes, mode_shapes
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.validation import Array, integer, number, vector
 import numpy as np
+from numpy.typing import ArrayLike
 
 MAX_LINKS = 8
 MAX_MODES = 8
@@ -213,6 +215,13 @@ class Arm:
     nodes: tuple[Node, ...] = ()
     gravity: Array = field(default_factory=lambda: np.zeros(2))
     source: str = ''
+
+    if TYPE_CHECKING:
+        # gravity is made an array of anything like one; type checkers would insist on arrays
+        def __init__(self, *, name: str, links: tuple[Link, ...], joints: tuple[Joint, ...],
+                     nodes: tuple[Node, ...] = ..., gravity: ArrayLike = ...,
+                     source: str = ...) -> None:
+            """Accept a list where an array is kept."""
 
     def __post_init__(self) -> None:
         n = integer('number of links', len(self.links), at_least=1, at_most=MAX_LINKS)

@@ -18,7 +18,6 @@ from flex_planner.base.errors import (
 from flex_planner.base.validation import Array
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import least_squares
 
 # relative to reach^2: nearer to a stretched or folded arm a small step needs huge joint motion
 _SINGULAR = 1e-3
@@ -153,6 +152,8 @@ def _bent(arm: Arm, point: Array, elbow: int) -> Array:
 def _nearest(arm: Arm, point: Array, near: Array) -> Array:
     """Return the posture closest to a given one among those that reach a point."""
     rigid, (lower, upper) = arm.rigid(), arm.angle_limits()
+    from scipy.optimize import least_squares  # a tenth of a second, and not every task needs it
+
     for start in _starts(near, lower, upper):
         positions = start
         for weight in _WEIGHTS:

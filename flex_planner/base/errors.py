@@ -76,3 +76,7 @@ class NoEquilibriumError(InvalidTaskError):
 
 class RecordingError(FlexPlannerError):
     """A recording cannot be written or read."""
+
+
+class ValueFileError(FlexPlannerError):
+    """A file of saved values is damaged, or holds something else."""

@@ -87,9 +87,10 @@ def find_max_payload(task: Task, *, model: ArmModel | None = None, solver: Solve
     step = max(_STEP, accuracy) if step is None else step
     number('step', step, at_least=accuracy, at_most=MAX_PAYLOAD, unit='kg')
     _check(task)
+    model = model or ArmModel.of(task.arm)  # before a clock starts
     solver = (solver or Solver()).watched_by(monitor)
     began = solver.monitor.iteration, solver.monitor.elapsed
-    problem = MotionProblem(model or ArmModel.of(task.arm), task, task_parameters(task))
+    problem = MotionProblem(model, task, task_parameters(task))
     search = LimitSearch(PAYLOAD, problem, solver, accuracy)
     try:
         if method is PayloadMethod.DIRECT:

@@ -69,10 +69,11 @@ def find_min_duration(task: Task, *, model: ArmModel | None = None,
                                'shortest')
     if not task.ends_at_rest:
         raise InvalidTaskError('the shortest duration is that of a motion which ends at rest')
+    model = model or ArmModel.of(task.arm)  # before a clock starts
     solver = (solver or Solver()).watched_by(monitor)
     began = solver.monitor.iteration, solver.monitor.elapsed
     fixed = replace(task, time_weight=0.0)
-    problem = MotionProblem(model or ArmModel.of(task.arm), fixed, task_parameters(fixed))
+    problem = MotionProblem(model, fixed, task_parameters(fixed))
     neighbours = start_from if isinstance(start_from, Neighbours) else Neighbours(
         near=start_from)
     try:

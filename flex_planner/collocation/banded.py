@@ -10,16 +10,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import ctypes
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cython_lapack
 
 Array = NDArray[np.float64]
 
 
+@cache
 def _routine(name: str, arguments: int) -> Callable[..., None]:
     """Return a LAPACK routine that SciPy exports; all its arguments are pointers."""
+    from scipy.linalg import cython_lapack  # longer to import than all of flex_planner
+
     capsule = cython_lapack.__pyx_capi__[name]
     api = ctypes.pythonapi
     api.PyCapsule_GetName.restype = ctypes.c_char_p
@@ -28,10 +31,6 @@ def _routine(name: str, arguments: int) -> Callable[..., None]:
     api.PyCapsule_GetPointer.argtypes = [ctypes.py_object, ctypes.c_char_p]
     address = api.PyCapsule_GetPointer(capsule, api.PyCapsule_GetName(capsule))
     return ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * arguments)(address)
-
-
-_factorise = _routine('dgbtrf', 8)
-_solve = _routine('dgbtrs', 11)
 
 
 class BandedFactors:
@@ -60,8 +59,9 @@ class BandedFactors:
         self._sizes = [ctypes.c_int(k) for k in (band.shape[1], lower, upper, band.shape[0])]
         info = ctypes.c_int()
         n, kl, ku, rows = (ctypes.addressof(size) for size in self._sizes)
-        _factorise(n, n, kl, ku, band.ctypes.data, rows, self._pivots.ctypes.data,
-                   ctypes.addressof(info))
+        _routine('dgbtrf', 8)(
+            n, n, kl, ku, band.ctypes.data, rows, self._pivots.ctypes.data,
+            ctypes.addressof(info))
         self.singular = bool(info.value) or not np.isfinite(band).all()
 
     def solve(self, rhs: Array) -> Array:
@@ -72,7 +72,8 @@ class BandedFactors:
             raise ValueError(f'the right-hand side has shape {solution.shape}')
         one, info = ctypes.c_int(1), ctypes.c_int()
         transposed = ctypes.c_char(b'N')
-        _solve(ctypes.addressof(transposed), n, kl, ku, ctypes.addressof(one),
-               self._factors.ctypes.data, rows, self._pivots.ctypes.data, solution.ctypes.data,
-               n, ctypes.addressof(info))
+        _routine('dgbtrs', 11)(
+            ctypes.addressof(transposed), n, kl, ku, ctypes.addressof(one),
+            self._factors.ctypes.data, rows, self._pivots.ctypes.data, solution.ctypes.data, n,
+            ctypes.addressof(info))
         return solution

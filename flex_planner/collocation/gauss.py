@@ -8,6 +8,7 @@ any order; powers of the time would lose a digit with every stage.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
@@ -80,6 +81,19 @@ class GaussRule:
                      * weights / 2)
         matrix = _integrated(points, stages) @ transform
         return GaussRule(nodes, weights / 2, matrix, transform, _spectrum(matrix))
+
+    def __reduce__(self) -> tuple[Callable[[int], GaussRule], tuple[int]]:
+        """Pickle as the number of stages: there is one rule for each."""
+        return GaussRule.of, (self.stages,)
+
+    def reconstruction_arguments(self) -> tuple[int]:
+        """Return what `reconstruct` takes."""
+        return (self.stages,)
+
+    @staticmethod
+    def reconstruct(stages: int) -> GaussRule:
+        """Return the rule with a number of stages."""
+        return GaussRule.of(stages)
 
     @property
     def stages(self) -> int:

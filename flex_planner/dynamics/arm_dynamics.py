@@ -65,8 +65,22 @@ class ArmDynamics:
         """Wait with loading until a function is needed."""
         self.arm, self._loaded = arm, {}
 
+    def reconstruction_arguments(self) -> tuple[Arm]:
+        """Return what `reconstruct` takes."""
+        return (self.arm,)
+
+    @classmethod
+    def reconstruct(cls: type[Dynamics], arm: Arm) -> Dynamics:
+        """Return the functions of an arm, loaded or compiled when they are needed."""
+        made = cls.__new__(cls)
+        made.__setstate__(arm)
+        return made
+
     def compile(self) -> None:
-        """Load the functions from disk, or compile them."""
+        """Load the functions from disk, or compile them, and the libraries that solving takes."""
+        import scipy.integrate
+        import scipy.linalg  # noqa: F401
+
         self._load('forward_dynamics')
 
     def forward_dynamics(self, x: Array, torque: Array, physical: Array) -> Array:

@@ -7,7 +7,6 @@ from flex_planner.base.validation import Array
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.physical_parameters import PhysicalParameters
 import numpy as np
-from scipy.linalg import eigh
 
 _MAX_ITERATIONS = 50
 _STATIONS = 41
@@ -82,6 +81,8 @@ def natural_modes(dynamics: ArmDynamics, coordinates: Array, parameters: Physica
         Columns are displacements, orthonormal in the mass matrix.
 
     """
+    from scipy.linalg import eigh  # see `ArmDynamics.compile`
+
     first, p = dynamics.arm.n_joints if locked else 0, parameters.physical
     x = np.concatenate([coordinates, np.zeros_like(coordinates)])[None]
     mass = dynamics.mass_and_energy(x, p)[0][0, first:, first:]

@@ -12,7 +12,6 @@ from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.optimal_control.task import MAX_PAYLOAD, Task
 import numpy as np
-from scipy.optimize import brentq
 
 # share of its stall torque by which a motor is said to be too weak for a buckled arm
 _OVERLOADED = 1e3
@@ -105,6 +104,8 @@ def holding_limit(model: ArmModel, task: Task, parameters: Parameters) -> tuple[
     The payload is infinite where gravity does not load the joints, or motors have no limits.
 
     """
+    from scipy.optimize import brentq  # a tenth of a second, and few tasks need it
+
     def load(payload: float) -> Array:
         """Return the share of the stall torque that each motor needs."""
         try:

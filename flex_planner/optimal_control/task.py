@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any, TYPE_CHECKING
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.inverse_kinematics import check_angle_limits, inverse_kinematics
@@ -75,6 +76,47 @@ class Task:
     goal_velocity_weights: Array = field(default_factory=lambda: np.zeros(0))
     time_weight: float = 0.0
     tolerance: float = 1e-3
+
+    if TYPE_CHECKING:
+        # arrays are made of anything like one; type checkers would insist on arrays
+        def __init__(
+                self, *, arm: Arm, start_positions: ArrayLike, goal_positions: ArrayLike,
+                duration: float, payload_mass: float = ..., payload_inertia: float = ...,
+                effort_weights: ArrayLike = ..., position_weights: ArrayLike = ...,
+                velocity_weights: ArrayLike = ..., start_velocities: ArrayLike = ...,
+                goal_velocities: ArrayLike = ..., goal_position_weights: ArrayLike = ...,
+                goal_velocity_weights: ArrayLike = ..., time_weight: float = ...,
+                tolerance: float = ...) -> None:
+            """Accept lists where arrays are kept."""
+
+    @classmethod
+    def between_points(cls, arm: Arm, start: ArrayLike, goal: ArrayLike, *, duration: float,
+                       elbow: int = -1, **others: Any) -> Task:
+        """
+        Return the motion between two points of the tip, see `postures_from_points`.
+
+        Parameters
+        ----------
+        arm : Arm
+            n joints.
+        start, goal : array_like, shape (2,)
+            Tip positions of the unbent arm in the base frame [m].
+        duration : float
+            As of `Task`.
+        elbow : int
+            Branch of the inverse kinematics, +1 or -1.
+        others
+            Further fields of `Task`.
+
+        Raises
+        ------
+        UnreachableError, SingularError, InvalidValueError
+            See `inverse_kinematics`; the message says which point.
+
+        """
+        postures = postures_from_points(arm, start, goal, elbow)
+        return cls(arm=arm, start_positions=postures[0], goal_positions=postures[1],
+                   duration=duration, **others)
 
     def __post_init__(self) -> None:
         n, n_t = self.arm.n_joints, self.arm.n_coordinates

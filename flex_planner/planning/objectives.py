@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from typing import TYPE_CHECKING
 
 from flex_planner.arms.arm import Arm
 from flex_planner.base.errors import (
@@ -68,6 +69,13 @@ class Objectives:
     max_torque_shares: Array = field(default_factory=lambda: np.zeros(0))
     max_modal_rates: Array = field(default_factory=lambda: np.zeros(0))
     weight_tolerance: float = 0.01
+
+    if TYPE_CHECKING:
+        # arrays are made of anything like one; type checkers would insist on arrays
+        def __init__(self, *, max_joint_speeds: ArrayLike = ...,
+                     max_torque_shares: ArrayLike = ...,
+                     max_modal_rates: ArrayLike = ..., weight_tolerance: float = ...) -> None:
+            """Accept lists where arrays are kept."""
 
     def __post_init__(self) -> None:
         for name in ('max_joint_speeds', 'max_torque_shares', 'max_modal_rates'):

@@ -4,18 +4,33 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import Enum
+import os
 
-from flex_planner.arms.arm import Arm
+from flex_planner.arms.arm import Arm, Joint, Link, Motor, Node
 from flex_planner.arms.kinematics import tip_position
+from flex_planner.base.errors import InvalidValueError, ValueFileError
 from flex_planner.base.validation import Array
-from flex_planner.collocation import CollocationSolution
+from flex_planner.base.value_files import load_value, save_value
+from flex_planner.collocation import CollocationSolution, GaussRule
 from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.boundary_conditions import BoundaryConditions
 from flex_planner.optimal_control.motion_problem import MotionProblem
+from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.optimal_control.task import Task
 from flex_planner.optimal_control.torque_limits import TorqueLimits
 from flex_planner.planning.certificate import Certificate
-from flex_planner.planning.objectives import ObjectiveSearch
+from flex_planner.planning.objectives import (
+    Margin,
+    Objective,
+    Objectives,
+    ObjectiveSearch,
+    WeightTrial,
+)
 import numpy as np
+from numpy.typing import ArrayLike
+
+# share of its duration by which a time may be past an end of the motion
+_ROUNDING = 1e-12
 
 
 class PlanStatus(Enum):
@@ -67,7 +82,7 @@ class Samples:
     tip: Array
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class Plan:
     """
     The outcome of planning one task, whether it succeeded or not.
@@ -143,18 +158,58 @@ class Plan:
         """Return the intervals of the final mesh, 0 without a solution."""
         return self.solution.intervals if self.solution else 0
 
-    def sample(self, times: Array) -> Samples:
+    def __repr__(self) -> str:
+        """Return one line: status, arm, motion and cost."""
+        task = self.task
+        cost = f', J = {self.cost:.6g}' if self.solution is not None else ''
+        return (f'<Plan {self.status.name}: {task.arm.name}, {task.duration:g} s, '
+                f'{task.payload_mass:g} kg{cost}>')
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """
+        Write the plan to one file, whole or not at all.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be written.
+
+        """
+        save_value(path, self)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Plan:
+        """
+        Return a saved plan; the compiled functions of its arm are loaded when they are needed.
+
+        Raises
+        ------
+        ValueFileError
+            If the file is damaged, or holds no plan.
+        OSError
+            If it cannot be read.
+
+        """
+        found = load_value(path, _SAVED)
+        if not isinstance(found, Plan):
+            raise ValueFileError(f'{path} holds a {type(found).__name__}, but must hold a Plan')
+        return found
+
+    def sample(self, times: ArrayLike) -> Samples:
         """
         Return the motion at times (k,) from 0 to the task's duration.
 
         Raises
         ------
+        InvalidValueError
+            If a time is not a number within the motion.
         ValueError
             If the plan has no solution.
 
         """
         if self.solution is None:
             raise ValueError(f'the plan has no solution: {self.message}')
+        times = self._within(times)
         arm, z = self.arm, self.solution(times)
         n_t = arm.n_coordinates
         control = self.model.controls(z, self.problem.p)
@@ -166,9 +221,25 @@ class Plan:
             velocity_costates=z[:, 3 * n_t:], hamiltonian=control.hamiltonian,
             tip=tip_position(arm, z[:, :n_t]))
 
+    def _within(self, times: ArrayLike) -> Array:
+        """Return times (k,) after a check that the motion lasts so long."""
+        end = self.task.duration
+        given = np.atleast_1d(np.asarray(times, dtype=float))
+        outside = np.flatnonzero(~(np.abs(given - end / 2) <= end * (0.5 + _ROUNDING)))
+        if outside.size:
+            k = int(outside[0])
+            raise InvalidValueError(f'times[{k}]', float(given[k]), f'from 0 to {end:g} s')
+        return np.clip(given, 0.0, end)
+
     def uniform_samples(self, count: int) -> Samples:
         """Return the motion at evenly spaced times, both ends included."""
         return self.sample(np.linspace(0, self.task.duration, count, dtype=np.float64))
+
+
+# what a file of a plan may hold
+_SAVED = (Plan, PlanStatus, Certificate, Task, Arm, Link, Joint, Motor, Node, ArmModel,
+          MotionProblem, BoundaryConditions, Parameters, CollocationSolution, GaussRule,
+          ObjectiveSearch, Objectives, Objective, WeightTrial, Margin)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

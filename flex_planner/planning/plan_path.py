@@ -66,8 +66,9 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
     """
     if not strategies:
         raise ValueError('strategies must name at least one way to a solution')
+    model = model or ArmModel.of(task.arm)  # before a clock starts
     solver = (solver or Solver()).watched_by(monitor)
-    problem = MotionProblem(model or ArmModel.of(task.arm), task, task_parameters(task))
+    problem = MotionProblem(model, task, task_parameters(task))
     start = start_from.solution if isinstance(start_from, Plan) else start_from
     if start is not None:
         strategies = (warm_start(start), *strategies)
