@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
+LongArray = NDArray[np.longdouble]
+ComplexLongArray = NDArray[np.clongdouble]
 
 FEWEST_STAGES, MOST_STAGES = 2, 12
 
@@ -80,7 +82,7 @@ class GaussRule:
         transform = ((2 * degrees + 1)[:, None] * legendre.legvander(points, stages - 1).T
                      * weights / 2)
         matrix = _integrated(points, stages) @ transform
-        return GaussRule(nodes, weights / 2, matrix, transform, _spectrum(matrix))
+        return GaussRule(nodes, weights / 2, matrix, transform, _spectrum(points, weights))
 
     def __reduce__(self) -> tuple[Callable[[int], GaussRule], tuple[int]]:
         """Pickle as the number of stages: there is one rule for each."""
@@ -121,11 +123,52 @@ def _integrated(x: Array, count: int) -> Array:
     return integrals
 
 
-def _spectrum(matrix: Array) -> Spectrum:
-    """Return the eigenvectors that a real system needs."""
-    eigenvalues, vectors = np.linalg.eig(matrix)
-    inverse = np.linalg.inv(vectors)
+def _spectrum(points: Array, weights: Array) -> Spectrum:
+    """
+    Return the eigenvectors that a real system needs.
+
+    In normalised Legendre polynomials the Butcher matrix is tridiagonal, X = 1/2 in the corner
+    and +-1 / (2 sqrt(4 k^2 - 1)) beside the diagonal (Hairer and Wanner, Solving ODEs II, IV.5).
+    X with the signs of every other row and column changed is X transposed: so a row of V^-1 is
+    its column of V with these signs, divided by their product, and nothing is inverted.
+
+    """
+    count = points.size
+    beside = 1 / (2 * np.sqrt(4 * np.arange(1, count, dtype=np.longdouble)**2 - 1))
+    X = (np.diag(beside, -1) - np.diag(beside, 1)).astype(np.longdouble)
+    X[0, 0] = 0.5
+    eigenvalues, vectors = _refined(X)
+    signed = vectors * (-1.0)**np.arange(count)[:, None]
+    rows = (signed / (signed * vectors).sum(axis=0)).T
+    vectors = vectors * np.where(eigenvalues.imag > 0, 2, 1)
+    rows = rows @ (2 * np.eye(count) - (vectors @ rows).real)  # an error of 1e-8 is squared
+    polynomials = legendre.legvander(points, count - 1) * np.sqrt(2 * np.arange(count) + 1)
+    return Spectrum(*(part.astype(np.complex128) for part in (
+        eigenvalues, polynomials @ vectors, rows @ (polynomials.T * weights / 2))))
+
+
+def _refined(X: LongArray) -> tuple[ComplexLongArray, ComplexLongArray]:
+    """
+    Return eigenvalues, one of each pair, and eigenvectors whose first component is 1.
+
+    The eigenvectors lie so close to one another that what LAPACK makes of them loses a digit with
+    every stage: Newton's method with residuals in long double wins these back.
+
+    """
+    eigenvalues, vectors = np.linalg.eig(X.astype(np.float64))
     kept = eigenvalues.imag > -1e-9 * np.abs(eigenvalues)
-    doubled = np.where(eigenvalues[kept].imag > 1e-9 * np.abs(eigenvalues[kept]), 2, 1)
-    return Spectrum(*(part.astype(complex) for part in (
-        eigenvalues[kept], vectors[:, kept] * doubled, inverse[kept])))
+    values, chosen = eigenvalues[kept], vectors[:, kept]
+    real = np.abs(values.imag) < 1e-9 * np.abs(values)
+    values = np.where(real, values.real, values).astype(np.clongdouble)
+    chosen = np.where(real, chosen.real, chosen).astype(np.clongdouble)
+    chosen /= chosen[0]
+    diagonal = np.arange(X.shape[0])
+    for _ in range(3):  # quadratic from eight digits; the last for rounding
+        system = np.repeat(X[None].astype(np.complex128), values.size, axis=0)
+        system[:, diagonal, diagonal] -= values[:, None]
+        system[..., 0] = -chosen.T  # of the eigenvalue, as the first component stays
+        residual = (X @ chosen - chosen * values).T[..., None].astype(np.complex128)
+        change = np.linalg.solve(system, -residual)[..., 0].T
+        values = values + change[0]
+        chosen[1:] += change[1:]
+    return values, chosen

@@ -24,6 +24,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
+_SINGULAR_STAGES = 'the stage equations of an interval are singular'
+
 
 class SingularSystemError(ArithmeticError):
     """The linearised problem has no unique solution."""
@@ -182,10 +184,12 @@ class _StageSystem:
         diagonal = np.arange(inner.size)
         system[..., diagonal, diagonal] += 1
         try:
-            inverse = np.linalg.inv(system)
+            inverse = np.linalg.inv(system).astype(np.complex128, copy=False)
         except np.linalg.LinAlgError:
-            raise SingularSystemError('the stage equations of an interval are singular') from None
-        return inverse.astype(np.complex128, copy=False)
+            raise SingularSystemError(_SINGULAR_STAGES) from None
+        if _is_singular(system, inverse):
+            raise SingularSystemError(_SINGULAR_STAGES)
+        return inverse
 
     def transition(self) -> Array:
         """Return d z_1 / d z_0 of every interval, shape (N, m, m)."""
@@ -267,3 +271,24 @@ def _row_sizes(rows: Array) -> Array:
     if not np.isfinite(sizes).all() or (sizes == 0).any():
         raise SingularSystemError('a boundary row is zero or not finite')
     return sizes
+
+
+def _is_singular(system: ComplexArray, inverse: ComplexArray) -> bool:
+    """
+    Tell whether rounding may have made a system ``I - T`` of one that has no inverse.
+
+    If all terms of ``I - T`` change by 1 / sum_ij |inverse_ij| (|I| + |T|)_ji of themselves, it
+    may be singular, in whatever units the unknowns are.
+
+    """
+    size, limit = system.shape[-1], 0.1 / np.finfo(np.float64).eps
+    if 2 * size**2 * _largest_part(inverse) * (_largest_part(system) + 2) < limit:
+        return False  # as nearly always, without all the magnitudes
+    terms = np.abs(system - np.eye(size)) + np.eye(size)
+    sensitivity = np.einsum('...ij,...ji', np.abs(inverse), terms)
+    return not (sensitivity < limit).all()
+
+
+def _largest_part(values: ComplexArray) -> float:
+    """Return the largest magnitude of a real or imaginary part."""
+    return max(float(np.abs(part).max(initial=0)) for part in (values.real, values.imag))

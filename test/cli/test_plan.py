@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import io
 import os
 from pathlib import Path
-import pty
 import re
 import signal
 import subprocess
@@ -16,10 +15,8 @@ import sys
 from typing import Any
 
 from flex_planner.arms.arm import Arm
-from flex_planner.base.progress import Progress
 from flex_planner.cli import main
 from flex_planner.cli.options import with_joined_lists
-from flex_planner.cli.progress_line import Display
 from flex_planner.optimal_control.task import postures_from_points, Task
 from flex_planner.planning.plan_path import plan_path
 from flex_planner.recording import definition_folder, MessageTypes, read_recording
@@ -296,7 +293,7 @@ def test_lists_may_begin_with_a_minus_sign() -> None:
 
 
 def start_long_search(folder: Path) -> subprocess.Popen[str]:
-    """SearchStart a search that takes many seconds, and wait until it is under way."""
+    """Start a search that takes many seconds, and wait until it is under way."""
     process = subprocess.Popen(
         [sys.executable, '-m', 'flex_planner.cli', 'payload', 'korayem_ei50', *MOTION,
          '--method', 'incremental', '--accuracy', '1e-6', '--output', str(folder / 'new')],
@@ -338,28 +335,6 @@ def test_plan_is_drawn_also_without_ros(tmp_path: Path) -> None:
     (picture,) = tmp_path.iterdir()
     assert picture.name == 'korayem_rigid_motion.png'
     assert is_picture(str(picture))
-
-
-def test_terminal_shows_one_line_that_is_removed_in_the_end(
-        monkeypatch: pytest.MonkeyPatch) -> None:
-    leader, follower = pty.openpty()
-    shown = ''
-    with open(follower, 'w') as stream:
-        display = Display(stream)
-        monkeypatch.setattr(Display, 'elapsed', 1.0)
-        display.begin('some phase')
-        monkeypatch.setattr(Display, 'elapsed', 1.2)
-        for iteration in (7, 8):  # the second comes too soon to be shown
-            display.report(Progress(phase='some phase', iteration=iteration, residual=0.5,
-                                    intervals=20, payload=2.5))
-        display.close()
-        while shown.count('\r\x1b[K') < 3:
-            shown += os.read(leader, 4096).decode()
-    os.close(leader)
-    assert '\n' not in shown
-    assert [state.strip() for state in shown.split('\r\x1b[K')] == [
-        '', '1.0 s  some phase',
-        '1.2 s  some phase, payload 2.5 kg: iteration 7, correction 5.0e-01, 20 inter', '']
 
 
 # Objectives

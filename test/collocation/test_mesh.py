@@ -1,20 +1,9 @@
-"""Where the mesh needs its nodes: defects, error estimates, and meshes that level them."""
+"""Meshes: defects measured, levelled, refined and coarsened."""
 
 from __future__ import annotations
 
-from bvp_problems import (
-    bratu,
-    Case,
-    CASES,
-    mc_03,
-    mc_14,
-    mc_20,
-    outcome_on,
-    second_order,
-    solved_on,
-)
+from bvp_problems import bratu, mc_14, second_order, solved_on, STEEP
 from flex_planner.collocation import CollocationSolution, solve, SolverSettings
-from flex_planner.collocation.estimate import Estimate, estimated
 from flex_planner.collocation.mesh import coarsened, defects, levelled
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +11,6 @@ import pytest
 
 Array = NDArray[np.float64]
 NOWHERE = np.zeros(0)
-STEEP = Case(problem=second_order(lambda t, y, v: 64 * y, 0, 1),
-             exact=lambda t: np.sinh(8 * t) / np.sinh(8))
 
 
 # Defects
@@ -58,47 +45,6 @@ def test_defect_is_infinite_where_the_right_hand_side_is_undefined(bad: float) -
     found = defects(problem, solved_on(STEEP, 4, 3))
     assert np.isinf(found[0])
     assert np.isfinite(found[1:]).all()
-
-
-# Estimated errors
-
-
-def estimate_of(case: Case, intervals: int, stages: int) -> tuple[Estimate, float]:
-    """Return the estimate on a uniform mesh, and the error that it estimates."""
-    outcome = outcome_on(case, intervals, stages)
-    assert outcome.system is not None
-    estimate = estimated(case.problem, outcome.solution, outcome.system)
-    return estimate, case.error(outcome.solution)
-
-
-@pytest.mark.parametrize(('case', 'stages'), [
-    (STEEP, 2), (STEEP, 3), (STEEP, 4),
-    *((case, stages) for stages in (2, 3, 4) for case in (bratu(upper=True), mc_20(0.1))),
-    (mc_03(0.1), 3)])
-def test_estimate_is_the_error_and_its_result_is_better(case: Case, stages: int) -> None:
-    estimate, error = estimate_of(case, 20, stages)
-    assert estimate.errors[0] == pytest.approx(error, rel=0.05)
-    assert estimate.improved.rule.stages == stages + 1
-    assert case.error(estimate.improved) <= error / 20
-
-
-@pytest.mark.parametrize(('case', 'stages'), [
-    (case, stages) for stages in (2, 3, 4)
-    for case in (bratu(upper=True), mc_20(0.1), mc_03(0.1), STEEP)])
-def test_estimate_has_the_size_of_the_error(case: Case, stages: int) -> None:
-    estimate, error = estimate_of(case, 16, stages)
-    assert 0.2 * error <= estimate.errors[0] <= 1.6 * error
-    assert case.error(estimate.improved) <= 1.5 * error
-
-
-@pytest.mark.parametrize('name', ['long interval', 'MC 14, thin layers', 'MC 6, shock'])
-def test_solution_is_continuous_after_its_improvement(name: str) -> None:
-    for tolerance in (1e-4, 1e-6, 1e-8):
-        settings = SolverSettings(error_tolerance=tolerance)
-        solution = solve(CASES[name].problem, CASES[name].start(settings), settings).solution
-        ends = solution.values_at(np.ones(1))[:, 0]
-        np.testing.assert_allclose(ends, solution.nodes[1:], rtol=0,
-                                   atol=1e-12 * np.abs(solution.nodes).max())
 
 
 # Meshes

@@ -343,3 +343,7 @@ def outcome_on(case: Case, intervals: int | Array, stages: int) -> NewtonOutcome
 
 def solved_on(case: Case, intervals: int | Array, stages: int) -> CollocationSolution:
     return outcome_on(case, intervals, stages).solution
+
+
+STEEP = Case(problem=second_order(lambda t, y, v: 64 * y, 0, 1),
+             exact=lambda t: np.sinh(8 * t) / np.sinh(8))

@@ -19,17 +19,14 @@ from flex_planner.collocation import (
     SolverStatus,
 )
 from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.integrate_totals import integrate_totals
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import Task
-from flex_planner.optimal_control.totals import integrate_totals
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.strategies.catalogue import CATALOGUE
 from flex_planner.planning.strategies.homotopies import raise_weights
-from flex_planner.planning.strategies.initial_guesses import (
-    lift_rigid_motion,
-    warm_start,
-)
+from flex_planner.planning.strategies.initial_guesses import lift_rigid_motion, warm_start
 from flex_planner.planning.strategies.strategy import Strategy
 import numpy as np
 from plan_checks import problem_of, SAME_COST, solution_of

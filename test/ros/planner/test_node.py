@@ -252,7 +252,7 @@ JOINT_TASK = {'space': MotionTask.JOINT, 'start_positions': [0.0, 1.0],
      'start_positions[1] is 1000000000.0'),
     ({**JOINT_TASK, 'goal_positions': [math.inf, 0.0]}, PlanReport.NOT_FINITE,
      'goal_positions[0]'),
-], ids=str)
+], ids=lambda value: str(value)[:60])
 def test_malformed_request_is_refused_by_field(rigid: Planner, wrong: dict[str, Any], code: int,
                                                field: str) -> None:
     report = rigid.report(**wrong)

@@ -1,0 +1,120 @@
+"""The check of a recorded plan: sound ones pass, falsified ones are found out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from flex_planner.base.errors import RecordingError
+from flex_planner.base.progress import Monitor, StoppedError
+from flex_planner.cli import main
+from flex_planner.dynamics.integration import integrate, LinearTorque, simulate
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.recording import (
+    definition_folder,
+    MessageTypes,
+    read_attachments,
+    read_recording,
+    Recording,
+)
+from flex_planner.reports.recording import check_motion, RecordedRequest
+import numpy as np
+import pytest
+
+
+def failed_findings(request: RecordedRequest, model: ArmModel) -> set[str]:
+    return {finding.name for finding in check_motion(request, model).findings
+            if not finding.passed}
+
+
+def with_motion(request: RecordedRequest, **changes: Any) -> RecordedRequest:
+    assert request.motion is not None
+    return replace(request, motion=replace(request.motion, **changes))
+
+
+@pytest.mark.parametrize(('name', 'model'), [('plan', 'ei50_model'), ('trials', 'rigid_model')])
+def test_recorded_plans_pass_their_check(name: str, model: str,
+                                         request: pytest.FixtureRequest) -> None:
+    recording = RecordedRequest.read(request.getfixturevalue(name))
+    check = check_motion(recording, request.getfixturevalue(model))
+    assert check.passed
+    found = {finding.name: finding for finding in check.findings}
+    # of linear interpolation between samples, whose torques differ by up to 0.02 N m
+    assert found['tip error at the end'].value < 1e-4
+    assert found['torques against eq. (14)'].value < 1e-9
+    assert found['boundary error (eq. 17)'].recorded == recording.report.boundary_error
+
+
+@pytest.mark.parametrize(('change', 'expected'), [
+    (lambda motion: {'torques': 1.02 * motion.torques},
+     {'tip error at the end', 'tip off its path', 'torques against eq. (14)'}),
+    (lambda motion: {'torques': 3 * motion.torques},
+     {'tip error at the end', 'tip off its path', 'torques against eq. (14)',
+      'boundary error (eq. 17)', 'torque beyond its bounds'}),
+    (lambda motion: {'payload_mass': 1.0},
+     {'tip error at the end', 'tip off its path', 'torques against eq. (14)'}),
+    (lambda motion: {'tip': motion.tip + 0.01}, {'tip error at the end', 'tip off its path'}),
+    (lambda motion: {'rates': 1.02 * motion.rates}, {'joints off their path'}),
+    (lambda motion: {'velocity_costates': 0.9 * motion.velocity_costates},
+     {'torques against eq. (14)', 'Hamiltonian drift'}),
+    (lambda motion: {'torques': np.full_like(motion.torques, 1e200)}, {
+        'tip error at the end', 'tip off its path', 'torques against eq. (14)',
+        'boundary error (eq. 17)', 'torque beyond its bounds'}),
+    (lambda motion: {'rates': motion.rates + 1e-3}, {
+        'start from rest', 'goal from rest'})])
+def test_every_falsified_plan_is_found_out(request_of_plan: RecordedRequest, ei50_model: ArmModel,
+                                           change: Callable[[Any], dict[str, Any]],
+                                           expected: set[str]) -> None:
+    changed = with_motion(request_of_plan, **change(request_of_plan.motion))
+    assert failed_findings(changed, ei50_model) >= expected
+
+
+def test_plan_of_another_task_is_found_out(request_of_plan: RecordedRequest,
+                                           ei50_model: ArmModel) -> None:
+    original = request_of_plan.task.goal_point
+    request_of_plan.task.goal_point = type(original)(0.5, 0.4, 0.0)
+    try:
+        assert failed_findings(request_of_plan, ei50_model) == {'goal from what was asked'}
+    finally:
+        request_of_plan.task.goal_point = original
+
+
+def test_resimulation_agrees_with_an_integrator_of_another_kind(
+        ei50_model: ArmModel, request_of_plan: RecordedRequest) -> None:
+    motion, p = request_of_plan.motion, request_of_plan.parameters.physical
+    assert motion is not None
+    times = np.linspace(0, 0.1, 5)
+    torques = np.array([np.interp(times, motion.times, column) for column in motion.torques.T]).T
+    start = np.concatenate([motion.coordinates[0], motion.rates[0]])
+    ours = integrate(ei50_model, p, start, LinearTorque(times, torques), rtol=1e-10, atol=1e-12)
+    state = start
+    for k, length in enumerate(np.diff(times)):
+        slope = (torques[k + 1] - torques[k]) / length
+        state = simulate(ei50_model, p, state, lambda t, u=torques[k], slope=slope: u + t * slope,
+                         length, rtol=1e-10, atol=1e-12)
+    assert np.abs(ours[-1] - state).max() < 1e-9
+
+
+def test_check_obeys_its_monitor_and_needs_a_motion(request_of_plan: RecordedRequest,
+                                                    ei50_model: ArmModel, failure: Path) -> None:
+    with pytest.raises(StoppedError):
+        check_motion(request_of_plan, ei50_model, Monitor(canceled=lambda: True))
+    with pytest.raises(RecordingError, match='has no motion that could be checked: impossible'):
+        check_motion(RecordedRequest.read(failure))
+
+
+def test_falsified_recording_fails_on_the_command_line(plan: Path, tmp_path: Path,
+                                                       capsys: pytest.CaptureFixture[str]) -> None:
+    types = MessageTypes.load([definition_folder('flex_planner_interfaces')])
+    with Recording.create(tmp_path, 'forged', types) as recording:
+        recording.attach('scenario.yaml', read_attachments(plan)['scenario.yaml'], media_type='')
+        for entry in read_recording(plan, types):
+            for point in getattr(getattr(entry.message, 'joint_trajectory', None), 'points', ()):
+                point.effort = 1.1 * point.effort
+            recording.write(entry.topic, entry.message, entry.log_time_ns)
+    page = tmp_path / 'forged.html'
+    assert main(['report', str(recording.path), '--check', '--output', str(page)]) == 1
+    assert 'the check of the recording FAILED (tip error at the end' in capsys.readouterr().out
+    assert 'class="verdict failed"' in page.read_text()

@@ -1,0 +1,218 @@
+"""The page of a recording: what it says, what its plots hold, and that a browser agrees."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+import re
+import shutil
+import subprocess
+from typing import Any
+
+from flex_planner.base.errors import RecordingError
+from flex_planner.cli import main
+from flex_planner.reports.recording import RecordedRequest, report_page, write_report
+import numpy as np
+import pytest
+from report_support import Page, recorded
+
+BROWSER = next(filter(None, map(shutil.which, (
+    'chromium', 'chromium-browser', 'google-chrome', 'google-chrome-stable'))), None)
+in_browser = pytest.mark.skipif(BROWSER is None, reason='no Chromium is installed')
+
+
+@pytest.fixture(scope='module')
+def search(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return recorded(tmp_path_factory.mktemp('search'), 'payload', 'korayem_rigid', '--accuracy',
+                    '0.1')
+
+
+# On the command line
+
+
+def test_report_on_the_command_line(plan: Path, failure: Path, tmp_path: Path,
+                                    monkeypatch: pytest.MonkeyPatch,
+                                    capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(['report', str(plan), '--check']) == 0
+    assert 'the check of the recording passed' in capsys.readouterr().out
+    assert main(['report', str(next(failure.glob('*.mcap')))]) == 0
+    assert 'Failed, error 304' in capsys.readouterr().out
+    assert {path.name for path in tmp_path.iterdir()} == {
+        f'{plan.name}.html', f'{failure.name}_0.html'}
+    for arguments, complaint in ((['/nowhere'], 'cannot read /nowhere'),
+                                 ([__file__], 'is damaged or no MCAP file'),
+                                 ([str(plan), '--output', '/nowhere/x.html'], 'cannot write'),
+                                 ([str(failure), '--check'], 'no motion to check: impossible')):
+        assert main(['report', *arguments]) == 1
+        assert complaint in capsys.readouterr().err
+
+
+# The page
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A plot in the data of a page."""
+
+    xs: list[np.ndarray[Any, Any]]
+    ys: list[np.ndarray[Any, Any]]
+    names: list[str]
+
+
+def drawn(page: Page) -> dict[str, Drawn]:
+    data = page.data
+    return {plot['key']: Drawn(
+        [np.array(data['axes'][line['x']], dtype=float) for line in plot['series']],
+        [np.array(line['y'], dtype=float) for line in plot['series']],
+        [line['name'] for line in plot['series']]) for plot in data['plots']}
+
+
+def test_plots_show_the_recorded_numbers(request_of_plan: RecordedRequest) -> None:
+    motion, found = request_of_plan.motion, drawn(Page(report_page(request_of_plan)))
+    assert motion is not None
+    n = 2
+    for name, values in (('torques', motion.torques), ('positions', motion.coordinates[:, :n]),
+                         ('speeds', motion.rates[:, :n]), ('modes', motion.coordinates[:, n:]),
+                         ('modal_rates', motion.rates[:, n:]),
+                         ('position_costates', motion.position_costates),
+                         ('velocity_costates', motion.velocity_costates)):
+        plot = found[name]
+        # written with nine digits
+        np.testing.assert_allclose(np.array(plot.ys[:values.shape[1]]).T, values, rtol=1e-8)
+        np.testing.assert_allclose(plot.xs[0], motion.times, rtol=1e-8)
+    np.testing.assert_allclose(np.array([found['tip'].xs[0], found['tip'].ys[0]]).T, motion.tip,
+                               rtol=1e-8)
+    assert found['torques'].names[2:] == [
+        f'{joint} {end}' for end in ('lowest', 'highest') for joint in ('joint1', 'joint2')]
+
+
+def test_plots_of_searches_show_front_and_trials(search: Path, trials: Path) -> None:
+    message = RecordedRequest.read(search).search
+    front = drawn(Page(report_page(RecordedRequest.read(search))))['front']
+    np.testing.assert_allclose(front.xs[0], message.front_payloads, rtol=1e-8)
+    np.testing.assert_allclose(front.ys[0], message.front_efforts, rtol=1e-8)
+    message = RecordedRequest.read(trials).search
+    tried = drawn(Page(report_page(RecordedRequest.read(trials))))['trials']
+    np.testing.assert_allclose(tried.ys[0], message.tried_payloads, rtol=1e-8)
+    assert tried.names == ['tried', 'carried', 'not carried']
+
+
+def test_page_loads_nothing_and_names_nothing_by_its_content(plan: Path, failure: Path) -> None:
+    for path in (plan, failure):
+        request = RecordedRequest.read(path)
+        request.report.error_msg = '</script><script>alert(1)</script> <b>&'
+        text = report_page(request)
+        page = Page(text)
+        assert [tag for tag, _ in page.tags].count('script') == 2
+        assert not [name for _, attributes in page.tags for name in attributes
+                    if name in ('src', 'href')]
+        assert not re.search(r'https?:|import\(|@import|url\(', text)
+
+
+def test_page_of_a_failure_tells_the_error(failure: Path) -> None:
+    page = Page(report_page(RecordedRequest.read(failure)))
+    assert page.data['plots'] == []
+    rows = {row[0]: row[1] for table in page.data['tables'] for row in table['rows']}
+    assert rows['error code'] == '304'
+    assert rows['error'].startswith('impossible within the limits of the motors')
+    assert rows['payload'] == '100 kg, 0 kg m²'
+
+
+def test_report_replaces_an_older_one_only_when_it_is_complete(
+        request_of_plan: RecordedRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    page = tmp_path / 'page.html'
+    page.write_text('older')
+
+    def full(self: Path, *arguments: Any, **options: Any) -> int:
+        raise OSError(28, 'No space left on device')
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, 'write_text', full)
+        with pytest.raises(RecordingError, match=r'cannot write .*/page.html: No space left'):
+            write_report(page, request_of_plan)
+    assert page.read_text() == 'older'
+    write_report(page, request_of_plan)
+    assert page.read_text().startswith('<!DOCTYPE html>')
+    assert [path.name for path in tmp_path.iterdir()] == ['page.html']
+
+
+# In a browser
+
+
+USER = """
+<script>
+const result = document.body.dataset;
+const canvas = document.querySelector('#torques canvas');
+const box = () => canvas.getBoundingClientRect();
+function mouse(kind, share) {
+  canvas.dispatchEvent(new PointerEvent(kind, {
+    clientX: box().left + share * box().width, clientY: box().top + 60, pointerId: 1 }));
+}
+canvas.setPointerCapture = () => {};
+const first = canvas.toDataURL();
+const other = document.querySelector('#speeds canvas');
+const second = other.toDataURL();
+mouse('pointermove', 0.5);
+result.readouts = [...document.querySelectorAll('#torques output')].map((o) => o.textContent);
+mouse('pointerleave', 0.5);
+mouse('pointerdown', 0.4);
+mouse('pointermove', 0.6);
+mouse('pointerup', 0.6);
+result.zoomed = first !== canvas.toDataURL() && second !== other.toDataURL();
+canvas.dispatchEvent(new MouseEvent('dblclick'));
+mouse('pointerleave', 0.5);
+result.restored = first === canvas.toDataURL() && second === other.toDataURL();
+document.querySelector('#torques button').click();
+result.hidden = first !== canvas.toDataURL();
+const marked = document.querySelector('#modes_spectrum canvas');
+const bands = marked.toDataURL();
+[...document.querySelectorAll('#modes_spectrum button')].at(-1).click();
+result.bands = bands !== marked.toDataURL();
+</script>
+</body>
+"""
+
+
+def opened(page: Path, *options: str) -> str:
+    """Return what a browser makes of a page."""
+    assert BROWSER is not None
+    result = subprocess.run(
+        [BROWSER, '--headless', '--no-sandbox', '--disable-gpu', '--disable-dev-shm-usage',
+         f'--user-data-dir={page.parent / "profile"}', '--window-size=1200,3000', *options,
+         f'file://{page}'], capture_output=True, text=True, timeout=120, check=True)
+    assert 'Uncaught' not in result.stderr
+    return result.stdout
+
+
+@in_browser
+def test_browser_draws_zooms_and_toggles(plan: Path, tmp_path: Path) -> None:
+    request = RecordedRequest.read(plan)
+    page = tmp_path / 'page.html'
+    page.write_text(report_page(request).replace('</body>', USER), encoding='utf-8')
+    for _ in range(3):  # on a busy machine the browser may not have drawn by the time it is asked
+        seen = opened(page, '--enable-logging=stderr', '--dump-dom')
+        attributes = dict(re.findall(r'data-(\w+)="([^"]*)"', seen))
+        worked = {attributes[name] for name in ('zoomed', 'restored', 'hidden', 'bands')}
+        if worked == {'true'}:
+            break
+    assert attributes['plots'] == '10'
+    assert worked == {'true'}
+    assert all(float(value) for value in attributes['readouts'].split(','))
+    assert 'Certificate when planned' in seen
+
+
+@in_browser
+def test_browser_shows_the_page_of_a_failure(failure: Path, tmp_path: Path) -> None:
+    write_report(tmp_path / 'page.html', RecordedRequest.read(failure))
+    picture = tmp_path / 'page.png'
+    opened(tmp_path / 'page.html', f'--screenshot={picture}')
+    assert picture.read_bytes().startswith(b'\x89PNG')
+
+
+def test_script_is_sound() -> None:
+    node = shutil.which('node')
+    if node is None:
+        pytest.skip('no node is installed')
+    script = Path(__file__).parents[3] / 'flex_planner' / 'reports' / 'recording' / 'plots.js'
+    subprocess.run([node, '--check', str(script)], check=True)
