@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 from flex_planner.base.validation import Array
-from flex_planner.paper.evidence import Curve, Panel
 from flex_planner.planning.plan import Samples
+from flex_planner.plotting.diagrams import Curve, Panel
 import numpy as np
 
 Cases = Mapping[str, Samples]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
-from flex_planner.base.validation import Array
+from flex_planner.plotting.diagrams import Picture
 
 
 class Verdict(Enum):
@@ -50,54 +50,6 @@ class Table:
     title: str
     header: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Curve:
-    """
-    A line of a diagram.
-
-    Attributes
-    ----------
-    x, y : numpy.ndarray, shape (k,)
-        Its points.
-    label : str
-        In the legend; empty for none.
-    color, style : str
-        As Matplotlib takes them.
-    width : float
-        Of the line [pt].
-
-    """
-
-    x: Array
-    y: Array
-    label: str = ''
-    color: str = 'C0'
-    style: str = '-'
-    width: float = 1.3
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Panel:
-    """A diagram; `equal` gives both axes the same scale, `log` the vertical one decades."""
-
-    title: str
-    x_label: str
-    y_label: str
-    curves: tuple[Curve, ...]
-    equal: bool = False
-    log: bool = False
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Picture:
-    """Diagrams in rows of `columns`, saved as NAME.png."""
-
-    name: str
-    caption: str
-    panels: tuple[Panel, ...]
-    columns: int = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -22,6 +22,7 @@ import sys
 import threading
 import time
 
+from flex_planner.base.validation import Array
 import numpy as np
 from numpy.typing import NDArray
 import rclpy
@@ -29,7 +30,6 @@ from rclpy.signals import SignalHandlerOptions
 from scipy.interpolate import CubicHermiteSpline
 from sensor_msgs.msg import JointState
 
-Array = NDArray[np.float64]
 _BLOCK = 100  # states are interpolated that many at a time
 _DEPTH = 10
 _AFTER_YOU, _LAST_RESORT = 0.3, 1.5  # [s], for the planner to leave first; to leave by force

@@ -24,18 +24,10 @@ from flex_planner.paper.cases import (
 )
 from flex_planner.paper.diagrams import joint_panels, runs_on_limit
 from flex_planner.paper.document import document
-from flex_planner.paper.evidence import (
-    Claim,
-    confirmed_if,
-    Curve,
-    Panel,
-    Picture,
-    Section,
-    Table,
-    Verdict,
-)
+from flex_planner.paper.evidence import Claim, confirmed_if, Section, Table, Verdict
 from flex_planner.paper.run import computed, STUDIES
 from flex_planner.paper.sections.slips import PrintedProblem
+from flex_planner.plotting.diagrams import Curve, Panel, Picture
 from flex_planner.plotting.panels import draw_picture
 import numpy as np
 import pytest

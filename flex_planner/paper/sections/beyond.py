@@ -16,15 +16,8 @@ from flex_planner.paper.cases import (
     point_to_point,
     STIFFNESS_LIMITS,
 )
-from flex_planner.paper.evidence import (
-    Claim,
-    confirmed_if,
-    Curve,
-    Panel,
-    Picture,
-    Section,
-    Table,
-)
+from flex_planner.paper.evidence import Claim, confirmed_if, Section, Table
+from flex_planner.plotting.diagrams import Curve, Panel, Picture
 from flex_planner.simulation.comparison import compare
 from flex_planner.simulation.execution import ExecutionMode, ExecutionResult
 import numpy as np

@@ -8,10 +8,11 @@ from flex_planner.base.validation import Array
 from flex_planner.paper.cases import certified, paper_arm, point_to_point, W_2
 from flex_planner.paper.checks import checked, shown, swing_of
 from flex_planner.paper.diagrams import joint_panels, POINTS, runs_on_limit, tip_panel
-from flex_planner.paper.evidence import Claim, confirmed_if, Picture, Section, Table, Verdict
+from flex_planner.paper.evidence import Claim, confirmed_if, Section, Table, Verdict
 from flex_planner.planning.objectives import Objectives
 from flex_planner.planning.plan import peaks, Plan, Samples
 from flex_planner.planning.plan_path import plan_path
+from flex_planner.plotting.diagrams import Picture
 import numpy as np
 
 _PAYLOAD, _WISHED = 1.0, 0.8  # [kg], [rad/s]

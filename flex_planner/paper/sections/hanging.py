@@ -8,15 +8,8 @@ from flex_planner.arms.arm_files import load_arm
 from flex_planner.base.validation import Array
 from flex_planner.optimal_control.arm_model import ArmModel, Parameters
 from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectSettings
-from flex_planner.paper.evidence import (
-    Claim,
-    confirmed_if,
-    Curve,
-    Panel,
-    Picture,
-    Section,
-    Table,
-)
+from flex_planner.paper.evidence import Claim, confirmed_if, Section, Table
+from flex_planner.plotting.diagrams import Curve, Panel, Picture
 import numpy as np
 from scipy.integrate import solve_ivp
 

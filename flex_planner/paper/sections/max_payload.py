@@ -21,8 +21,9 @@ from flex_planner.paper.cases import (
 )
 from flex_planner.paper.checks import largest_payload, shown
 from flex_planner.paper.diagrams import joint_panels, POINTS, tip_panel
-from flex_planner.paper.evidence import Claim, confirmed_if, Picture, Section, Table, Verdict
+from flex_planner.paper.evidence import Claim, confirmed_if, Section, Table, Verdict
 from flex_planner.planning.plan import peaks, Plan, Samples
+from flex_planner.plotting.diagrams import Picture
 import numpy as np
 
 _PRICE = 1e3  # of the payload against effort, for IPOPT [1/kg]

@@ -5,8 +5,9 @@ from __future__ import annotations
 from flex_planner.paper.cases import certified, turn, turning_arm
 from flex_planner.paper.checks import checked, shown
 from flex_planner.paper.diagrams import joint_panels, POINTS, runs_on_limit
-from flex_planner.paper.evidence import Claim, Picture, Section, Table, Verdict
+from flex_planner.paper.evidence import Claim, Section, Table, Verdict
 from flex_planner.planning.plan import peaks, Plan, Samples
+from flex_planner.plotting.diagrams import Picture
 
 # what J_1, J_2, J_3 = 1 kg m^2 may turn with: inertias at the nodes of the arm, each of which
 # turns with the link that starts there, the last with the tip

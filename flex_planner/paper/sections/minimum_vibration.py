@@ -8,16 +8,9 @@ from flex_planner.optimal_control.arm_model import ArmModel, Parameters
 from flex_planner.paper.cases import certified, turn, turning_arm, VIBRATION_WEIGHT
 from flex_planner.paper.checks import checked, shown
 from flex_planner.paper.diagrams import joint_panels, modal_panels, tip_panel
-from flex_planner.paper.evidence import (
-    Claim,
-    confirmed_if,
-    Curve,
-    Panel,
-    Picture,
-    Section,
-    Table,
-)
+from flex_planner.paper.evidence import Claim, confirmed_if, Section, Table
 from flex_planner.planning.plan import peaks, Plan, Samples
+from flex_planner.plotting.diagrams import Curve, Panel, Picture
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 

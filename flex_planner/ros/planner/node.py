@@ -146,7 +146,7 @@ class PlannerNode(Node):  # type: ignore[misc]
             self.get_logger().warning(f'error {report.error_code}: {report.error_msg}')
 
     def destroy_node(self) -> Any:
-        """Extremal the streamer and the worker, then the node."""
+        """Stop the streamer and the worker, then the node."""
         self._streamer.close()
         if not self._desk.close(_STOP_TIMEOUT):
             self._planning.abandon()

@@ -60,7 +60,7 @@ class Outcome:
         Always filled.
     trajectory : FlexibleTrajectory
         Empty unless there is a plan.
-    plan, reference : Plan, Reference or None
+    plan, reference : Plan, SampledPlan or None
         What the trajectory was made of.
     search : PayloadSearch or None
         What came of a search for the maximum payload.
