@@ -21,9 +21,10 @@ from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.maps.axes import Axis
 from flex_planner.maps.block_solver import blocks, solve_block
 from flex_planner.maps.end_points import End
+from flex_planner.maps.quantities import Quantity
 from flex_planner.maps.run_map import run_map
 from flex_planner.maps.store import MapStore
-from flex_planner.maps.study import Quantity, Study
+from flex_planner.maps.study import Study
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.planning.plan import PlanStatus
 from flex_planner.reports.motion import table
@@ -41,7 +42,7 @@ def study(arm: str) -> Study:
     axes = (Axis(name='goal_x', values=np.linspace(0.2, 0.6, side, dtype=np.float64)),
             Axis(name='goal_y', values=np.linspace(0.3, 0.7, side, dtype=np.float64)))
     given = load_arm(arm)
-    single = Mismatch(modes=1).applied(given) if given.n_modes else given
+    single = Mismatch(modes=1).apply(given) if given.n_modes else given
     return Study(name='bench', arm=single, quantity=Quantity.MAX_PAYLOAD, axes=axes,
                  start=End(name='start', point=np.array([0.5, 0.0])), goal=End(name='goal'),
                  effort_weights=np.array([0.125, 0.125]), accuracy=1e-3,

@@ -37,7 +37,7 @@ def call_service(node: Node) -> None:
     client = node.create_client(PlanPath, NAME)
     if not client.wait_for_service(PATIENCE):
         sys.exit(f'no planner answers at {NAME} within {PATIENCE:g} s: start one, see above')
-    report = waited(node, client.call_async(PlanPath.Request(task=TASK))).report
+    report = wait_for(node, client.call_async(PlanPath.Request(task=TASK))).report
     if report.error_code != PlanReport.NONE:
         sys.exit(f'error {report.error_code}: {report.error_msg}')
     print(f'service: J = {report.cost:.4f}, tip error {report.tip_error * 1e3:.1e} mm, '
@@ -55,18 +55,18 @@ def call_action(node: Node) -> None:
             print(f'action: {heard[-1]}')
 
     client.wait_for_server(PATIENCE)
-    goal = waited(node, client.send_goal_async(PlanPathAction.Goal(task=SLOW), on_feedback))
+    goal = wait_for(node, client.send_goal_async(PlanPathAction.Goal(task=SLOW), on_feedback))
     result = goal.get_result_async()
     while len(heard) < 10 and not result.done():
         rclpy.spin_once(node, timeout_sec=0.1)
     if not result.done():
-        waited(node, goal.cancel_goal_async())
-    outcome = waited(node, result)
+        wait_for(node, goal.cancel_goal_async())
+    outcome = wait_for(node, result)
     canceled = outcome.status == GoalStatus.STATUS_CANCELED
     print(f'action: {"canceled" if canceled else "done"}, {outcome.result.report.error_msg}')
 
 
-def waited(node: Node, future: Any) -> Any:
+def wait_for(node: Node, future: Any) -> Any:
     """Return what a future holds once it is there."""
     rclpy.spin_until_future_complete(node, future)
     return future.result()

@@ -28,7 +28,7 @@ import numpy as np
 FOLDER = Path('output')
 
 
-def recorded() -> Path:
+def record_plan() -> Path:
     """Plan a motion, record it as the node would, and return the folder."""
     arm, points = load_arm('korayem_ei50'), (np.array([0.5, 0.0]), np.array([0.5, 0.5]))
     start, goal = postures_from_points(arm, *points, elbow=-1)
@@ -44,7 +44,7 @@ def recorded() -> Path:
 
 def main() -> None:
     """Record, read, check, report."""
-    path = recorded()
+    path = record_plan()
     print(f'recording: {path}')
 
     # as messages, in the order of their times; any rosbag2 tool reads them as well

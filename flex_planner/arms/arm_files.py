@@ -161,13 +161,13 @@ def _cross_section(section: YamlSection) -> tuple[float, float]:
     return math.nan, math.nan
 
 
-def _one_of(section: YamlSection, ways: Mapping[str, Callable[[float], float]]) -> float:
-    """Return a quantity that may be given in several ways, but has to be given in one."""
-    given = [name for name in ways if section.has(name)]
+def _one_of(section: YamlSection, conversions: Mapping[str, Callable[[float], float]]) -> float:
+    """Return a quantity that may be given in several conversions, but has to be given in one."""
+    given = [name for name in conversions if section.has(name)]
     if len(given) != 1:
-        raise InvalidValueError(section.name(' or '.join(ways)),
+        raise InvalidValueError(section.name(' or '.join(conversions)),
                                 ' and '.join(given) or None, 'given, one of them')
-    result = ways[given[0]](_number(section, given[0]))
+    result = conversions[given[0]](_number(section, given[0]))
     if math.isnan(result):
         needs = 'section' if given[0] == 'density' else 'section or second_moment_of_area'
         raise InvalidValueError(section.name(needs), None, f'given with {given[0]}')

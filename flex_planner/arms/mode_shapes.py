@@ -132,14 +132,14 @@ def clamped_mass(length: float, count: int, load: TipLoad | None = None) -> Link
     modes = [ClampedMode.of(order, load or TipLoad()) for order in range(1, count + 1)]
     points, weights = _gauss_legendre()
 
-    def stacked(x: Array, derivative: int = 0) -> Array:
+    def stack_modes(x: Array, derivative: int = 0) -> Array:
         columns = [mode(np.asarray(x) / length, derivative) for mode in modes]
         return np.stack(columns, axis=-1) if modes else np.zeros((*np.shape(x), 0))
 
-    sizes = np.sqrt(weights @ stacked(points * length) ** 2)
+    sizes = np.sqrt(weights @ stack_modes(points * length) ** 2)
 
     def evaluate(x: Array, derivative: int) -> Array:
-        values: Array = stacked(x, derivative) / sizes / length**derivative
+        values: Array = stack_modes(x, derivative) / sizes / length**derivative
         return values
 
     stations = points * length

@@ -68,7 +68,7 @@ class Outputs:
     def write_plan(self, plan: Plan, reference: SampledPlan | None) -> Iterator[Row]:
         """Write what came of a plan; yield names and paths, one by one as they are written."""
         if self.draws and plan.solved:
-            yield self._motion(plan)
+            yield self._draw_motion(plan)
         if self.recorder is not None:
             yield 'recording', str(self.recorder.record_plan(plan, reference))
 
@@ -81,19 +81,19 @@ class Outputs:
 
             path = self.folder / f'{self.stem}_max_payload.png'
             draw_max_payload(path, found, _joint_names(found.task.arm.n_joints),
-                             _drawn(solved) if solved else None)
+                             _fine_motion(solved) if solved else None)
             yield 'picture of the search', str(path)
         if self.draws and solved:
-            yield self._motion(solved)
+            yield self._draw_motion(solved)
         if self.recorder is not None:
             yield 'recording', str(self.recorder.record_search(found, accuracy, step, reference))
 
-    def _motion(self, plan: Plan) -> Row:
+    def _draw_motion(self, plan: Plan) -> Row:
         """Draw the motion of a plan."""
         from flex_planner.plotting import draw_motion
 
         path = self.folder / f'{self.stem}_motion.png'
-        draw_motion(path, plan.arm, _joint_names(plan.arm.n_joints), _drawn(plan))
+        draw_motion(path, plan.arm, _joint_names(plan.arm.n_joints), _fine_motion(plan))
         return 'picture of the motion', str(path)
 
 
@@ -134,7 +134,7 @@ def _joint_names(count: int) -> list[str]:
     return [f'joint{i}' for i in range(1, count + 1)]
 
 
-def _drawn(plan: Plan) -> Motion:
+def _fine_motion(plan: Plan) -> Motion:
     """Return a solved plan as arrays, finer than a controller needs it."""
     from flex_planner.plotting import Motion
 

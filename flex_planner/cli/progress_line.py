@@ -94,7 +94,8 @@ def interruptible() -> Iterator[Callable[[], bool]]:
         signal.signal(signal.SIGINT, before)
 
 
-def watched(arm: Arm, time_limit: float, work: Callable[[ArmModel, Monitor], Result]) -> Result:
+def run_with_progress(arm: Arm, time_limit: float,
+                      work: Callable[[ArmModel, Monitor], Result]) -> Result:
     """
     Return the result of work on an arm, showing its progress.
 

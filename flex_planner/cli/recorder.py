@@ -19,7 +19,7 @@ from flex_planner.ros.messages.plans import (
     duration_message,
     OBJECTIVE_FIELDS,
     report_from_plan,
-    reported_trajectory,
+    report_trajectory,
 )
 from flex_planner.ros.planner.recorder import OutcomeRecorder
 from flex_planner.ros.settings.planner import PlannerSettings
@@ -79,7 +79,7 @@ class RequestRecorder:
         """Write a recording; the request is said to have come when planning began."""
         trajectory, took = FlexibleTrajectory(), int(seconds * 1e9)
         if plan is not None and reference is not None:
-            trajectory = reported_trajectory(report, plan, reference, self._settings)
+            trajectory = report_trajectory(report, plan, reference, self._settings)
         report.planning_time = duration_message(took)
         return self._recorder.write(
             self._settings, time.time_ns() - took, self._message, report, trajectory, plan,

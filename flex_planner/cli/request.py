@@ -68,7 +68,7 @@ class Request:
 
         """
         arm = load_arm(options.arm)
-        with named_as_options():
+        with translate_errors():
             limit = number('time_limit', options.time_limit, above=0, at_most=MAX_TIME_LIMIT,
                            unit='s')
             points = _points(options)
@@ -139,7 +139,7 @@ def add_objectives(parser: argparse.ArgumentParser) -> None:
 
 
 @contextmanager
-def named_as_options() -> Iterator[None]:
+def translate_errors() -> Iterator[None]:
     """Let errors of the core name options instead of its own fields."""
     try:
         yield

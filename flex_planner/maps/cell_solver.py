@@ -24,7 +24,7 @@ from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.strategies.first_extremals import first_motion
 from flex_planner.planning.strategies.price_continuation import on_the_way
-from flex_planner.simulation.comparison import finely_sampled
+from flex_planner.simulation.comparison import sample_finely
 from flex_planner.simulation.execution import execute_plan, ExecutionMode, Setting
 from flex_planner.simulation.joint_control import Gains
 import numpy as np
@@ -44,10 +44,10 @@ class Vibration:
     peak_to_peak: float
 
 
-Found: TypeAlias = MaxPayload | MinDuration | Plan | Vibration
+CellSolution: TypeAlias = MaxPayload | MinDuration | Plan | Vibration
 
 
-class Solver:
+class CellSolver:
     """
     Solves the cells of a study.
 
@@ -62,7 +62,7 @@ class Solver:
         self._study, self._model = study, ArmModel(study.arm)
 
     def solve(self, index: tuple[int, ...], task: Task, monitor: Monitor, near: Any, far: Any,
-              ratio: float) -> Found:
+              ratio: float) -> CellSolution:
         """
         Return what was found for the task of a cell, from what was found for neighbours.
 
@@ -87,11 +87,10 @@ class Solver:
                          start_from=_plan_of(near))
         if study.quantity is Quantity.MIN_EFFORT or not plan.solved:
             return plan
-        return self._shaken(index, task, plan, monitor)
+        return self._measure_vibration(index, task, plan, monitor)
 
     def _payload(self, problem: MotionProblem, settings: SolverSettings, monitor: Monitor,
-                 near: Any,
-                 far: Any, ratio: float) -> Found:
+                 near: Any, far: Any, ratio: float) -> CellSolution:
         """
         Return the largest payload, or the shortest duration where that is too long.
 
@@ -100,8 +99,8 @@ class Solver:
 
         """
         task, late = problem.task, isinstance(near, MinDuration)
-        if self._says_much and (late or _may_be_none(problem, settings, near, far, ratio,
-                                                     monitor)):
+        if self._duration_decides and (late or _may_carry_nothing(
+                problem, settings, near, far, ratio, monitor)):
             shortest = find_min_duration(
                 task, model=self._model, settings=settings, monitor=monitor,
                 accuracy=_SHORT * task.duration, start_from=near if late else None,
@@ -115,14 +114,14 @@ class Solver:
                                 ratio=ratio)
 
     @property
-    def _says_much(self) -> bool:
+    def _duration_decides(self) -> bool:
         """Whether a shortest duration holds for all motions: not where they may swing first."""
         arm = self._study.arm
         limited = [np.isfinite(joint.motor.stall_torque) for joint in arm.joints]
         return all(limited) and not arm.gravity.any()
 
-    def _shaken(self, index: tuple[int, ...], task: Task, plan: Plan,
-                monitor: Monitor) -> Vibration:
+    def _measure_vibration(self, index: tuple[int, ...], task: Task, plan: Plan,
+                           monitor: Monitor) -> Vibration:
         """Carry a plan out on the arm that is simulated."""
         study = self._study
         arm, carried = study.plant(index)
@@ -130,14 +129,14 @@ class Solver:
         goal = tip_position(task.arm, plan.problem.goal[:task.arm.n_coordinates])
         setting = Setting(model=PlantModel(arm), gains=gains, rate=_RATE, payload_mass=carried,
                           goal=goal, settling=study.settling, monitor=monitor)
-        way = ExecutionMode.FLEXIBLE if study.gains else ExecutionMode.FLEXIBLE_OPEN
-        outcome = execute_plan(way, plan, finely_sampled(plan, monitor), setting)
-        return Vibration(plan=plan, peak_to_peak=outcome.residual.tip)
+        mode = ExecutionMode.FLEXIBLE if study.gains else ExecutionMode.FLEXIBLE_OPEN
+        executed = execute_plan(mode, plan, sample_finely(plan, monitor), setting)
+        return Vibration(plan=plan, peak_to_peak=executed.residual.tip)
 
-    def result(self, index: tuple[int, ...], found: Found) -> CellResult:
+    def result(self, index: tuple[int, ...], found: CellSolution) -> CellResult:
         """Return what was found as a result."""
         if isinstance(found, MinDuration) and self._study.quantity is Quantity.MAX_PAYLOAD:
-            return _too_late(index, found)
+            return _late_result(index, found)
         plan = _plan_of(found)
         solution = found.plan if isinstance(found, Vibration) else found
         code = CellCode.of(solution.status)
@@ -148,7 +147,8 @@ class Solver:
         return CellResult(index=index, code=code, message=solution.message, value=value,
                           bound=bound, cost=plan.cost, tip_error=plan.certificate.tip_error,
                           iterations=solution.iterations,
-                          motion=_kept(found, plan) if self._study.keeps_motions else None)
+                          motion=(_motion_to_keep(found, plan) if self._study.keeps_motions
+                                  else None))
 
 
 def _settings(problem: MotionProblem) -> SolverSettings:
@@ -159,8 +159,8 @@ def _settings(problem: MotionProblem) -> SolverSettings:
     return replace(settings, max_intervals=most)
 
 
-def _may_be_none(problem: MotionProblem, settings: SolverSettings, near: MaxPayload | None,
-                 far: MaxPayload | None, ratio: float, monitor: Monitor) -> bool:
+def _may_carry_nothing(problem: MotionProblem, settings: SolverSettings, near: MaxPayload | None,
+                       far: MaxPayload | None, ratio: float, monitor: Monitor) -> bool:
     """Return whether neighbours, or a first trial, let expect that nothing can be carried."""
     if near is None:
         return not first_motion(problem, on_the_way(settings), monitor).converged
@@ -168,8 +168,8 @@ def _may_be_none(problem: MotionProblem, settings: SolverSettings, near: MaxPayl
     return near.payload + 2 * ratio * slope < problem.task.payload_mass
 
 
-def _kept(found: Found, plan: Plan) -> KeptMotion | None:
-    """Return what others may start from: near a limit, the last motion but one on the way."""
+def _motion_to_keep(found: CellSolution, plan: Plan) -> KeptMotion | None:
+    """Return what others may start from: near a limit, the last motion but one on the mode."""
     if isinstance(found, MaxPayload) and found.stops:
         stop = found.stops[-2:][0]
         motion = thinned(stop, on_the_way(SolverSettings()))
@@ -177,7 +177,7 @@ def _kept(found: Found, plan: Plan) -> KeptMotion | None:
     return None if plan.solution is None else KeptMotion.of(plan.problem, plan.solution)
 
 
-def _too_late(index: tuple[int, ...], found: MinDuration) -> CellResult:
+def _late_result(index: tuple[int, ...], found: MinDuration) -> CellResult:
     """Return that a motion takes longer than it may."""
     task = found.task
     return CellResult(index=index, code=CellCode.INFEASIBLE, iterations=found.iterations, message=(
@@ -185,19 +185,19 @@ def _too_late(index: tuple[int, ...], found: MinDuration) -> CellResult:
         f'{task.duration:g} s were asked for'))
 
 
-def task_of(found: Found) -> Task:
+def task_of(found: CellSolution) -> Task:
     """Return the task of what was found."""
     return found.plan.task if isinstance(found, Vibration) else found.task
 
 
-def _plan_of(found: Found | None) -> Plan | None:
+def _plan_of(found: CellSolution | None) -> Plan | None:
     """Return the plan of what was found."""
     if found is None or isinstance(found, Plan):
         return found
     return found.plan
 
 
-def _value(found: Found) -> tuple[float, float]:
+def _value(found: CellSolution) -> tuple[float, float]:
     """Return the quantity, and how far it is at most."""
     if isinstance(found, MaxPayload):
         return found.payload, found.upper

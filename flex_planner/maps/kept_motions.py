@@ -107,14 +107,14 @@ class KeptMotion:
                    payload=problem.parameters.payload_mass, mesh=solution.mesh,
                    nodes=solution.nodes)
 
-    def packed(self) -> Packed:
+    def pack(self) -> Packed:
         """Return payload, price, mesh and nodes; single precision is plenty for a start."""
         mesh, kept = np.unique(self.mesh.astype(np.float32), return_index=True)
         return np.concatenate([[self.payload, self.price, mesh.size], mesh,
                                self.nodes[kept].ravel()], dtype=np.float32)
 
     @classmethod
-    def unpacked(cls, own: Array, packed: Packed) -> KeptMotion:
+    def unpack(cls, own: Array, packed: Packed) -> KeptMotion:
         """Return the motion of a signature and what `packed` made of it."""
         head, values = packed[:_HEAD].tolist(), packed[_HEAD:].astype(np.float64)
         payload, price, count = head[0], head[1], int(head[2])

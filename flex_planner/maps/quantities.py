@@ -86,14 +86,14 @@ def _no_effect(arm: Arm, name: str) -> str:
     """Return why an axis changes nothing about an arm, or nothing."""
     if name == 'stiffness_scale' and not arm.n_modes:
         return 'every link of the arm is rigid'
-    if name == 'motor_scale' and not any(_limited(arm)):
+    if name == 'motor_scale' and not any(_has_limit(arm)):
         return 'no motor of the arm has a limit'
     return ''
 
 
 def check_motors(quantity: Quantity, arm: Arm) -> None:
     """Refuse an arm without the motor limits that a quantity comes from."""
-    limited = _limited(arm)
+    limited = _has_limit(arm)
     if quantity is Quantity.MAX_PAYLOAD and not any(limited):
         raise InvalidValueError('arm', 'without a limited motor',
                                 'one with a stall torque, or no payload is the largest')
@@ -102,6 +102,6 @@ def check_motors(quantity: Quantity, arm: Arm) -> None:
                                 'one with stall torques, or no duration is the shortest')
 
 
-def _limited(arm: Arm) -> list[bool]:
+def _has_limit(arm: Arm) -> list[bool]:
     """Return which motors have a stall torque."""
     return [math.isfinite(joint.motor.stall_torque) for joint in arm.joints]

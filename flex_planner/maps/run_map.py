@@ -17,9 +17,10 @@ from flex_planner.maps.cluster import (
     remote_cluster,
     threads,
 )
-from flex_planner.maps.scheduling import compute, Solver
+from flex_planner.maps.quantities import Quantity
+from flex_planner.maps.scheduling import BlockSolver, compute
 from flex_planner.maps.store import MapStore
-from flex_planner.maps.study import Quantity, Study
+from flex_planner.maps.study import Study
 from flex_planner.maps.tally import Tally
 from flex_planner.optimal_control.arm_model import ArmModel
 
@@ -28,7 +29,7 @@ _OFTEN = 0.05  # [s], between two looks at it
 
 
 def run_map(study: Study, store: MapStore, *, workers: int = 0, scheduler: str = '',
-            solve: Solver = solve_block, begin: Callable[[str], None] = lambda phase: None,
+            solve: BlockSolver = solve_block, begin: Callable[[str], None] = lambda phase: None,
             report: Callable[[Tally], None] = lambda tally: None,
             canceled: Callable[[], bool] = lambda: False) -> Tally:
     """
@@ -50,7 +51,7 @@ def run_map(study: Study, store: MapStore, *, workers: int = 0, scheduler: str =
         As of :func:`compute`, which also says what is raised and returned.
 
     """
-    left = [block for block in blocks(study) if not store.complete(block)]
+    left = [block for block in blocks(study) if not store.is_complete(block)]
     if not left:
         return Tally(store.codes)
     if scheduler:

@@ -19,6 +19,7 @@ from types import TracebackType
 from typing import Any, NoReturn, TYPE_CHECKING
 
 from flex_planner.base.errors import FlexPlannerError
+from flex_planner.maps.axes import Block
 from flex_planner.maps.cell_results import CellCode, CellResult
 from flex_planner.maps.store_layout import BESIDE, differences, metadata, MOTIONS, write_empty
 import numpy as np
@@ -28,8 +29,6 @@ import zarr
 
 if TYPE_CHECKING:
     from flex_planner.maps.study import Study
-
-Block = tuple[slice, ...]
 
 
 class MapStoreError(FlexPlannerError):
@@ -54,9 +53,9 @@ class MapStore:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._group = opened_group(path, 'r+')
+        self._group = open_group(path, 'r+')
         self._key: str = self._group.attrs['quantity']
-        self._lock = _locked(path)
+        self._lock = _lock_store(path)
         self.codes = _readable_codes(self._group['code'])
 
     @classmethod
@@ -105,7 +104,7 @@ class MapStore:
         if os.path.lexists(path):
             store = cls(path)
             if not reset:
-                return store.checked(study)
+                return store.check(study)
             try:
                 shutil.rmtree(path)
             except OSError as error:
@@ -114,7 +113,7 @@ class MapStore:
                 store.close()
         return cls.create(path, study)
 
-    def checked(self, study: Study) -> MapStore:
+    def check(self, study: Study) -> MapStore:
         """
         Return the store itself, if it is that of a study and of this version.
 
@@ -134,7 +133,7 @@ class MapStore:
                                 'it anew with --reset')
         return self
 
-    def complete(self, block: Block) -> bool:
+    def is_complete(self, block: Block) -> bool:
         """Return whether every cell of a block is done."""
         return bool((self.codes[block] != CellCode.PENDING).all())
 
@@ -176,7 +175,7 @@ class MapStore:
         motions = np.empty(len(ordered), dtype=object)
         for k, result in enumerate(ordered):
             motion = result.motion
-            motions[k] = np.zeros(0, np.float32) if motion is None else motion.packed()
+            motions[k] = np.zeros(0, np.float32) if motion is None else motion.pack()
             if motion is not None:
                 signatures[k] = motion.signature
         kept['signature'][block] = signatures.reshape(*shape, -1)
@@ -210,12 +209,12 @@ def open_map(path: Path) -> xr.Dataset:
         If there is none.
 
     """
-    opened_group(path, 'r')
+    open_group(path, 'r')
     opened: xr.Dataset = xr.open_zarr(str(path), chunks=None)
     return opened
 
 
-def opened_group(path: Path, mode: str) -> Any:
+def open_group(path: Path, mode: str) -> Any:
     """
     Return the Zarr group of a map.
 
@@ -241,7 +240,7 @@ def cells(block: Block) -> list[tuple[int, ...]]:
     return list(itertools.product(*(range(part.start, part.stop) for part in block)))
 
 
-def _locked(path: Path) -> int:
+def _lock_store(path: Path) -> int:
     """Return a descriptor that keeps other writers out while it is open."""
     descriptor = os.open(path, os.O_RDONLY)
     try:

@@ -19,7 +19,7 @@ from flex_planner.base.errors import (
 )
 from flex_planner.base.validation import Array, integer, number, vector
 from flex_planner.base.yaml_files import read_yaml, YamlFileError, YamlSection
-from flex_planner.maps.axes import Axis, tiles
+from flex_planner.maps.axes import Axis, Block, tiles
 from flex_planner.maps.cell_results import CellCode, CellResult
 from flex_planner.maps.end_points import End, middle_posture
 from flex_planner.maps.quantities import check_axes, check_motors, Quantity
@@ -29,8 +29,6 @@ from flex_planner.simulation.joint_control import Gains
 from flex_planner.simulation.mismatch import Mismatch
 import numpy as np
 
-__all__ = ['Block', 'load_study', 'Quantity', 'Study', 'StudyError']
-Block = tuple[slice, ...]
 MAX_CELL_TIME = 3600.0
 
 
@@ -150,7 +148,7 @@ class Study:
 
     def _check_plant(self) -> None:
         """Check what is said about the simulated arm."""
-        self.mismatch.applied(self.arm)
+        self.mismatch.apply(self.arm)
         names = [axis.name for axis in self.axes]
         if not math.isnan(self.plant_payload):
             number('mismatch.payload_mass', self.plant_payload, at_least=0, at_most=MAX_PAYLOAD,
@@ -220,9 +218,9 @@ class Study:
         """Return the arm with its links and motors scaled."""
         arm = self.arm
         if 'stiffness_scale' in values:
-            arm = Mismatch(rigidity_scale=values['stiffness_scale']).applied(arm)
+            arm = Mismatch(rigidity_scale=values['stiffness_scale']).apply(arm)
         if 'motor_scale' in values:
-            stronger = partial(_stronger, factor=values['motor_scale'])
+            stronger = partial(_with_stronger_motor, factor=values['motor_scale'])
             arm = replace(arm, joints=tuple(map(stronger, arm.joints)))
         return arm
 
@@ -231,7 +229,7 @@ class Study:
         values = self.values(index)
         planned = values.get('payload_mass', self.payload_mass)
         carried = planned if math.isnan(self.plant_payload) else self.plant_payload
-        return (self.mismatch.applied(self._arm(values)),
+        return (self.mismatch.apply(self._arm(values)),
                 values.get('payload_scale', 1.0) * carried)
 
     def known_failures(self, block: Block | None = None) -> list[CellResult]:
@@ -277,7 +275,7 @@ class Study:
         return None
 
 
-def _stronger(joint: Joint, factor: float) -> Joint:
+def _with_stronger_motor(joint: Joint, factor: float) -> Joint:
     """Return a joint with a stronger motor of the same no-load speed."""
     stall = factor * joint.motor.stall_torque
     return replace(joint, motor=replace(joint.motor, stall_torque=stall))

@@ -49,7 +49,7 @@ def read_fields(top: YamlSection, folder: Path) -> dict[str, Any]:
             'accuracy': top.take('accuracy', _ACCURACIES.get(quantity, math.nan)),
             'block_shape': _block_shape(top, axes),
             'keep_motions': top.flag('keep_motions', True),
-            **_simulated(top, quantity, arm.n_joints)}
+            **_simulated_fields(top, quantity, arm.n_joints)}
 
 
 def _quantity(top: YamlSection) -> Quantity:
@@ -77,7 +77,7 @@ def _arm(top: YamlSection, folder: Path) -> Arm:
     modes = integer('modes', top.take('modes'), at_least=0, at_most=MAX_MODES)
     if modes and not arm.n_modes:
         raise InvalidValueError('modes', modes, 'left out: every link of the arm is rigid')
-    return Mismatch(modes=modes).applied(arm)
+    return Mismatch(modes=modes).apply(arm)
 
 
 def _refuse_given_twice(top: YamlSection, axes: tuple[Axis, ...]) -> None:
@@ -128,7 +128,7 @@ def _block_shape(top: YamlSection, axes: tuple[Axis, ...]) -> tuple[int, ...]:
     return shape
 
 
-def _simulated(top: YamlSection, quantity: Quantity, joints: int) -> dict[str, Any]:
+def _simulated_fields(top: YamlSection, quantity: Quantity, joints: int) -> dict[str, Any]:
     """Return what is said about the simulated arm."""
     if quantity is not Quantity.RESIDUAL_VIBRATION:
         for key in ('mismatch', 'gains', 'settling'):

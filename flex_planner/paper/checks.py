@@ -14,7 +14,7 @@ import numpy as np
 _DEGREE = 6
 
 
-def checked(plan: Plan, intervals: int = 30) -> DirectResult:
+def solve_by_ipopt(plan: Plan, intervals: int = 30) -> DirectResult:
     """Return what IPOPT makes of the task of a plan; it does not see the plan."""
     problem = plan.problem
     settings = DirectSettings(degree=_DEGREE, intervals=intervals)
@@ -22,7 +22,7 @@ def checked(plan: Plan, intervals: int = 30) -> DirectResult:
         problem.parameters, problem.start, problem.goal, problem.task.duration)
 
 
-def largest_payload(task: Task, plan: Plan, price: float, intervals: int = 30) -> DirectResult:
+def maximize_payload(task: Task, plan: Plan, price: float, intervals: int = 30) -> DirectResult:
     """Return what IPOPT makes of carrying as much as possible at a price, from a light load."""
     light = replace(task, payload_mass=1.0)
     problem = MotionProblem(plan.model, light, task_parameters(light))
@@ -31,7 +31,7 @@ def largest_payload(task: Task, plan: Plan, price: float, intervals: int = 30) -
         problem.parameters, problem.start, problem.goal, task.duration, price=price)
 
 
-def shown(result: DirectResult, value: float, digits: int = 6) -> str:
+def format_value(result: DirectResult, value: float, digits: int = 6) -> str:
     """Return a value of IPOPT's as text, or that it failed."""
     return f'{value:.{digits}g}' if result.converged else 'did not converge'
 

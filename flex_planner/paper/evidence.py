@@ -17,7 +17,7 @@ class Verdict(Enum):
     NOT_REPRODUCIBLE = 'not reproducible'
 
 
-def confirmed_if(holds: bool) -> Verdict:
+def judge(holds: bool) -> Verdict:
     """Return what became of a statement that a number decides."""
     return Verdict.CONFIRMED if holds else Verdict.CORRECTED
 

@@ -61,7 +61,7 @@ class ArmSimulator(Node):  # type: ignore[misc]
         super().__init__('arm_simulator')
         arm = declare_arm(self)
         self._settings = declare(self, SimulatorSettings.for_arm(arm))
-        self._arm = self._settings.mismatch.applied(arm)
+        self._arm = self._settings.mismatch.apply(arm)
         self._plant = self._new_plant()
         self._watch = ArrivalWatch(self._arm, self._settings.vibration_window)
         self._joints = self.create_publisher(JointState, 'joint_states', 10)

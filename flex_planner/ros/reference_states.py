@@ -149,14 +149,14 @@ class Stream:
             self._changed.notify()
         self._thread.join(timeout)
 
-    def _interrupted(self) -> bool:
+    def _is_interrupted(self) -> bool:
         return self._closed or self._next is not None
 
     def _run(self) -> None:
         _hurry()
         while True:
             with self._changed:
-                self._changed.wait_for(self._interrupted)
+                self._changed.wait_for(self._is_interrupted)
                 if self._closed or self._next is None:
                     return
                 plan, self._next = self._next, None
@@ -185,7 +185,7 @@ class Stream:
     def _wait(self, due_ns: int) -> bool:
         """Wait until a time of the monotonic clock [ns]; return whether to stop instead."""
         with self._changed:
-            while not self._interrupted():
+            while not self._is_interrupted():
                 left = due_ns - time.monotonic_ns()
                 if left <= 0:
                     return False

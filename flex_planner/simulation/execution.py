@@ -1,4 +1,4 @@
-"""One way to carry out a plan on a simulated flexible arm, and what came of it."""
+"""One mode to carry out a plan on a simulated flexible arm, and what came of it."""
 
 from __future__ import annotations
 
@@ -67,11 +67,11 @@ class SimulatedMotion:
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ExecutionResult:
     """
-    What came of one way.
+    What came of one mode.
 
     Attributes
     ----------
-    way : ExecutionMode
+    mode : ExecutionMode
         Which.
     arrival : float
         Planned duration [s].
@@ -91,7 +91,7 @@ class ExecutionResult:
 
     """
 
-    way: ExecutionMode
+    mode: ExecutionMode
     arrival: float
     arrival_error: float
     final_error: float
@@ -134,10 +134,10 @@ class Setting:
     monitor: Monitor
 
 
-def execute_plan(way: ExecutionMode, plan: Plan, sampled: SampledPlan,
+def execute_plan(mode: ExecutionMode, plan: Plan, sampled: SampledPlan,
                  setting: Setting) -> ExecutionResult:
     """
-    Follow a sampled plan in one way.
+    Follow a sampled plan in one mode.
 
     Raises
     ------
@@ -148,28 +148,28 @@ def execute_plan(way: ExecutionMode, plan: Plan, sampled: SampledPlan,
 
     """
     reference, n = JointReference.of(sampled), plan.arm.n_joints
-    gains = setting.gains if way.feedback else Gains.of(n, 0.0, 0.0)
+    gains = setting.gains if mode.feedback else Gains.of(n, 0.0, 0.0)
     plant = Plant(
         setting.model, Control(gains=gains, rate=setting.rate,
-                               feedforward=way is not ExecutionMode.PD_ONLY),
+                               feedforward=mode is not ExecutionMode.PD_ONLY),
         payload_mass=setting.payload_mass, payload_inertia=plan.task.payload_inertia,
         positions=plan.task.start_positions)
     plant.follow(reference)
     arrival = plan.task.duration
-    execution, bending = _watched(plant, arrival, setting)
+    execution, bending = _watch(plant, arrival, setting)
     error = np.linalg.norm(execution.tip - setting.goal, axis=1)
     after = int(np.ceil(arrival * setting.rate - 1e-6))
     end = execution.times[-1] - _SETTLED * setting.settling
     demanded = np.array([reference.motion(time)[0] for time in execution.times[:after + 1]])
     tracking = np.abs(execution.coordinates[:after + 1, :n] - demanded).max()
     return ExecutionResult(
-        way=way, arrival=arrival, arrival_error=float(error[after]),
+        mode=mode, arrival=arrival, arrival_error=float(error[after]),
         final_error=float(error[execution.times >= end].max()), bending=bending,
         residual=ResidualVibration.of(plant.model.arm, execution.coordinates[after:]),
         tracking_error=float(tracking), execution=execution)
 
 
-def _watched(plant: Plant, arrival: float, setting: Setting) -> tuple[SimulatedMotion, float]:
+def _watch(plant: Plant, arrival: float, setting: Setting) -> tuple[SimulatedMotion, float]:
     """Let an arm go; return what it did, and its bending with the joints locked on arrival."""
     n_t = plant.model.arm.n_coordinates
     times, states, torques = [0.0], [plant.state], [plant.torque]

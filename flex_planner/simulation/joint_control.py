@@ -161,7 +161,7 @@ class JointSensor:
 
     def __init__(self, encoder: Encoder, positions: Array) -> None:
         self._encoder = encoder
-        self.positions, self.speeds = self._rounded(positions), np.zeros_like(positions)
+        self.positions, self.speeds = self._round(positions), np.zeros_like(positions)
         self._count, self._sampled = 0, 0.0
 
     def look(self, time: float, positions: Array, speeds: Array) -> None:
@@ -170,12 +170,12 @@ class JointSensor:
         if self._encoder.rate and count == self._count:
             return
         before, since = self.positions, time - self._sampled
-        self.positions = self._rounded(positions)
+        self.positions = self._round(positions)
         differences: Array = (self.positions - before) / since
         self.speeds = differences if self._encoder.differentiates else speeds.copy()
         self._count, self._sampled = count, time
 
-    def _rounded(self, positions: Array) -> Array:
+    def _round(self, positions: Array) -> Array:
         resolution = self._encoder.resolution
         if not resolution:
             return positions.copy()

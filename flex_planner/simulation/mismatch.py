@@ -43,7 +43,7 @@ class Mismatch:
         object.__setattr__(self, 'added_friction', vector(
             'added_friction', given, given.size, at_least=0, at_most=1e3, unit='N m s/rad'))
 
-    def applied(self, arm: Arm) -> Arm:
+    def apply(self, arm: Arm) -> Arm:
         """
         Return the arm that is simulated instead.
 
@@ -57,7 +57,7 @@ class Mismatch:
         added = friction if friction.size else np.zeros(arm.n_joints)
         return replace(
             arm, links=tuple(self._link(link) for link in arm.links),
-            joints=tuple(_rubbing(joint, float(more))
+            joints=tuple(_with_friction(joint, float(more))
                          for joint, more in zip(arm.joints, added, strict=True)))
 
     def _link(self, link: Link) -> Link:
@@ -69,6 +69,6 @@ class Mismatch:
                        flexural_rigidity=link.flexural_rigidity * self.rigidity_scale)
 
 
-def _rubbing(joint: Joint, more: float) -> Joint:
+def _with_friction(joint: Joint, more: float) -> Joint:
     """Return a joint with more friction."""
     return replace(joint, viscous_friction=joint.viscous_friction + more)

@@ -167,15 +167,15 @@ class Plant:
     def _go_on(self) -> None:
         """Compute a torque, hold it for one period."""
         begin = self.elapsed
-        self.torque = self._commanded(begin)
+        self.torque = self._command(begin)
         total = self.torque
         if self._moves:
             total = total + self.control.disturbance.mean(begin, begin + self.period, total.size)
-        self.state = self._integrated(total)
+        self.state = self._integrate(total)
         self._ticks += 1
         self.sensor.look(self.time, *self.joint_state)
 
-    def _commanded(self, elapsed: float) -> Array:
+    def _command(self, elapsed: float) -> Array:
         """Return what the motors do for the coming period."""
         gains, sensor = self.control.gains, self.sensor
         position, velocity = self._reference.motion(elapsed)
@@ -189,11 +189,11 @@ class Plant:
             torque = np.minimum(np.maximum(torque, lower), upper)
         return torque
 
-    def _integrated(self, torque: Array) -> Array:
+    def _integrate(self, torque: Array) -> Array:
         """Return the state after one period, in as many steps as it takes."""
         with np.errstate(over='ignore', invalid='ignore'):
             while self._steps <= _MOST_STEPS:
-                state, error = self._crossed(torque)
+                state, error = self._take_steps(torque)
                 if error <= 1:
                     if error < _EASY:
                         self._steps = max(self._fewest, self._steps // 2)
@@ -202,7 +202,7 @@ class Plant:
         raise RunawayError(f'the simulated arm has run away after {self.time:.3f} s: gains that '
                            'are too high for the rate of the controller, or too much torque')
 
-    def _crossed(self, torque: Array) -> tuple[Array, float]:
+    def _take_steps(self, torque: Array) -> tuple[Array, float]:
         """Return the state after equal steps, and the error of the worst of them."""
         state, worst, length = self.state, 0.0, self.period / self._steps
         for _ in range(self._steps):

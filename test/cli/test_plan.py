@@ -18,7 +18,7 @@ from typing import Any
 from flex_planner.arms.arm import Arm
 from flex_planner.base.progress import Progress
 from flex_planner.cli import main
-from flex_planner.cli.options import with_joined_lists
+from flex_planner.cli.options import join_lists
 from flex_planner.cli.progress_line import Display
 from flex_planner.optimal_control.task import postures_from_points, Task
 from flex_planner.planning.plan_path import plan_path
@@ -289,14 +289,14 @@ def test_folder_that_cannot_be_written_is_told_before_anything_is_solved(tmp_pat
 
 
 def test_lists_may_begin_with_a_minus_sign() -> None:
-    assert with_joined_lists(['plan', 'arm', '--to', '-0.5,0', '--elbow', '-1', '--from=-1,0']) \
+    assert join_lists(['plan', 'arm', '--to', '-0.5,0', '--elbow', '-1', '--from=-1,0']) \
         == ['plan', 'arm', '--to=-0.5,0', '--elbow', '-1', '--from=-1,0']
     assert run('plan', 'korayem_rigid', '--from', '-.5,0', '--to', '-0.5,-0.5', '--duration',
                '1.5', *DRY).code == 0
 
 
 def start_long_search(folder: Path) -> subprocess.Popen[str]:
-    """SearchStart a search that takes many seconds, and wait until it is under way."""
+    """Start a search that takes many seconds, and wait until it is under way."""
     process = subprocess.Popen(
         [sys.executable, '-m', 'flex_planner.cli', 'payload', 'korayem_ei50', *MOTION,
          '--method', 'incremental', '--accuracy', '1e-6', '--output', str(folder / 'new')],

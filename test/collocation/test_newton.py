@@ -28,7 +28,7 @@ LINEAR = CASES['linear']
 
 def newton_of(case: Case, shift: float = 0.0, tolerance: float = 1e-9,
               monitor: Monitor | None = None) -> NewtonOutcome:
-    """SearchStart on 10 intervals from the closed form and a shift."""
+    """Start on 10 intervals from the closed form and a shift."""
     mesh = np.linspace(*case.span, 11)
     values = np.stack([case.exact(mesh) + shift, np.gradient(case.exact(mesh), mesh)], axis=1)
     guess = CollocationSolution.from_values(mesh, values, GaussRule.of(3))

@@ -12,7 +12,7 @@ from flex_planner.capacity.min_duration import find_min_duration
 from flex_planner.maps import block_solver
 from flex_planner.maps.block_solver import blocks, solve_block
 from flex_planner.maps.cell_results import CellCode, CellResult
-from flex_planner.maps.cell_solver import Solver
+from flex_planner.maps.cell_solver import CellSolver
 from flex_planner.maps.study import load_study, Study
 from flex_planner.planning.plan_path import plan_path
 from flex_planner.simulation.comparison import compare
@@ -153,7 +153,7 @@ def test_value_out_of_bounds_is_invalid_and_costs_no_other(tmp_path: Path) -> No
     same = replace(study.task((0, 1)), goal_positions=study.task((0, 1)).start_positions)
     assert same.duration == 1.0
 
-    class Refusing(Solver):
+    class Refusing(CellSolver):
         """Finds fault with a cell."""
 
         def solve(self, index: tuple[int, ...], *args: object) -> object:  # type: ignore
@@ -162,7 +162,7 @@ def test_value_out_of_bounds_is_invalid_and_costs_no_other(tmp_path: Path) -> No
             return super().solve(index, *args)  # type: ignore
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(block_solver, 'Solver', Refusing)
+        patch.setattr(block_solver, 'CellSolver', Refusing)
         first, second = whole(study)
     assert (first.code, second.code) == (CellCode.INVALID, CellCode.SOLVED)
     assert first.message == 'duration is -1.0, but must be a number > 0 and <= 1000 s'
@@ -171,14 +171,14 @@ def test_value_out_of_bounds_is_invalid_and_costs_no_other(tmp_path: Path) -> No
 def test_error_of_the_program_is_a_code_with_its_name(tmp_path: Path) -> None:
     study = study_of(tmp_path, axes='{goal_x: [0.4], goal_y: [0.45, 0.47]}', block='')
 
-    class Broken(Solver):
+    class Broken(CellSolver):
         """Fails as programs do."""
 
         def solve(self, *args: object) -> object:  # type: ignore
             raise ZeroDivisionError('x' * 1000)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(block_solver, 'Solver', Broken)
+        patch.setattr(block_solver, 'CellSolver', Broken)
         results = whole(study)
     assert {result.code for result in results} == {CellCode.FAILED}
     assert all(result.message.startswith('ZeroDivisionError: xxx') for result in results)

@@ -66,7 +66,7 @@ def test_complete_blocks_are_known_when_the_map_is_opened_again(path: Path) -> N
     with MapStore.of(path, study) as store:
         fill(store, 2)
     with MapStore.of(path, study) as store:
-        assert [store.complete(block) for block in blocks(study)] == [True] * 2 + [False] * 4
+        assert [store.is_complete(block) for block in blocks(study)] == [True] * 2 + [False] * 4
 
 
 @pytest.mark.parametrize('room', [0, 1, 5, 10])
@@ -87,10 +87,10 @@ def test_a_full_disk_costs_only_the_block_that_it_cuts_off(
         with pytest.raises(OSError, match='No space left on device; finished') as caught:
             fill(store)
         assert (caught.value.errno, caught.value.filename) == (errno.ENOSPC, str(path))
-        assert not store.complete(blocks(study)[1])
+        assert not store.is_complete(blocks(study)[1])
     monkeypatch.undo()
     with MapStore.of(path, study) as store:
-        assert [store.complete(block) for block in blocks(study)] == [True] + [False] * 5
+        assert [store.is_complete(block) for block in blocks(study)] == [True] + [False] * 5
         fill(store)
         assert store.dataset().max_payload[5, 3] == value_of((5, 3))
 
@@ -101,7 +101,7 @@ def test_a_damaged_block_is_not_complete(path: Path) -> None:
         fill(store)
     (path / 'code' / '1.1').write_bytes(b'')
     with MapStore.of(path, study) as store:
-        assert [store.complete(block) for block in blocks(study)].count(False) == 1
+        assert [store.is_complete(block) for block in blocks(study)].count(False) == 1
 
 
 def test_results_of_other_cells_are_refused(path: Path) -> None:

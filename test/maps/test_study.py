@@ -20,8 +20,9 @@ from flex_planner.base.errors import (
 )
 from flex_planner.maps.axes import AXES, Axis, tiles
 from flex_planner.maps.cell_results import CellCode
-from flex_planner.maps.end_points import close, End
-from flex_planner.maps.study import load_study, Quantity, Study, StudyError
+from flex_planner.maps.end_points import are_close, End
+from flex_planner.maps.quantities import Quantity
+from flex_planner.maps.study import load_study, Study, StudyError
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.task import postures_from_points, Task
 from flex_planner.planning.plan_path import plan_path
@@ -292,7 +293,7 @@ def test_postures_change_steadily_but_for_the_line_half_a_turn_away() -> None:
             jump = float(np.abs(task.goal_positions - other.goal_positions).max())
             # of 4 cm; most near the folded arm, where a step turns it by a radian or so
             assert jump < 1.6 or abs(jump - 2 * np.pi) < 1.6
-            assert close(task, other) == (jump < np.pi)
+            assert are_close(task, other) == (jump < np.pi)
             cut += [task] if jump > np.pi else []
     turns = [abs(task.goal_positions[0] - task.start_positions[0]) for task in cut]
     assert 0 < len(cut) < 50
@@ -308,8 +309,8 @@ def test_half_turn_is_no_border_inside_a_grid_of_starts(y: float) -> None:
     angles = np.array([task.start_positions[0] for task in found.values()])
     assert angles.min() < -np.pi < angles.max()
     for (i, j), task in found.items():
-        assert close(task, found.get((i + 1, j), task))
-        assert close(task, found.get((i, j + 1), task))
+        assert are_close(task, found.get((i + 1, j), task))
+        assert are_close(task, found.get((i, j + 1), task))
 
 
 def test_angles_may_be_given_instead_of_points(tmp_path: Path) -> None:

@@ -9,12 +9,13 @@ import time
 
 from flex_planner.arms.arm_files import load_arm
 from flex_planner.base.progress import Monitor
-from flex_planner.maps.axes import Axis
+from flex_planner.maps.axes import Axis, Block
 from flex_planner.maps.block_solver import blocks, solve_block
 from flex_planner.maps.cell_results import CellCode, CellResult
 from flex_planner.maps.end_points import End
-from flex_planner.maps.store import Block, cells, MapStore
-from flex_planner.maps.study import load_study, Quantity, Study
+from flex_planner.maps.quantities import Quantity
+from flex_planner.maps.store import cells, MapStore
+from flex_planner.maps.study import load_study, Study
 import numpy as np
 
 SUPPORT = Path(__file__).parent

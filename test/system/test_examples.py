@@ -37,7 +37,7 @@ EXPECTED = {
 
 @pytest.fixture(scope='module', autouse=True)
 def planner(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Planner]:
-    """SearchStart a planner, which takes its time while scripts run that need none."""
+    """Start a planner, which takes its time while scripts run that need none."""
     folder = tmp_path_factory.mktemp('examples')
     with Planner(folder, 'korayem_ei50', effort_weights=[0.125, 0.125]) as planner:
         yield planner

@@ -102,7 +102,7 @@ def begun(notes: Path) -> Counter[str]:
 
 
 def left(store: MapStore) -> list[tuple[slice, ...]]:
-    return [block for block in blocks(small_study()) if not store.complete(block)]
+    return [block for block in blocks(small_study()) if not store.is_complete(block)]
 
 
 def assert_right(store: MapStore, failed: int = 0) -> None:

@@ -9,8 +9,8 @@ import sys
 from flex_planner.base.progress import Monitor
 from flex_planner.cli.options import Commands, numbers
 from flex_planner.cli.outputs import check_folder
-from flex_planner.cli.progress_line import watched
-from flex_planner.cli.request import add_task, named_as_options, Request
+from flex_planner.cli.progress_line import run_with_progress
+from flex_planner.cli.request import add_task, Request, translate_errors
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.reports.comparison import comparison_rows, comparison_table
 from flex_planner.reports.motion import table
@@ -58,18 +58,18 @@ def _compare(options: argparse.Namespace) -> int:
         check_folder(options.output)
 
     def work(model: ArmModel, monitor: Monitor) -> Comparison:
-        with named_as_options():
+        with translate_errors():
             return compare(
                 request.task, model=model, monitor=monitor, mismatch=_mismatch(options),
                 payload_mass=options.plant_payload, rate=options.rate,
                 settling=options.settling,
                 gains=Gains.of(request.task.arm.n_joints, options.stiffness, options.damping))
 
-    found = watched(request.task.arm, request.time_limit, work)
+    found = run_with_progress(request.task.arm, request.time_limit, work)
     print(table([('motion', f'{request} with {request.task.payload_mass:g} kg'),
                  *comparison_rows(found)]))
     print(f'\n{comparison_table(found)}\n')
-    if not options.no_plot and found.outcomes:
+    if not options.no_plot and found.results:
         from flex_planner.plotting import draw_comparison
 
         path = options.output / f'{Path(options.arm).stem}_comparison.png'

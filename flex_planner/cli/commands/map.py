@@ -46,7 +46,7 @@ def add_command(commands: Commands) -> None:
 def _map(options: argparse.Namespace) -> int:
     """Compute and draw a map, or say what is missing to do so."""
     try:
-        return _drawn(_place(options)) if options.draw else _computed(options)
+        return _draw(_place(options)) if options.draw else _compute(options)
     except ImportError as error:
         if (error.name or '').split('.')[0] not in _NEEDED:
             raise
@@ -63,7 +63,7 @@ def _place(options: argparse.Namespace) -> Path:
     return Path(output if output.suffix == _SUFFIX else output / f'{study.stem}{_SUFFIX}')
 
 
-def _drawn(path: Path) -> int:
+def _draw(path: Path) -> int:
     """Draw a map in a folder beside its store."""
     from flex_planner.maps.draw_map import draw_map
 
@@ -71,7 +71,7 @@ def _drawn(path: Path) -> int:
     return 0
 
 
-def _computed(options: argparse.Namespace) -> int:
+def _compute(options: argparse.Namespace) -> int:
     """Compute what is not there, say what came of it and draw it."""
     from flex_planner.maps.store import MapStore
     from flex_planner.maps.study import load_study
@@ -82,7 +82,7 @@ def _computed(options: argparse.Namespace) -> int:
         tally = _run(options, study, store)
         print(table([*outcome_rows(tally, store.dataset()), ('store', str(path))]))
     if not options.no_plot:
-        _drawn(path)
+        _draw(path)
     failed = tally.of(CellCode.FAILED)
     if failed:
         print(f'flex-planner: {failed} cells failed by an error of the program; the variable '

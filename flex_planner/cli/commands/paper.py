@@ -38,7 +38,7 @@ def add_command(commands: Commands) -> None:
 def _paper(options: argparse.Namespace) -> int:
     """Compute, write, and say what came of it."""
     from flex_planner.paper.document import document, summary
-    from flex_planner.paper.run import computed, STUDIES
+    from flex_planner.paper.run import compute_sections, STUDIES
 
     processes = integer('--processes', options.processes, at_least=1, at_most=256)
     keys = options.section or list(STUDIES)
@@ -53,7 +53,7 @@ def _paper(options: argparse.Namespace) -> int:
     page, pictures = options.output / _PAGE, options.output / _PICTURES
     try:
         with interruptible() as canceled:
-            sections = list(computed(
+            sections = list(compute_sections(
                 keys, reduced=options.reduced, processes=processes, canceled=canceled,
                 pictures=None if options.no_plot else pictures,
                 report=lambda key, done, count: display.begin(

@@ -10,8 +10,8 @@ from flex_planner.base.progress import Monitor
 from flex_planner.capacity.max_payload import find_max_payload, MaxPayload, PayloadMethod
 from flex_planner.cli.options import Commands
 from flex_planner.cli.outputs import add_outputs, Outputs
-from flex_planner.cli.progress_line import watched
-from flex_planner.cli.request import add_objectives, add_task, named_as_options, Request
+from flex_planner.cli.progress_line import run_with_progress
+from flex_planner.cli.request import add_objectives, add_task, Request, translate_errors
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.planning.plan import Peaks, peaks, Plan, PlanStatus
 from flex_planner.planning.plan_path import plan_path
@@ -65,8 +65,8 @@ def _plan(options: argparse.Namespace) -> int:
         return plan_path(request.task, model=model, monitor=monitor,
                          objectives=request.objectives)
 
-    plan = watched(request.task.arm, request.time_limit, work)
-    reference, most = _sampled(request, plan)
+    plan = run_with_progress(request.task.arm, request.time_limit, work)
+    reference, most = _sample(request, plan)
     _tell(request, f'with {request.task.payload_mass:g} kg', plan_rows(plan, most))
     if text := weights_table(plan):
         print(f'\n{text}\n')
@@ -82,13 +82,13 @@ def _payload(options: argparse.Namespace) -> int:
     step = max(_STEP, accuracy) if options.step is None else options.step
 
     def work(model: ArmModel, monitor: Monitor) -> MaxPayload:
-        with named_as_options():
+        with translate_errors():
             return find_max_payload(
                 request.task, model=model, monitor=monitor, accuracy=accuracy, step=step,
                 method=PayloadMethod[options.method.upper()])
 
-    found = watched(request.task.arm, request.time_limit, work)
-    reference, most = _sampled(request, found.plan)
+    found = run_with_progress(request.task.arm, request.time_limit, work)
+    reference, most = _sample(request, found.plan)
     _tell(request, '', payload_rows(found, most))
     if text := search_table(found):
         print(f'\n{text}\n')
@@ -96,7 +96,7 @@ def _payload(options: argparse.Namespace) -> int:
     return _exit_code(request, found)
 
 
-def _sampled(request: Request, plan: Plan | None) -> tuple[SampledPlan | None, Peaks | None]:
+def _sample(request: Request, plan: Plan | None) -> tuple[SampledPlan | None, Peaks | None]:
     """Return samples of a plan and its peaks, if it has a solution."""
     if plan is None or plan.solution is None:
         return None, None

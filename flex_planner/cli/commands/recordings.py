@@ -10,7 +10,7 @@ from flex_planner.base.errors import RecordingError
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import number
 from flex_planner.cli.options import Commands
-from flex_planner.cli.progress_line import watched
+from flex_planner.cli.progress_line import run_with_progress
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.recording import (
     definition_folder,
@@ -103,7 +103,7 @@ def _replay(options: argparse.Namespace) -> int:
 def _report(options: argparse.Namespace) -> int:
     """Make a page of a recording; check its plan if that is wanted."""
     request = RecordedRequest.read(options.recording)
-    check = _checked(request) if options.check else None
+    check = _check(request) if options.check else None
     output = options.output or Path(
         f'{options.recording.resolve().name.removesuffix(".mcap")}.html')
     write_report(output, request, check)
@@ -113,7 +113,7 @@ def _report(options: argparse.Namespace) -> int:
     return 0 if check is None or check.passed else 1
 
 
-def _checked(request: RecordedRequest) -> MotionCheck:
+def _check(request: RecordedRequest) -> MotionCheck:
     """Check the motion of a recording."""
     if request.motion is None:
         raise RecordingError(f'{request.path} holds no motion to check: '
@@ -122,7 +122,7 @@ def _checked(request: RecordedRequest) -> MotionCheck:
     def work(model: ArmModel, monitor: Monitor) -> MotionCheck:
         return check_motion(request, model, monitor)
 
-    return watched(request.arm, _MOST_SECONDS, work)
+    return run_with_progress(request.arm, _MOST_SECONDS, work)
 
 
 def _recover(options: argparse.Namespace) -> int:

@@ -114,7 +114,7 @@ class MapData:
         found = {axis.name: place for place, axis in enumerate(self.axes)}
         return tuple(found[name] for name in names if name in found)
 
-    def varied(self) -> list[int]:
+    def varied_axes(self) -> list[int]:
         """Return the numbers of the axes with more than one value."""
         return [place for place, axis in enumerate(self.axes) if axis.values.size > 1]
 

@@ -62,7 +62,7 @@ class Scene:
     best: Array | None
     given_name: str
 
-    def drawn(self, posture: Array) -> Array:
+    def joint_points(self, posture: Array) -> Array:
         """Return the ends of the unbent links in a posture, shape (n + 1, 2) [m]."""
         bent = np.concatenate([posture, np.zeros(self.arm.n_modes)])
         points = link_points(self.arm, bent)
@@ -71,7 +71,7 @@ class Scene:
     @property
     def lines(self) -> list[Array]:
         """Return the arm in all postures that are drawn."""
-        return [self.drawn(posture) for posture in (self.given, self.best)
+        return [self.joint_points(posture) for posture in (self.given, self.best)
                 if posture is not None]
 
 
@@ -174,7 +174,8 @@ def frame(axes: Axes, x: MapAxis, y: MapAxis, scene: Scene | None) -> None:
 def _posture(axes: Axes, scene: Scene, posture: Array, marker: str, label: str,
              alpha: float) -> Artist:
     """Draw the arm in a posture, its tip marked; return an entry of a legend."""
-    points, halo = scene.drawn(posture), [withStroke(linewidth=6, foreground='white', alpha=alpha)]
+    points = scene.joint_points(posture)
+    halo = [withStroke(linewidth=6, foreground='white', alpha=alpha)]
     color = (*to_rgb(_ARM), alpha)
     axes.plot(*points.T, color=color, linewidth=3, path_effects=halo, zorder=4,
               solid_joinstyle='round')

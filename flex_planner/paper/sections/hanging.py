@@ -8,7 +8,7 @@ from flex_planner.arms.arm_files import load_arm
 from flex_planner.base.validation import Array
 from flex_planner.optimal_control.arm_model import ArmModel, Parameters
 from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectSettings
-from flex_planner.paper.evidence import Claim, confirmed_if, Section, Table
+from flex_planner.paper.evidence import Claim, judge, Section, Table
 from flex_planner.plotting.diagrams import Curve, Panel, Picture
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -58,7 +58,7 @@ def study(*, reduced: bool = False) -> Section:
     away = {rigidity: np.abs(one.states[:, :2] - rigid.states[:, :2]).max(axis=0)
             for rigidity, one in swings.items()}
     range_ = np.ptp(rigid.states[:, :2], axis=0)
-    torque, gap = _repeated(model)
+    torque, gap = _repeat_by_ipopt(model)
     values = {f'hanging_deviation_{rigidity:g}_joint_{joint + 1}': float(one[joint])
               for rigidity, one in away.items() for joint in range(2)}
     values |= {'hanging_ipopt_torque': torque, 'hanging_ipopt_gap': gap,
@@ -78,11 +78,11 @@ def study(*, reduced: bool = False) -> Section:
             + f'. IPOPT, asked for the motion of least effort between two states of the swing '
             f'{_CHECKED:g} s apart, finds the swing: torques below {max(torque, 1e-12):.0e} N m, '
             f'joints within {gap:.0e} rad.',
-            verdict=confirmed_if(share < _SMALL)),),
+            verdict=judge(share < _SMALL)),),
         pictures=(_picture(rigid, swings),), values=values)
 
 
-def _repeated(model: ArmModel) -> tuple[float, float]:
+def _repeat_by_ipopt(model: ArmModel) -> tuple[float, float]:
     """
     Return the torque and the error of the joints of a swing that IPOPT was to repeat.
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from flex_planner.paper.cases import certified, turn, turning_arm
-from flex_planner.paper.checks import checked, shown
+from flex_planner.paper.cases import plan_certified, turn, turning_arm
+from flex_planner.paper.checks import format_value, solve_by_ipopt
 from flex_planner.paper.diagrams import joint_panels, POINTS, runs_on_limit
 from flex_planner.paper.evidence import Claim, Section, Table, Verdict
 from flex_planner.planning.plan import peaks, Plan, Samples
@@ -24,14 +24,14 @@ TAKEN = next(iter(READINGS))
 def study(*, reduced: bool = False) -> Section:
     """Return what came of section 5.4."""
     names = list(READINGS)[:1] if reduced else list(READINGS)
-    plans = {name: certified(turn(turning_arm(READINGS[name]))) for name in names}
+    plans = {name: plan_certified(turn(turning_arm(READINGS[name]))) for name in names}
     samples = {name: plan.uniform_samples(POINTS) for name, plan in plans.items()}
-    checks = {name: checked(plan, 80) for name, plan in plans.items()
+    checks = {name: solve_by_ipopt(plan, 80) for name, plan in plans.items()
               if name in (TAKEN, names[-1])}
     values = {f'turn_cost_{k}': plan.cost for k, plan in enumerate(plans.values())}
     values |= {f'turn_peak_joint_{j + 1}': float(peaks(plans[TAKEN], samples[TAKEN]).speeds[j])
                for j in range(2)}
-    independent = {name: shown(check, check.cost) for name, check in checks.items()}
+    independent = {name: format_value(check, check.cost) for name, check in checks.items()}
     return Section(
         key='5.4', title='Minimum effort',
         text='The arm of Table VI, one pinned-pinned mode a link, turns from (0, 180) deg to '

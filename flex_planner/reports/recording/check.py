@@ -152,7 +152,8 @@ def check_motion(request: RecordedRequest, model: ArmModel | None = None,
     return MotionCheck(tip=tip, findings=(
         *_resimulation(request, motion, states[-1] - ends[1], tip, limits),
         _joint_path(motion, states, request.arm.n_joints, limits),
-        *_ends(motion, ends, limits), *_asked(request, motion, limits),
+        *_deviation_from_rest(motion, ends, limits),
+        *_deviation_from_request(request, motion, limits),
         *_optimality(model, motion, parameters, limits)))
 
 
@@ -221,7 +222,8 @@ def _joint_path(motion: RecordedMotion, states: Array, n: int, limits: CheckLimi
                    value=float(np.max(shares)))
 
 
-def _ends(motion: RecordedMotion, ends: list[Array], limits: CheckLimits) -> list[Finding]:
+def _deviation_from_rest(motion: RecordedMotion, ends: list[Array],
+                         limits: CheckLimits) -> list[Finding]:
     """Return how far the first and the last sample are from rest."""
     samples = np.hstack([motion.coordinates, motion.rates])[[0, -1]]
     return [Finding(name=f'{name} from rest', unit='', limit=limits.end_error,
@@ -229,8 +231,8 @@ def _ends(motion: RecordedMotion, ends: list[Array], limits: CheckLimits) -> lis
             for name, sample, end in zip(('start', 'goal'), samples, ends, strict=True)]
 
 
-def _asked(request: RecordedRequest, motion: RecordedMotion,
-           limits: CheckLimits) -> list[Finding]:
+def _deviation_from_request(request: RecordedRequest, motion: RecordedMotion,
+                            limits: CheckLimits) -> list[Finding]:
     """Return how far both ends are from what was asked: joint angles, or the tip unbent."""
     task, n = request.task, request.arm.n_joints
     joints = motion.coordinates[[0, -1], :n]

@@ -197,12 +197,12 @@ def _search_plots(search: Any) -> list[Plot]:
             found.append(Plot(key=key, title=title, x_label='payload [kg]', y_label=unit,
                               series=[line, dots], group='payload'))
     if len(search.tried_payloads):
-        found.append(_tried(np.asarray(search.tried_payloads, dtype=float),
-                            np.asarray(search.tried_solved, dtype=bool)))
+        found.append(_trials(np.asarray(search.tried_payloads, dtype=float),
+                             np.asarray(search.tried_solved, dtype=bool)))
     return found
 
 
-def _tried(payloads: Array, carried: NDArray[np.bool_]) -> Plot:
+def _trials(payloads: Array, carried: NDArray[np.bool_]) -> Plot:
     """Return the payloads in the order they were tried."""
     numbers: Array = np.arange(1, payloads.size + 1).astype(np.float64)
     return Plot(key='trials', title='Payloads tried', x_label='trial', y_label='payload [kg]',

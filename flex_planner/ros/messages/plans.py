@@ -199,8 +199,8 @@ def flexible_trajectory(plan: Plan, reference: SampledPlan, joints: JointTraject
     return message
 
 
-def reported_trajectory(report: PlanReport, plan: Plan, reference: SampledPlan,
-                        settings: PlannerSettings) -> FlexibleTrajectory:
+def report_trajectory(report: PlanReport, plan: Plan, reference: SampledPlan,
+                      settings: PlannerSettings) -> FlexibleTrajectory:
     """Return the trajectory of a sampled plan, and add to its report what the samples show."""
     add_reference(report, plan, reference)
     joints = joint_trajectory(reference, settings.joint_names)

@@ -35,7 +35,7 @@ class Starts:
     """
 
     def __init__(self, store: str, arm: Arm) -> None:
-        self._map = _loaded(store, arm) if store else None
+        self._map = _load_map(store, arm) if store else None
 
     def __len__(self) -> int:
         """Return the number of motions."""
@@ -52,7 +52,7 @@ class Starts:
             return None
 
 
-def _loaded(store: str, arm: Arm) -> MapStarts:
+def _load_map(store: str, arm: Arm) -> MapStarts:
     try:
         from flex_planner.maps.map_starts import MapStarts
     except ImportError as error:

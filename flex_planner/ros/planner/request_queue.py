@@ -6,7 +6,12 @@ from collections.abc import Callable
 from functools import partial
 import threading
 
-from flex_planner.ros.planner.request_planner import busy, canceled, Outcome, unknown_failure
+from flex_planner.ros.planner.request_planner import (
+    busy_outcome,
+    canceled_outcome,
+    Outcome,
+    unknown_failure,
+)
 from flex_planner.ros.planner.request_state import RequestState
 from flex_planner.ros.planner.worker import Job, Worker
 from flex_planner.ros.settings.planner import PlannerSettings
@@ -22,15 +27,15 @@ class PendingRequest:
 
     Parameters
     ----------
-    ticket : RequestState
+    state : RequestState
         Of the request.
     executor : Executor
         Runs what awaits `future`.
 
     """
 
-    def __init__(self, ticket: RequestState, executor: Executor) -> None:
-        self.ticket, self.future = ticket, Future(executor=executor)
+    def __init__(self, state: RequestState, executor: Executor) -> None:
+        self.state, self.future = state, Future(executor=executor)
         self.job: Job | None = None
         self._executor, self._lock = executor, threading.Lock()
 
@@ -69,7 +74,7 @@ class RequestQueue:
     def active(self) -> RequestState | None:
         """Return what is at work, None if nothing is."""
         active = self._active
-        return active.ticket if active else None
+        return active.state if active else None
 
     def submit(self, work: Work, settings: PlannerSettings, executor: Executor) -> PendingRequest:
         """
@@ -85,11 +90,11 @@ class RequestQueue:
             Runs what awaits the outcome.
 
         """
-        ticket = RequestState(settings=settings, stopping=lambda: self._worker.stopping)
-        pending = PendingRequest(ticket, executor)
+        state = RequestState(settings=settings, stopping=lambda: self._worker.stopping)
+        pending = PendingRequest(state, executor)
         pending.job = partial(self._serve, work, pending)
         if not self._worker.submit(pending.job):
-            pending.conclude(busy(self._queue_length))
+            pending.conclude(busy_outcome(self._queue_length))
         return pending
 
     def withdraw(self, pending: PendingRequest) -> None:
@@ -99,10 +104,10 @@ class RequestQueue:
         A solver that works on it gives up at its next iteration.
 
         """
-        pending.ticket.withdrawn = True
+        pending.state.withdrawn = True
         if pending.job is not None:
             self._worker.withdraw(pending.job)
-        pending.conclude(canceled(pending.ticket))
+        pending.conclude(canceled_outcome(pending.state))
 
     def close(self, timeout: float) -> bool:
         """Take no more, tell the one at work to give up, and return whether it did [s]."""
@@ -111,7 +116,7 @@ class RequestQueue:
     def _serve(self, work: Work, pending: PendingRequest) -> None:
         self._active = pending
         try:
-            outcome = work(pending.ticket)
+            outcome = work(pending.state)
         except Exception as error:
             outcome = unknown_failure(error)
         finally:

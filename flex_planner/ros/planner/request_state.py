@@ -52,7 +52,7 @@ class RequestState:
         """Time since it was accepted [ns]."""
         return time.monotonic_ns() - self.accepted_ns
 
-    def canceled(self) -> bool:
+    def is_canceled(self) -> bool:
         """Return whether to give up."""
         return self.withdrawn or self.stopping()
 

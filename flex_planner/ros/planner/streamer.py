@@ -32,7 +32,7 @@ class Streamer:
 
     def __init__(self, node: Node) -> None:
         self._node = node
-        self._process = self._started()
+        self._process = self._start_process()
 
     def wait_until_ready(self) -> None:
         """Wait for the process to be there; it says one word, or ends."""
@@ -76,7 +76,7 @@ class Streamer:
         self._node.get_logger().warning(
             'the process that streams ~/reference_states is gone: it is started again')
         self.close()
-        self._process = self._started()
+        self._process = self._start_process()
         self._write(data)
 
     def _write(self, data: bytes) -> None:
@@ -84,7 +84,7 @@ class Streamer:
             self._process.stdin.write(data)
             self._process.stdin.flush()
 
-    def _started(self) -> subprocess.Popen[bytes]:
+    def _start_process(self) -> subprocess.Popen[bytes]:
         node, topic = self._node, self._node.resolve_topic_name('~/reference_states')
         return subprocess.Popen(
             [sys.executable, '-m', 'flex_planner.ros.reference_states',

@@ -12,7 +12,7 @@ from flex_planner.base.validation import vector
 from flex_planner.collocation import SolverSettings
 from flex_planner.optimal_control.task import MAX_PAYLOAD
 from flex_planner.planning.sampling import SamplingSettings
-from flex_planner.ros.runtime.parameters import described
+from flex_planner.ros.runtime.parameters import parameter_field
 
 # of the largest payload [kg]
 MIN_ACCURACY, MAX_ACCURACY = 1e-6, 1e3
@@ -32,55 +32,55 @@ class PlannerSettings:
 
     """
 
-    elbow: int = described(
+    elbow: int = parameter_field(
         -1, 'Sign of the second joint angle, +1 or -1, where a request leaves elbow at 0.',
         lowest=-1, highest=1)
-    tolerance: float = described(
+    tolerance: float = parameter_field(
         1e-3, 'eps of eq. (17): largest half squared error of the final state.',
         lowest=1e-9, highest=1.0)
-    allowed_planning_time: float = described(
+    allowed_planning_time: float = parameter_field(
         30.0, 'Time limit of a request that sets none [s].', lowest=1e-3, highest=3600.0)
-    effort_weights: list[float] = described(
+    effort_weights: list[float] = parameter_field(
         [1.0], 'Diagonal of R where a request gives none: one entry a joint.')
-    payload_accuracy: float = described(
+    payload_accuracy: float = parameter_field(
         1e-3, 'Largest error of a maximum payload where a request gives none [kg].',
         lowest=MIN_ACCURACY, highest=MAX_ACCURACY)
-    payload_step: float = described(
+    payload_step: float = parameter_field(
         1.0, 'First step of the incremental search for it where a request gives none; where that '
         'is less than the accuracy, the accuracy counts [kg].',
         lowest=MIN_ACCURACY, highest=MAX_PAYLOAD)
-    joint_names: list[str] = described(
+    joint_names: list[str] = parameter_field(
         ['joint1'], 'Names of the joints in trajectories, from the base outwards.',
         read_only=True)
-    base_frame: str = described('base_link', 'Frame of tip paths.', read_only=True)
-    stages: int = described(
+    base_frame: str = parameter_field('base_link', 'Frame of tip paths.', read_only=True)
+    stages: int = parameter_field(
         8, 'Gauss points in a mesh interval; the order is twice that.', lowest=2, highest=11)
-    intervals: int = described(20, 'Intervals of the first mesh.', lowest=4, highest=20000)
-    max_intervals: int = described(
+    intervals: int = parameter_field(20, 'Intervals of the first mesh.', lowest=4, highest=20000)
+    max_intervals: int = parameter_field(
         2000, 'Most intervals of a mesh.', lowest=4, highest=20000)
-    max_iterations: int = described(
+    max_iterations: int = parameter_field(
         60, 'Newton iterations on one mesh.', lowest=1, highest=1000)
-    error_tolerance: float = described(
+    error_tolerance: float = parameter_field(
         1e-6, 'Largest estimated error of states and costates relative to their magnitude.',
         lowest=1e-11, highest=1.0)
-    sampling_step: float = described(
+    sampling_step: float = parameter_field(
         0.01, 'Longest time between published samples [s].', lowest=2.5e-4, highest=1.0)
-    torque_tolerance: float = described(
+    torque_tolerance: float = parameter_field(
         0.02, 'Samples get closer until linear interpolation of the torque is this exact [N m].',
         lowest=1e-6, highest=1e6)
-    reference_rate: float = described(
+    reference_rate: float = parameter_field(
         100.0, 'States a second that are streamed along a published plan [Hz].', lowest=1.0,
         highest=1000.0)
-    map_store: str = described(
+    map_store: str = parameter_field(
         '', 'Store of a map of this arm that flex-planner map has made: requests near one of its '
         'cells start from the motion there. Empty for none.', read_only=True)
-    queue_length: int = described(
+    queue_length: int = parameter_field(
         8, 'Requests that may wait; more are answered BUSY.', lowest=1, highest=1000,
         read_only=True)
-    recording_folder: str = described(
+    recording_folder: str = parameter_field(
         '', 'Folder of the recordings; empty for $ROS_HOME/flex_planner.', read_only=True)
-    record: bool = described(True, 'Whether to record every request with its outcome.')
-    max_recording_size: int = described(
+    record: bool = parameter_field(True, 'Whether to record every request with its outcome.')
+    max_recording_size: int = parameter_field(
         0, 'Size from which on a recording continues in another file, at least 65536 [bytes]; 0: '
         'recordings are never split.', lowest=0, highest=MAX_RECORDING_SIZE)
 
