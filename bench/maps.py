@@ -1,5 +1,5 @@
 """
-Capacity maps: cells a second on one and on two processes, from neighbours and from nothing.
+Capacity maps: cells per second in one and in two processes, from neighbours and cold.
 
 Run by ``tools/run python -m bench.maps``, on an idle machine; takes ten minutes.
 
@@ -37,7 +37,7 @@ _MEGABYTE = 1024  # in the unit of ru_maxrss
 
 
 def study(arm: str) -> Study:
-    """Return the middle of the workspace, where every cell is solved; one mode a link if any."""
+    """Return the middle of the workspace, where every cell is solved; one mode per link if any."""
     side = SIDES[arm]
     axes = (Axis(name='goal_x', values=np.linspace(0.2, 0.6, side, dtype=np.float64)),
             Axis(name='goal_y', values=np.linspace(0.3, 0.7, side, dtype=np.float64)))
@@ -58,7 +58,7 @@ def rate(one: Study, workers: int) -> float:
 
 
 def costs(one: Study) -> dict[str, float]:
-    """Return what a cell costs in its block and on its own [s], and the memory it takes [MB]."""
+    """Return the time of a cell in its block and on its own [s], and the memory it takes [MB]."""
     with one_thread_each(), ProcessPoolExecutor(1, multiprocessing.get_context('spawn')) as pool:
         return pool.submit(_costs, one).result()
 
@@ -90,8 +90,8 @@ def rows(arm: str) -> list[tuple[str, str]]:
     gain = statistics.median(two / one for one, two in rates)
     found = costs(one)
     return [(f'{one.arm.name}', f'{side} x {side} cells in blocks of {BLOCK} x {BLOCK}'),
-            ('  cells a second, 1 process', f'{single:.1f}'),
-            ('  cells a second, 2 processes', f'{double:.1f}'),
+            ('  cells per second, 1 process', f'{single:.1f}'),
+            ('  cells per second, 2 processes', f'{double:.1f}'),
             ('  gain, median of the runs', f'{gain:.2f}'),
             ('  a cell in its block, mean', f'{found["whole block"]:.3f} s'),
             ('  a cell from neighbors, median', f'{found["from neighbors"]:.3f} s'),

@@ -124,7 +124,7 @@ def _rival(arm: str, problem: MotionProblem, limit: float, name: str, accuracy: 
 
 
 def _tip_error(problem: MotionProblem, settings: DirectSettings, found: DirectResult) -> float:
-    """Return how far IPOPT's torque, as its scheme interpolates it, leads past the goal."""
+    """Return the miss at the goal under IPOPT's torque, interpolated as by its scheme."""
     mesh = Mesh.of(settings.scheme, settings.degree, settings.intervals)
     breaks = np.linspace(0, problem.task.duration, settings.intervals + 1, dtype=np.float64)
     points = mesh.points * settings.intervals

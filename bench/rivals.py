@@ -196,7 +196,7 @@ def warm_boundary_value_run(problem: MotionProblem, tolerance: float,
 
 def _boundary_value_solution(problem: MotionProblem, tolerance: float, monitor: Monitor,
                              first: Any) -> Any:
-    """Return what solve_bvp returns; its arrays hold a point a column."""
+    """Return the result of solve_bvp; its arrays have one column per point."""
     half, rows = problem.size // 2, np.eye(problem.size // 2, problem.size)
     none = np.zeros_like(rows)
     jacobians = np.vstack([rows, none]), np.vstack([none, rows])

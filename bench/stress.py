@@ -65,7 +65,7 @@ class Client:
         return self.wait(self._goals.send_goal_async(action.PlanPath.Goal(task=task(**fields))))
 
     def latency(self) -> float:
-        """Return how long a parameter takes to read [ms]."""
+        """Return the time to read a parameter [ms]."""
         began = time.monotonic()
         self.wait(self._parameters.call_async(GetParameters.Request(names=['tolerance'])))
         return (time.monotonic() - began) * 1e3

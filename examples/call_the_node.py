@@ -67,7 +67,7 @@ def call_action(node: Node) -> None:
 
 
 def wait_for(node: Node, future: Any) -> Any:
-    """Return what a future holds once it is there."""
+    """Wait for a future and return its result."""
     rclpy.spin_until_future_complete(node, future)
     return future.result()
 

@@ -67,7 +67,7 @@ class Controller(Node):
         self.done = list(now.position[:n]) == list(plan.points[-1].positions)
 
     def summary(self) -> str:
-        """Return how the motion went."""
+        """Return the largest errors of the motion."""
         return f'followed: at most {max(self._errors):.4f} rad off, PD {max(self._shares):.2f} N m'
 
 

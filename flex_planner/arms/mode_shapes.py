@@ -40,7 +40,7 @@ class LinkModes:
     stiffness : numpy.ndarray, shape (n_modes, n_modes)
         Integral of phi'' phi''^T [1/m^3]; the flexural rigidity multiplies it.
     tip_deflection, tip_slope : numpy.ndarray, shape (n_modes,)
-        What a unit of each mode displaces and turns the frame of the next link by,
+        Displacement and turn of the frame of the next link per unit of each mode,
         [m/m] and [rad/m].
 
     """

@@ -1,4 +1,4 @@
-"""Pictures and recordings of what a command found."""
+"""Pictures and recordings of a command's results."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class Outputs:
                    recorder=_recorder(request, options.output) if records else None)
 
     def write_plan(self, plan: Plan, reference: SampledPlan | None) -> Iterator[Row]:
-        """Write what came of a plan; yield names and paths, one by one as they are written."""
+        """Write pictures and recording of a plan; yield names and paths as they are written."""
         if self.draws and plan.solved:
             yield self._draw_motion(plan)
         if self.recorder is not None:
@@ -74,7 +74,7 @@ class Outputs:
 
     def write_search(self, found: MaxPayload, accuracy: float, step: float,
                      reference: SampledPlan | None) -> Iterator[Row]:
-        """Write what came of a search, see `write_plan`."""
+        """Write pictures and recording of a search, see `write_plan`."""
         solved = found.plan if found.plan is not None and found.plan.solved else None
         if self.draws and (solved or found.front.payloads.size or found.trials):
             from flex_planner.plotting import draw_max_payload
@@ -119,7 +119,7 @@ def check_folder(folder: Path) -> None:
 
 
 def _recorder(request: Request, folder: Path) -> RequestRecorder | None:
-    """Return what records the outcome, or None where ROS 2 is missing, which is told."""
+    """Return the recorder, or None, with a message, where ROS 2 is missing."""
     try:
         from flex_planner.cli.recorder import RequestRecorder
 

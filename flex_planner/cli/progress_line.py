@@ -79,7 +79,7 @@ class Display:
 
 @contextmanager
 def interruptible() -> Iterator[Callable[[], bool]]:
-    """Provide what tells whether Ctrl-C was pressed; pressed again, it interrupts at once."""
+    """Provide a function that says whether Ctrl-C was pressed; a second time it interrupts."""
     pressed = Event()
 
     def on_interrupt(number: int, frame: FrameType | None) -> None:

@@ -36,7 +36,7 @@ _NODE = '/flex_planner'  # so that the topics are those of the node
 
 class RequestRecorder:
     """
-    Records what came of a request, as the node would.
+    Records a request and its outcome, as the node would.
 
     Parameters
     ----------

@@ -33,7 +33,7 @@ _RENAMED = {**_POINTS, 'payload_mass': '--payload'}
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Request:
     """
-    What a command was asked for.
+    The request of a command line.
 
     Attributes
     ----------
@@ -84,7 +84,7 @@ class Request:
 
     @property
     def sampling(self) -> SamplingSettings:
-        """Return how a plan is sampled: closely, but not more often than is allowed."""
+        """Return the settings of the sampling: close, within the largest number of samples."""
         closest = SamplingSettings()
         return replace(closest, longest_step=max(closest.longest_step,
                                                  self.task.duration / (MAX_SAMPLES - 1)))

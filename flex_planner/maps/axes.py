@@ -109,7 +109,7 @@ class Axis:
 
     @property
     def title(self) -> str:
-        """Return what it is in words."""
+        """Return the axis in words."""
         return AXES[self.name].title
 
 

@@ -32,7 +32,7 @@ _LONGEST_MESSAGE = 300
 
 
 class Neighbours(NamedTuple):
-    """What a cell starts from: two cells on a line with it, the nearer one first; or fewer."""
+    """Up to two cells that a cell starts from, on a line with it, the nearer one first."""
 
     near: CellSolution | None = None
     far: CellSolution | None = None
@@ -48,7 +48,7 @@ def blocks(study: Study) -> list[Block]:
 
 def solve_block(study: Study, block: Block, monitor: Monitor | None = None) -> list[CellResult]:
     """
-    Return what became of every cell of a block, in the order of their indices.
+    Return the results of all cells of a block, in the order of their indices.
 
     A cell that fails is a result with a code, whatever happened.
 
@@ -66,7 +66,7 @@ def solve_block(study: Study, block: Block, monitor: Monitor | None = None) -> l
 
 
 class _BlockRun:
-    """A block on its way: what was found so far, and what each cell started from."""
+    """The solutions of a block so far, and the neighbours that each cell started from."""
 
     def __init__(self, study: Study, block: Block, monitor: Monitor | None) -> None:
         self._study, self._monitor, self._solver = study, monitor, CellSolver(study)
@@ -76,7 +76,7 @@ class _BlockRun:
         self._starts: dict[Index, Neighbours] = {}
 
     def results(self) -> list[CellResult]:
-        """Return what became of the cells."""
+        """Return the results of the cells."""
         for index in self._cells:
             if index not in self._results:
                 self._results[index] = self._add(index)
@@ -97,7 +97,7 @@ class _BlockRun:
                                        seconds=first.seconds + second.seconds)
 
     def _add(self, index: Index) -> CellResult:
-        """Return what became of a cell, and keep its motion for the neighbours."""
+        """Return the result of a cell, and keep its motion for the neighbours."""
         began, limited = time.monotonic(), Monitor(time_limit=self._study.cell_time_limit)
         if self._monitor is not None:
             limited.canceled = self._monitor.canceled
@@ -148,6 +148,6 @@ def _neighbours(study: Study, index: Index, task: Task,
 
 def _cell_before(index: Index, axis: int, back: int, task: Task,
                  done: dict[Index, CellSolution]) -> CellSolution | None:
-    """Return what was found so many cells before one, unless the arm turns the other way."""
+    """Return the solution some cells before one, unless the arm turns the other way round."""
     found = done.get((*index[:axis], index[axis] - back, *index[axis + 1:]))
     return found if found is not None and are_close(task_of(found), task) else None

@@ -64,7 +64,7 @@ class CellSolver:
     def solve(self, index: tuple[int, ...], task: Task, monitor: Monitor, near: Any, far: Any,
               ratio: float) -> CellSolution:
         """
-        Return what was found for the task of a cell, from what was found for neighbours.
+        Return the solution of the task of a cell, starting from those of neighbours.
 
         Raises
         ------
@@ -134,7 +134,7 @@ class CellSolver:
         return Vibration(plan=plan, peak_to_peak=executed.residual.tip)
 
     def result(self, index: tuple[int, ...], found: CellSolution) -> CellResult:
-        """Return what was found as a result."""
+        """Return the result of a cell from its solution."""
         if isinstance(found, MinDuration) and self._study.quantity is Quantity.MAX_PAYLOAD:
             return _late_result(index, found)
         plan = _plan_of(found)
@@ -161,7 +161,7 @@ def _settings(problem: MotionProblem) -> SolverSettings:
 
 def _may_carry_nothing(problem: MotionProblem, settings: SolverSettings, near: MaxPayload | None,
                        far: MaxPayload | None, ratio: float, monitor: Monitor) -> bool:
-    """Return whether neighbours, or a first trial, let expect that nothing can be carried."""
+    """Return whether neighbours, or a first trial, suggest that nothing can be carried."""
     if near is None:
         return not first_motion(problem, on_the_way(settings), monitor).converged
     slope = near.payload - far.payload if far is not None else -near.payload / 2
@@ -169,7 +169,7 @@ def _may_carry_nothing(problem: MotionProblem, settings: SolverSettings, near: M
 
 
 def _motion_to_keep(found: CellSolution, plan: Plan) -> KeptMotion | None:
-    """Return what others may start from: near a limit, the last motion but one on the mode."""
+    """Return the motion for others to start from: near a limit, the last but one of the search."""
     if isinstance(found, MaxPayload) and found.stops:
         stop = found.stops[-2:][0]
         motion = thinned(stop, on_the_way(SolverSettings()))
@@ -178,7 +178,7 @@ def _motion_to_keep(found: CellSolution, plan: Plan) -> KeptMotion | None:
 
 
 def _late_result(index: tuple[int, ...], found: MinDuration) -> CellResult:
-    """Return that a motion takes longer than it may."""
+    """Return the result of a cell whose motion takes longer than it may."""
     task = found.task
     return CellResult(index=index, code=CellCode.INFEASIBLE, iterations=found.iterations, message=(
         f'the motion takes at least {found.lower:.4g} s with {task.payload_mass:g} kg, and '
@@ -186,19 +186,19 @@ def _late_result(index: tuple[int, ...], found: MinDuration) -> CellResult:
 
 
 def task_of(found: CellSolution) -> Task:
-    """Return the task of what was found."""
+    """Return the task of a solution."""
     return found.plan.task if isinstance(found, Vibration) else found.task
 
 
 def _plan_of(found: CellSolution | None) -> Plan | None:
-    """Return the plan of what was found."""
+    """Return the plan of a solution."""
     if found is None or isinstance(found, Plan):
         return found
     return found.plan
 
 
 def _value(found: CellSolution) -> tuple[float, float]:
-    """Return the quantity, and how far it is at most."""
+    """Return the quantity, and the bound of its true value."""
     if isinstance(found, MaxPayload):
         return found.payload, found.upper
     if isinstance(found, MinDuration):

@@ -38,7 +38,7 @@ _FLAT = 0.92
 
 def draw_map(store: Path, folder: Path) -> list[Path]:
     """
-    Draw a map, as far as it is.
+    Draw a map, finished or not.
 
     Over the workspace the quantity is drawn as colours with contours and the arm, a diagram for
     each combination of further values; if one of them is the duration, also against it for some
@@ -140,7 +140,7 @@ def _map(data: MapData, plane: tuple[int, int], study: Study | None) -> Figure:
 
 
 def _extend(norm: Normalize, cuts: list[tuple[Array, NDArray[np.int8]]]) -> str:
-    """Return at which end of the colours there are values beyond them."""
+    """Return the end of the colour scale beyond which there are values."""
     below = any((values[np.isfinite(values)] < norm.vmin).any() for values, _ in cuts)
     return 'min' if below else 'neither'
 

@@ -1,4 +1,4 @@
-"""The motions of a finished map, looked up by whoever plans one like them."""
+"""The motions of a map as starts for plans and searches like them."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class MapStarts:
 
     A map of largest payloads serves searches for them, one of least effort or vibration plans.
 
-    What is in memory is one vector a cell; motions are read when they are asked for.
+    Only one vector per cell is kept in memory; motions are read on demand.
 
     Parameters
     ----------

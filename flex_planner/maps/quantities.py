@@ -1,4 +1,4 @@
-"""What a map shows, and which axes it can be drawn over."""
+"""The quantities that a map can show, and the axes that suit each of them."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def check_axes(quantity: Quantity, arm: Arm, axes: Sequence[Axis]) -> None:
 
 
 def _no_effect(arm: Arm, name: str) -> str:
-    """Return why an axis changes nothing about an arm, or nothing."""
+    """Return the reason why an axis has no effect on an arm, or an empty text."""
     if name == 'stiffness_scale' and not arm.n_modes:
         return 'every link of the arm is rigid'
     if name == 'motor_scale' and not any(_has_limit(arm)):
@@ -103,5 +103,5 @@ def check_motors(quantity: Quantity, arm: Arm) -> None:
 
 
 def _has_limit(arm: Arm) -> list[bool]:
-    """Return which motors have a stall torque."""
+    """Return for each motor whether it has a stall torque."""
     return [math.isfinite(joint.motor.stall_torque) for joint in arm.joints]

@@ -40,13 +40,13 @@ def run_map(study: Study, store: MapStore, *, workers: int = 0, scheduler: str =
     study, store
         What is computed, and where it goes.
     workers : int
-        Processes on this machine; 0 for one a processor. Never more than blocks.
+        Processes on this machine; 0 for one per processor. Never more than blocks.
     scheduler : str
         Address of a cluster to use instead; empty for none.
     solve : callable
         What solves a block.
     begin : callable
-        Told what is being done.
+        Receives the name of each phase.
     report, canceled : callable
         As of :func:`compute`, which also says what is raised and returned.
 

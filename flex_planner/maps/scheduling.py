@@ -37,7 +37,7 @@ def compute(study: Study, store: MapStore, client: Client, left: Sequence[Block]
             solve: BlockSolver, *, report: Callable[[Tally], None] = lambda tally: None,
             canceled: Callable[[], bool] = lambda: False) -> Tally:
     """
-    Solve blocks, and write each as soon as it is there.
+    Solve blocks, and write the results of each as soon as they arrive.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def compute(study: Study, store: MapStore, client: Client, left: Sequence[Block]
     solve : callable
         ``solve_block``, or what takes its place; found by name on the workers.
     report : callable
-        Told where the run is, some times a second.
+        Receives the progress, several times per second.
     canceled : callable
         Says when to stop.
 
@@ -118,7 +118,7 @@ class _Flight:
                                'are kept, and are not computed again')
 
     def next_result(self) -> tuple[Block, Sequence[CellResult]] | None:
-        """Return a block that is done with its cells, or None if there is none for a moment."""
+        """Return a finished block with its results, or None if there is none for a moment."""
         try:
             future = self._arrived.get(timeout=_OFTEN)
         except Empty:
@@ -148,7 +148,7 @@ def _solve_on_worker(solve: BlockSolver, study: Study, block: Block) -> Sequence
 
 
 def _withdrawal_check() -> Callable[[], bool]:
-    """Return what tells whether the client has given up the task that runs here."""
+    """Return a function that says whether the client has given up the task that runs here."""
     worker = get_worker()
     key = worker.get_current_task()
 
@@ -160,7 +160,7 @@ def _withdrawal_check() -> Callable[[], bool]:
 
 
 def _outcome(future: Future, block: Block) -> Sequence[CellResult] | None:
-    """Return what became of the cells of a block; None if it is lost and solved again."""
+    """Return the results of a block's cells; None if it was lost and is solved again."""
     status = future.status  # which may change at any time, as workers die
     if status == 'cancelled':
         raise ClusterError(LOST)
@@ -185,7 +185,7 @@ def _failed_results(block: Block, error: BaseException | None) -> Sequence[CellR
 
 
 def _reason(error: BaseException | None) -> str:
-    """Return why a block failed."""
+    """Return the reason of a block's failure."""
     if isinstance(error, KilledWorker):
         return ('the processes that solved its block died, one after the other; perhaps out of '
                 'memory')

@@ -82,7 +82,7 @@ class MapStore:
     @classmethod
     def of(cls, path: Path, study: Study, *, reset: bool = False) -> MapStore:
         """
-        Return the store of a study: what is there already, or a new one.
+        Return the store of a study: the existing one, or a new one.
 
         Parameters
         ----------
@@ -91,12 +91,12 @@ class MapStore:
         study : Study
             What it is for.
         reset : bool
-            Whether to remove a map that is there, of whatever study.
+            Whether to remove an existing map, of any study.
 
         Raises
         ------
         MapStoreError
-            If something else is there.
+            If the path holds something else.
         OSError
             If it cannot be written.
 
@@ -182,7 +182,7 @@ class MapStore:
         kept['motion'][block] = motions.reshape(shape)
 
     def dataset(self) -> xr.Dataset:
-        """Return what is there, opened; read it before the next block is written."""
+        """Return the present contents, opened; read them before the next block is written."""
         return open_map(self.path)
 
     def close(self) -> None:

@@ -50,7 +50,7 @@ class Study:
     quantity : Quantity
         What is computed.
     axes : tuple of Axis
-        1 to 4, at most 10^8 cells; a cell's index has one entry an axis.
+        1 to 4, at most 10^8 cells; a cell's index has one entry per axis.
     start, goal : End
         Of every motion; NaN in a point where an axis gives it.
     duration, payload_mass, effort_weights, velocity_weights, tolerance
@@ -116,7 +116,7 @@ class Study:
         self._check_numbers()
         sides = self.block_shape or tiles(self.shape)
         if len(sides) != len(self.axes):
-            raise InvalidValueError('block', list(sides), f'{len(self.axes)} sizes, one an axis')
+            raise InvalidValueError('block', list(sides), f'{len(self.axes)} sizes, one per axis')
         object.__setattr__(self, 'block_shape', tuple(
             integer(f'block.{axis.name}', side, at_least=1, at_most=axis.values.size)
             for axis, side in zip(self.axes, sides, strict=True)))
@@ -170,7 +170,7 @@ class Study:
 
     @property
     def keeps_motions(self) -> bool:
-        """Return whether motions are kept: nothing is asked that a shortest one would start."""
+        """Return whether motions are kept: those of shortest duration start no requests."""
         return self.keep_motions and self.quantity is not Quantity.MIN_DURATION
 
     def values(self, index: tuple[int, ...]) -> dict[str, float]:
@@ -180,7 +180,7 @@ class Study:
 
     def task(self, index: tuple[int, ...]) -> Task:
         """
-        Return what is asked at a cell.
+        Return the task of a cell.
 
         The task's arm is `arm` itself unless an axis changes it, and then differs in nothing
         that is compiled: one `ArmModel` of `arm` does for all cells.
@@ -260,7 +260,7 @@ class Study:
         return sorted(found, key=lambda result: result.index)
 
     def _failure(self, index: tuple[int, ...]) -> CellResult | None:
-        """Return why there is no motion at a cell."""
+        """Return the result of a cell that has no motion, None if it may have one."""
         values = self.values(index)
         quick = self.arm.n_joints <= 2 or any(end.is_too_far(self.arm, values)
                                               for end in (self.start, self.goal))

@@ -102,7 +102,7 @@ def _end(top: YamlSection, name: str, axes: tuple[Axis, ...]) -> End:
     if {f'{name}_x', f'{name}_y'} <= {axis.name for axis in axes}:
         return End(name=name)
     if not top.has(name):
-        raise InvalidValueError(f'{name} or {angles}', None, 'given, one of them')
+        raise InvalidValueError(f'{name} or {angles}', None, 'given, exactly one of them')
     point = _numbers(name, top.take(name))
     if point.size != 2:
         raise InvalidValueError(name, point.tolist(), 'a point [x, y] in m')
@@ -129,7 +129,7 @@ def _block_shape(top: YamlSection, axes: tuple[Axis, ...]) -> tuple[int, ...]:
 
 
 def _simulated_fields(top: YamlSection, quantity: Quantity, joints: int) -> dict[str, Any]:
-    """Return what is said about the simulated arm."""
+    """Return the fields of the simulated arm."""
     if quantity is not Quantity.RESIDUAL_VIBRATION:
         for key in ('mismatch', 'gains', 'settling'):
             if top.has(key):
@@ -149,7 +149,7 @@ def _simulated_fields(top: YamlSection, quantity: Quantity, joints: int) -> dict
 
 
 def _mismatch(part: YamlSection, joints: int) -> dict[str, Any]:
-    """Return how the simulated arm and its payload differ."""
+    """Return the differences of the simulated arm and of its payload."""
     fields: dict[str, Any] = {}
     if part.has('payload_mass'):
         fields['plant_payload'] = part.number('payload_mass', at_least=0, unit='kg')
@@ -162,7 +162,7 @@ def _mismatch(part: YamlSection, joints: int) -> dict[str, Any]:
 
 
 def _per_joint(part: YamlSection, key: str, joints: int) -> Array:
-    """Return a list with an entry a joint; a number stands for all of them."""
+    """Return a list with one entry per joint; a number stands for all of them."""
     given, field = part.take(key), part.name(key)
     if not isinstance(given, list):
         return np.full(joints, number(field, given))

@@ -87,7 +87,7 @@ def find_largest(task: Task, accuracy: float = 1e-3) -> MaxPayload:
 
 
 def require_solved(found: MaxPayload) -> MaxPayload:
-    """Return a search that succeeded; NoPlanError for others."""
+    """Return a search that succeeded; raise NoPlanError for others."""
     if not found.solved:
         raise NoPlanError(f'{found.task.arm.name}, {found.task.duration:g} s: {found.message}')
     return found

@@ -15,7 +15,7 @@ _DEGREE = 6
 
 
 def solve_by_ipopt(plan: Plan, intervals: int = 30) -> DirectResult:
-    """Return what IPOPT makes of the task of a plan; it does not see the plan."""
+    """Solve the task of a plan by IPOPT, which does not see the plan."""
     problem = plan.problem
     settings = DirectSettings(degree=_DEGREE, intervals=intervals)
     return DirectProblem(problem.model, settings).solve(
@@ -23,7 +23,7 @@ def solve_by_ipopt(plan: Plan, intervals: int = 30) -> DirectResult:
 
 
 def maximize_payload(task: Task, plan: Plan, price: float, intervals: int = 30) -> DirectResult:
-    """Return what IPOPT makes of carrying as much as possible at a price, from a light load."""
+    """Maximize the payload at a price by IPOPT, starting from a light load."""
     light = replace(task, payload_mass=1.0)
     problem = MotionProblem(plan.model, light, task_parameters(light))
     settings = DirectSettings(degree=_DEGREE, intervals=intervals, free_payload=True)
@@ -37,7 +37,7 @@ def format_value(result: DirectResult, value: float, digits: int = 6) -> str:
 
 
 def swing_of(samples: Samples, joint: int) -> Array:
-    """Return how far a joint is from a straight line in time, as a share of its travel."""
+    """Return the distance of a joint from a straight line in time, as a share of its travel."""
     angle, times = samples.coordinates[:, joint], samples.times
     line = np.interp(times, times[[0, -1]], angle[[0, -1]])
     share: Array = np.abs(angle - line) / abs(angle[-1] - angle[0])

@@ -1,4 +1,4 @@
-"""What a section of the paper led to: tables, statements that were put to the test, pictures."""
+"""The evidence on a section of the paper: tables, tested statements and pictures."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from flex_planner.plotting.diagrams import Picture
 
 
 class Verdict(Enum):
-    """What became of a statement of the paper; the value is shown to people."""
+    """Verdict on a statement of the paper; the value is shown to people."""
 
     CONFIRMED = 'confirmed'
     CORRECTED = 'corrected'
@@ -18,7 +18,7 @@ class Verdict(Enum):
 
 
 def judge(holds: bool) -> Verdict:
-    """Return what became of a statement that a number decides."""
+    """Return the verdict on a statement, by whether it holds."""
     return Verdict.CONFIRMED if holds else Verdict.CORRECTED
 
 
@@ -34,7 +34,7 @@ class Claim:
     found : str
         The number that it turned into, and the reason for the verdict.
     verdict : Verdict
-        What became of it.
+        By that number.
 
     """
 
@@ -55,7 +55,7 @@ class Table:
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Section:
     """
-    What a section of the paper led to.
+    The evidence on a section of the paper.
 
     Attributes
     ----------

@@ -57,7 +57,7 @@ def compute_sections(keys: Sequence[str], *, reduced: bool, processes: int, repo
     processes : int
         How many at a time.
     report : callable
-        Told of every section that is done: its key, how many are, of how many.
+        Receives the key of each finished section, the number of finished ones, and of all.
     pictures : Path, optional
         Folder for the pictures; nothing is drawn without.
     canceled : callable

@@ -31,7 +31,7 @@ def draw_comparison(path: Path, comparison: Comparison) -> None:
     path : Path
         File to write.
     comparison : Comparison
-        With a line for each result. Above: the distance of the tip from the goal after its
+        One line per result. Above: the distance of the tip from the goal after its
         arrival, and its path there. Below: the torques.
 
     """
@@ -89,7 +89,7 @@ def _draw_paths(axes: Axes, comparison: Comparison) -> None:
 
 
 def _draw_torques(axes: Axes, comparison: Comparison, joint: int) -> None:
-    """Draw what the motor of a joint did, and what it may do at the speeds of the plan."""
+    """Draw the torques of a joint's motor, and its bounds at the speeds of the plan."""
     results = comparison.results
     for result in results:
         color, style = _STYLES[result.mode]

@@ -53,7 +53,7 @@ def draw_max_payload(path: Path, found: MaxPayload, joint_names: Sequence[str],
 
 
 def _result(found: MaxPayload) -> str:
-    """Return the outcome in a line."""
+    """Return the result in a line."""
     if not found.solved:
         return found.status.value
     return f'largest payload {found.payload:.6g} kg, too much {found.upper:.6g} kg'
@@ -132,7 +132,7 @@ def _numbers(values: Array) -> Array:
 
 
 def _mark(axes: Axes, found: MaxPayload, values: Array) -> None:
-    """Mark a value of each trial, by its outcome."""
+    """Mark a value of each trial, by its result."""
     solved = np.array([trial.solved for trial in found.trials], dtype=bool)
     for chosen, style, label in ((solved, 'oC2', 'carried'), (~solved, 'XC3', 'not carried')):
         if chosen.any():

@@ -165,7 +165,7 @@ def _vector(value: object, path: str) -> NDArray[Any]:
 
 
 def _excerpt(value: object) -> object:
-    """Return what an error shows: a short value itself, else its type."""
+    """Return a short value itself, of a long one its type, for errors."""
     if isinstance(value, list) and len(value) == 1:
         return value[0]
     return value if len(repr(value)) < LONGEST_SHOWN else type(value)

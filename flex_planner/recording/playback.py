@@ -1,4 +1,4 @@
-"""Which messages a playback sends that does not begin with the first."""
+"""The messages of a playback that starts in the middle of a recording."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def from_time(messages: Iterable[SerializedMessage], start_ns: int) -> Iterator[
 
 def _release(held: dict[str, deque[SerializedMessage]],
              time_ns: int) -> Iterator[SerializedMessage]:
-    """Yield what was held, once, as of a time."""
+    """Yield the held messages once, stamped with a time."""
     for messages in held.values():
         yield from (message._replace(log_time_ns=time_ns) for message in messages)
     held.clear()

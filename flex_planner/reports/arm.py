@@ -1,4 +1,4 @@
-"""What an arm is like: masses, limits, frequencies and deflections, as text."""
+"""Properties of an arm as text: masses, limits, frequencies and deflections."""
 
 from __future__ import annotations
 

@@ -94,7 +94,7 @@ class ArmSimulator(Node):  # type: ignore[misc]
         self.get_logger().info(f'following a trajectory of {len(trajectory.points)} points')
 
     def _refusal(self, trajectory: JointTrajectory) -> str:
-        """Return why a trajectory cannot be followed, empty if it can."""
+        """Return the reason why a trajectory cannot be followed, empty if it can."""
         broken = trajectory_violations(trajectory, self._settings.joint_names)
         if broken:
             return '; '.join(broken[:3])
@@ -176,7 +176,7 @@ def _state_message(stamp: Time, names: Sequence[str], positions: Array, velociti
 
 
 def main(args: list[str] | None = None) -> None:
-    """Run the simulator until it is told to stop."""
+    """Run the simulator until a signal ends it."""
     run_node(ArmSimulator, 'arm_simulator', args)
 
 

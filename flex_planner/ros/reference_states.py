@@ -46,7 +46,7 @@ class StreamedPlan:
     names : list of str
         Of the joints, then of the modal coordinates.
     rate : float
-        States a second, above 0 [Hz].
+        States per second, above 0 [Hz].
     stamp_ns, began_ns : int
         When the motion starts, since 1970 and by the monotonic clock [ns].
     times_ns : numpy.ndarray of int64, shape (k,)

@@ -111,7 +111,7 @@ class Replay(Node):  # type: ignore[misc]
         return outlets
 
     def _passes(self) -> Iterator[tuple[float, partial[None]]]:
-        """Yield when to send each message, in seconds since the beginning, and what sends it."""
+        """Yield the time of each message from the beginning [s], and a call that sends it."""
         began = 0.0
         while True:
             due = began
@@ -171,7 +171,7 @@ def _profile(qos: QosProfile) -> QoSProfile:
 
 
 def replay(settings: ReplaySettings, args: list[str] | None = None) -> None:
-    """Publish a recording and end the process, with code 0 unless it cannot be read to its end."""
+    """Publish a recording and end the process; the code is 0 if all of it could be read."""
     run_node(lambda: Replay(settings), 'replay', args)
 
 

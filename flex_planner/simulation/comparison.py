@@ -1,5 +1,5 @@
 """
-What planning for flexible links is worth: one task planned in several ways, and carried out.
+The benefit of planning with flexible links: one task, planned and carried out in several modes.
 
 Every plan is followed by the same flexible arm, which may differ from the planned one. The
 controller samples and holds, as one with hardware would.
@@ -39,7 +39,7 @@ _STEP, _TORQUE_TOLERANCE = 2.5e-4, 1e-5
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Comparison:
     """
-    A task carried out in several ways.
+    A task carried out in several modes.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Comparison:
     payload_mass : float
         As simulated [kg].
     goal : numpy.ndarray, shape (2,)
-        Where the tip is to go [m].
+        Goal of the tip [m].
     settling : float
         How long the arm is watched after its arrival [s].
     results : tuple of ExecutionResult
@@ -72,7 +72,7 @@ class Comparison:
         return self.flexible.solved and self.rigid.solved
 
     def of(self, mode: ExecutionMode) -> ExecutionResult:
-        """Return one result; KeyError if its plan failed."""
+        """Return the result of a mode; KeyError if its plan failed."""
         return {result.mode: result for result in self.results}[mode]
 
 
@@ -149,7 +149,7 @@ def _execute_all(flexible: Plan, rigid: Plan, setting: Setting) -> tuple[Executi
 
 
 def sample_finely(plan: Plan, monitor: Monitor) -> SampledPlan:
-    """Return samples as close as they may be."""
+    """Return samples as close as the sampling allows."""
     step = max(_STEP, plan.task.duration / (MAX_SAMPLES - 1))
     settings = SamplingSettings(longest_step=step, torque_tolerance=_TORQUE_TOLERANCE)
     return sample_plan(plan, settings, monitor)

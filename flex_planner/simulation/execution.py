@@ -1,4 +1,4 @@
-"""One mode to carry out a plan on a simulated flexible arm, and what came of it."""
+"""A plan carried out on a simulated flexible arm in one of several modes, and the result."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _SETTLED = 0.1  # of the time after arrival
 
 
 class ExecutionMode(Enum):
-    """How a task is planned and carried out; the value is shown to people."""
+    """Modes of planning and carrying out a task; the value is shown to people."""
 
     FLEXIBLE_OPEN = 'flexible plan, torque only'
     RIGID_OPEN = 'rigid plan, torque only'
@@ -43,7 +43,7 @@ class ExecutionMode(Enum):
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SimulatedMotion:
     """
-    What the arm did, at every period of the controller from 0.
+    The motion of the arm, at every period of the controller from 0.
 
     Attributes
     ----------
@@ -67,13 +67,12 @@ class SimulatedMotion:
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ExecutionResult:
     """
-    What came of one mode.
+    The result of carrying out a plan.
 
     Attributes
     ----------
     mode : ExecutionMode
-        Which.
-    arrival : float
+        Of execution.    arrival : float
         Planned duration [s].
     arrival_error : float
         Distance of the tip from the goal at that time [m].
@@ -104,7 +103,7 @@ class ExecutionResult:
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Setting:
     """
-    What all ways have in common.
+    The conditions that all modes share.
 
     Attributes
     ----------
@@ -137,7 +136,7 @@ class Setting:
 def execute_plan(mode: ExecutionMode, plan: Plan, sampled: SampledPlan,
                  setting: Setting) -> ExecutionResult:
     """
-    Follow a sampled plan in one mode.
+    Carry out a sampled plan in one mode.
 
     Raises
     ------
@@ -170,7 +169,7 @@ def execute_plan(mode: ExecutionMode, plan: Plan, sampled: SampledPlan,
 
 
 def _watch(plant: Plant, arrival: float, setting: Setting) -> tuple[SimulatedMotion, float]:
-    """Let an arm go; return what it did, and its bending with the joints locked on arrival."""
+    """Run a motion; return it, and the bending with the joints locked on arrival."""
     n_t = plant.model.arm.n_coordinates
     times, states, torques = [0.0], [plant.state], [plant.torque]
 
@@ -191,7 +190,7 @@ def _watch(plant: Plant, arrival: float, setting: Setting) -> tuple[SimulatedMot
 
 
 def _bending(plant: Plant) -> float:
-    """Return how far the links would bend if the joints were locked now."""
+    """Return the largest deflection of the links if the joints were locked now."""
     rest, _ = equilibrium(plant.model, plant.joint_state[0], plant.parameters)
     locked = plant.state.copy()
     n, n_t = plant.model.arm.n_joints, plant.model.arm.n_coordinates

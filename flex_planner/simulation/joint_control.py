@@ -1,4 +1,4 @@
-"""What surrounds a simulated arm: its reference, gains, encoders and disturbances."""
+"""The reference, gains, encoders and disturbances of a simulated arm."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Gains:
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JointReference:
     """
-    What a joint trajectory demands, interpolated as joint_trajectory_controller does.
+    A joint trajectory, interpolated as by joint_trajectory_controller.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ class JointReference:
                    velocities=samples.rates[:, :n], torques=samples.torques)
 
     def after(self, positions: Array, velocities: Array, torques: Array) -> JointReference:
-        """Return the reference with a way to its first sample, unless that is at time 0."""
+        """Return the reference with a start at time 0, unless it has one."""
         if self.times[0] == 0:
             return self
         return JointReference(
@@ -113,7 +113,7 @@ class JointReference:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Encoder:
     """
-    How the joints are measured; by default exactly, at every period of the controller.
+    Measurement of the joints; by default exact, at every period of the controller.
 
     Parameters
     ----------

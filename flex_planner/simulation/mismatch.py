@@ -1,4 +1,4 @@
-"""How a simulated arm differs from the one that a motion was planned for."""
+"""Differences of a simulated arm from the one that a motion was planned for."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ AS_GIVEN = -1
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Mismatch:
     """
-    What is different; by default nothing.
+    The differences; by default none.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class Mismatch:
         Raises
         ------
         InvalidSizeError
-            If the friction has neither one entry a joint nor none.
+            If the friction has neither one entry per joint nor none.
 
         """
         friction = vector('added_friction', self.added_friction, (0, arm.n_joints))

@@ -41,7 +41,7 @@ class RunawayError(FlexPlannerError):
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Control:
     """
-    How the joints are driven.
+    The control of the joints.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ class Plant:
         self.sensor.look(self.time, *self.joint_state)
 
     def _command(self, elapsed: float) -> Array:
-        """Return what the motors do for the coming period."""
+        """Return the torques of the motors for the coming period."""
         gains, sensor = self.control.gains, self.sensor
         position, velocity = self._reference.motion(elapsed)
         torque: Array = (gains.stiffness * (position - sensor.positions)

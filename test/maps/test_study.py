@@ -58,7 +58,7 @@ MISTAKES: list[tuple[str, object, str]] = [
     ('modes', 9, 'modes is 9, but must be an integer from 0 to 8'),
     ('quantity', 'payload', "quantity is 'payload', but must be one of ['max_payload', "),
     ('quantity', 'min_effort', "mismatch is {'payload_mass': 1.5, "),
-    ('start', REMOVE, 'start or start_angles is None, but must be given, one of them'),
+    ('start', REMOVE, 'start or start_angles is None, but must be given, exactly one of them'),
     ('start', [0.5], 'start is [0.5], but must be a point [x, y] in m'),
     ('start', 'there', "start is 'there', but must be a list of numbers"),
     ('start', [0.5, math.nan], 'start is nan, but must be a finite number'),

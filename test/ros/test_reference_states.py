@@ -1,4 +1,4 @@
-"""SampledPlan states along a published plan: their values, and when they come."""
+"""Reference states along a published plan: their values, and when they come."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The command that carries out a task planned in several ways."""
+"""The command that plans a task with flexible and with rigid links, and compares."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def add_command(commands: Commands) -> None:
 
 
 def _compare(options: argparse.Namespace) -> int:
-    """Compare the ways, tell of them and draw them."""
+    """Compare the modes of execution; print and draw the results."""
     request = Request.of(options)
     if not options.no_plot:
         check_folder(options.output)
@@ -82,7 +82,7 @@ def _compare(options: argparse.Namespace) -> int:
 
 
 def _mismatch(options: argparse.Namespace) -> Mismatch:
-    """Return how the simulated arm differs."""
+    """Return the differences of the simulated arm."""
     given = options.added_friction
     friction = np.zeros(0) if given is None else numbers('--added-friction', given, finite=False)
     return Mismatch(modes=options.plant_modes, rigidity_scale=options.rigidity_scale,

@@ -72,7 +72,7 @@ def _draw(path: Path) -> int:
 
 
 def _compute(options: argparse.Namespace) -> int:
-    """Compute what is not there, say what came of it and draw it."""
+    """Compute the missing cells, print a summary and draw the map."""
     from flex_planner.maps.store import MapStore
     from flex_planner.maps.study import load_study
 
@@ -91,7 +91,7 @@ def _compute(options: argparse.Namespace) -> int:
 
 
 def _check(options: argparse.Namespace) -> None:
-    """Refuse options that make no sense."""
+    """Refuse options that contradict each other."""
     if options.workers is not None:
         integer('--workers', options.workers, at_least=1, at_most=1024)
         if options.scheduler:
@@ -100,7 +100,7 @@ def _check(options: argparse.Namespace) -> None:
 
 
 def _run(options: argparse.Namespace, study: Study, store: MapStore) -> Tally:
-    """Compute what is left, showing it; CanceledError after Ctrl-C."""
+    """Compute the missing cells, showing progress; CanceledError after Ctrl-C."""
     from flex_planner.maps.run_map import run_map
 
     done = int((store.codes != CellCode.PENDING).sum())

@@ -36,7 +36,7 @@ def add_command(commands: Commands) -> None:
 
 
 def _paper(options: argparse.Namespace) -> int:
-    """Compute, write, and say what came of it."""
+    """Compute the sections, write the page, print a summary."""
     from flex_planner.paper.document import document, summary
     from flex_planner.paper.run import compute_sections, STUDIES
 

@@ -57,7 +57,7 @@ def _add_search(parser: argparse.ArgumentParser) -> None:
 
 
 def _plan(options: argparse.Namespace) -> int:
-    """Plan a motion; tell of it, draw it and record it."""
+    """Plan a motion; print, draw and record it."""
     request = Request.of(options)
     outputs = Outputs.of(options, request)
 
@@ -75,7 +75,7 @@ def _plan(options: argparse.Namespace) -> int:
 
 
 def _payload(options: argparse.Namespace) -> int:
-    """Find the largest payload; tell of it and of its motion, draw and record both."""
+    """Find the largest payload and its motion; print, draw and record both."""
     request = Request.of(options)
     outputs = Outputs.of(options, request)
     accuracy = options.accuracy
@@ -105,19 +105,19 @@ def _sample(request: Request, plan: Plan | None) -> tuple[SampledPlan | None, Pe
 
 
 def _tell(request: Request, payload: str, rows: list[Row]) -> None:
-    """Print what was asked and what came of it."""
+    """Print the request and its result."""
     print(table([('arm', request.task.arm.name), ('motion', f'{request} {payload}'.rstrip()),
                  *rows]), flush=True)
 
 
 def _tell_files(files: Iterator[Row]) -> None:
-    """Write the files, and print each when it is there."""
+    """Write the files, and print the name of each as it is written."""
     for row in files:
         print(table([row]), flush=True)
 
 
 def _exit_code(request: Request, outcome: Plan | MaxPayload) -> int:
-    """Return the exit code of an outcome; say why if it is a failure."""
+    """Return the exit code of a result; print the reason of a failure."""
     if outcome.solved:
         return 0
     reasons = [outcome.status.value, outcome.message]

@@ -60,7 +60,7 @@ def scale(values: Array) -> Normalize:
 
 
 def edges(values: Array) -> Array:
-    """Return where cells begin and end, half-way between their values."""
+    """Return the borders of cells, half-way between their values."""
     if values.size == 1:
         half = 0.5 * (abs(float(values[0])) or 1.0)
         lone: Array = values[0] + np.array([-half, half])
@@ -117,7 +117,7 @@ def draw_contours(axes: Axes, x: MapAxis, y: MapAxis, values: Array, norm: Norma
 
 
 def _label_places(lines: list[Array], size: Array, arm: list[Array]) -> list[Array]:
-    """Return a point of each line that is long enough, away from the arm and one another."""
+    """Return a point on each line that is long enough, away from the arm and one another."""
     taken = np.concatenate([np.full((1, 2), np.inf), *(_densify(part) / size for part in arm)])
     places: list[Array] = []
     for line in lines:
@@ -142,7 +142,7 @@ def _densify(line: Array) -> Array:
 
 
 def locator(norm: Normalize) -> Locator:
-    """Return where a scale has its ticks."""
+    """Return the locator of a scale's ticks."""
     if isinstance(norm, LogNorm):
         return LogLocator(subs=(1, 2, 5), numticks=_MANY)
     return MaxNLocator(_LEVELS)

@@ -108,7 +108,7 @@ def _arm(fields: dict[str, Any]) -> Arm:
 
 
 def _end(name: str, content: Mapping[str, Any]) -> End:
-    """Return where all motions of a study start or end."""
+    """Return the common start or goal of the motions of a study."""
     angles = np.array(content.get(f'{name}_angles', []), dtype=float)
     point = np.array(content.get(name, [np.nan, np.nan]), dtype=float)
     return End(name=name, point=point, angles=angles)

@@ -125,7 +125,7 @@ def _colors(count: int) -> list[str]:
 
 
 def _is_failure(codes: NDArray[np.int8]) -> NDArray[np.bool_]:
-    """Return which cells are to be marked."""
+    """Return the mask of cells that failed."""
     return ~np.isin(codes, (CellCode.PENDING, CellCode.SOLVED))
 
 
@@ -135,7 +135,7 @@ def _draw_line(axes: Axes, x: MapAxis, values: Array, color: str, label: str) ->
 
 
 def _draw_failures(axes: Axes, x: MapAxis, lines: list[tuple[NDArray[np.int8], str]]) -> None:
-    """Mark what was not solved, a row a line from above, below a diagram with the same x axis."""
+    """Mark failed cells below a diagram with the same x axis, one row per line, from above."""
     for row, (codes, color) in enumerate(lines):
         for kind, marker in MARKERS.items():
             places = x.values[codes == kind]

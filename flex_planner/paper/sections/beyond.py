@@ -33,7 +33,7 @@ _MODES = (ExecutionMode.FLEXIBLE_OPEN, ExecutionMode.RIGID_OPEN, ExecutionMode.F
 
 
 def front(*, reduced: bool = False) -> Section:
-    """Return what each payload costs, and how much goes in what time."""
+    """Return the least effort of each payload, and the largest payload for each duration."""
     arms = {'rigid': paper_arm(math.inf), f'EI = {_SOFT:g} N m^2': paper_arm(_SOFT, 1)}
     fronts = [_front(point_to_point(arm, 1.0), name, f'C{k}')
               for k, (name, arm) in enumerate(arms.items())]
@@ -78,7 +78,7 @@ def _against_duration(task: Task, durations: Array, name: str, color: str) -> Cu
 
 
 def clamped_links(*, reduced: bool = False) -> Section:
-    """Return what links carry that are clamped to their hubs, as real ones are."""
+    """Return the largest payloads of links that are clamped to their hubs, as real ones are."""
     rigidities = () if reduced else tuple(
         rigidity for rigidity in STIFFNESS_LIMITS if not math.isinf(rigidity))
     pinned = {rigidity: find_largest(point_to_point(paper_arm(rigidity, 1), 1.0))
@@ -109,7 +109,7 @@ def clamped_links(*, reduced: bool = False) -> Section:
 
 
 def feedforward(*, reduced: bool = False) -> Section:
-    """Return what planning with flexible links is worth on a flexible arm."""
+    """Return the benefit of planning with flexible links on a flexible arm."""
     comparison = compare(point_to_point(paper_arm(_SOFT), 1.0))
     if not comparison.solved:
         raise NoPlanError(f'{comparison.flexible.message}; {comparison.rigid.message}')
@@ -149,7 +149,7 @@ def _distances(results: dict[ExecutionMode, ExecutionResult], goal: Array) -> Pi
 
 
 def modes(*, reduced: bool = False) -> Section:
-    """Return how results settle as links get more modes."""
+    """Return the results for growing numbers of modes."""
     counts = (1, 2) if reduced else (1, 2, 3, 4)
     costs = {count: plan_certified(point_to_point(paper_arm(_SOFT, count), 1.0)).cost
              for count in counts}

@@ -22,7 +22,7 @@ _BEYOND = 1e5  # a weight far beyond the paper's largest
 
 
 def study(*, reduced: bool = False) -> Section:
-    """Return what came of section 5.2."""
+    """Return the evidence on section 5.2."""
     rigid = _plans(math.inf, W_2)
     flexible = _plans(50.0, W_2[:1] if reduced else W_2)
     shown_plans = rigid if reduced else flexible

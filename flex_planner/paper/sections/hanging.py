@@ -50,7 +50,7 @@ def swing(model: ArmModel, rigidity: float | None = None, duration: float = _DUR
 
 
 def study(*, reduced: bool = False) -> Section:
-    """Return what came of section 5.1."""
+    """Return the evidence on section 5.1."""
     model = ArmModel(load_arm('korayem_hanging'))
     rigid = swing(ArmModel(model.arm.rigid()))
     swings = {rigidity: swing(model, rigidity)

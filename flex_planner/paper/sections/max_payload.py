@@ -32,7 +32,7 @@ _NEARLY_ALL = 0.95  # of the time
 
 
 def study(*, reduced: bool = False) -> Section:
-    """Return what came of section 5.3."""
+    """Return the evidence on section 5.3."""
     found = {_RIGID: find_largest(point_to_point(paper_arm(_RIGID), 1.0))}
     if not reduced:
         found |= {rigidity: find_largest(point_to_point(paper_arm(rigidity), 1.0))
@@ -90,7 +90,7 @@ def _plan_with_weights(rigid: Plan, weights: tuple[float, ...]) -> dict[float, P
 
 
 def _raise_payload(rigid: Plan) -> MaxPayload:
-    """Return what the algorithm of fig. 2 finds with the paper's accuracies."""
+    """Return the result of the algorithm of fig. 2 with the paper's accuracies."""
     return find_max_payload(point_to_point(rigid.arm, 1.0), model=ArmModel(rigid.arm),
                             method=PayloadMethod.INCREMENTAL, accuracy=ACCURACY)
 
@@ -193,7 +193,7 @@ def _stiffness_claims(found: dict[float, MaxPayload],
 
 
 def _roughness(samples: Samples) -> Array:
-    """Return how much each torque goes up and down in all, shape (n,) [N m]."""
+    """Return the total variation of each torque, shape (n,) [N m]."""
     change: Array = np.abs(np.diff(samples.torques, axis=0)).sum(axis=0)
     return change
 

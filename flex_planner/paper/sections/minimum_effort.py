@@ -22,7 +22,7 @@ TAKEN = next(iter(READINGS))
 
 
 def study(*, reduced: bool = False) -> Section:
-    """Return what came of section 5.4."""
+    """Return the evidence on section 5.4."""
     names = list(READINGS)[:1] if reduced else list(READINGS)
     plans = {name: plan_certified(turn(turning_arm(READINGS[name]))) for name in names}
     samples = {name: plan.uniform_samples(POINTS) for name, plan in plans.items()}
@@ -44,7 +44,7 @@ def study(*, reduced: bool = False) -> Section:
 
 
 def _ends(samples: Samples, joint: int) -> str:
-    """Return where a motor is on its limit, in words."""
+    """Return the ends of the motion at which a motor is on its limit, in words."""
     runs, last = runs_on_limit(samples, joint), samples.times[-1]
     first = bool(runs) and runs[0][0] == 0
     final = bool(runs) and runs[-1][1] == last

@@ -24,7 +24,7 @@ _RINGING = 10.0  # [Hz] and above: the slowest bending mode has 15
 
 
 def study(*, reduced: bool = False) -> Section:
-    """Return what came of section 5.5."""
+    """Return the evidence on section 5.5."""
     arm = turning_arm(limited=False)
     weights = (0.0, VIBRATION_WEIGHT) if reduced else (0.0, VIBRATION_WEIGHT, _HEAVY)
     plans = {weight: plan_certified(turn(arm, weight)) for weight in weights}

@@ -1,4 +1,4 @@
-"""What the paper prints and cannot mean, each with its evidence."""
+"""The slips of the paper, each with its evidence."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class PrintedProblem(MotionProblem):
 
 
 def study(*, reduced: bool = False) -> Section:
-    """Return what the paper prints and cannot mean."""
+    """Return the slips of the paper with their evidence."""
     rows: list[tuple[str, str, str]] = []
     values: dict[str, float] = {}
     for part in (_angle, _costates, _appendix):

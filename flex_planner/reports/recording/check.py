@@ -200,7 +200,7 @@ def _at_rest(model: ArmModel, coordinates: Array, parameters: Parameters) -> Arr
 
 def _resimulation(request: RecordedRequest, motion: RecordedMotion, miss: Array, tip: Array,
                   limits: CheckLimits) -> list[Finding]:
-    """Return where the recorded torques lead."""
+    """Return the errors of the motion that the recorded torques lead to."""
     most = limits.tip_deviation * request.arm.reach
     distance = np.linalg.norm(tip - motion.tip, axis=1)
     return [
@@ -212,7 +212,7 @@ def _resimulation(request: RecordedRequest, motion: RecordedMotion, miss: Array,
 
 
 def _joint_path(motion: RecordedMotion, states: Array, n: int, limits: CheckLimits) -> Finding:
-    """Return how far angles and speeds of the joints are from the recorded ones."""
+    """Return the distance of the joints' angles and speeds from the recorded ones."""
     n_t = motion.coordinates.shape[1]
     pairs = ((states[:, :n], motion.coordinates[:, :n]),
              (states[:, n_t:n_t + n], motion.rates[:, :n]))
@@ -224,7 +224,7 @@ def _joint_path(motion: RecordedMotion, states: Array, n: int, limits: CheckLimi
 
 def _deviation_from_rest(motion: RecordedMotion, ends: list[Array],
                          limits: CheckLimits) -> list[Finding]:
-    """Return how far the first and the last sample are from rest."""
+    """Return the distances of the first and the last sample from rest."""
     samples = np.hstack([motion.coordinates, motion.rates])[[0, -1]]
     return [Finding(name=f'{name} from rest', unit='', limit=limits.end_error,
                     value=float(np.abs(sample - end).max()))
@@ -233,7 +233,7 @@ def _deviation_from_rest(motion: RecordedMotion, ends: list[Array],
 
 def _deviation_from_request(request: RecordedRequest, motion: RecordedMotion,
                             limits: CheckLimits) -> list[Finding]:
-    """Return how far both ends are from what was asked: joint angles, or the tip unbent."""
+    """Return the distances of both ends from the request: joint angles, or the unbent tip."""
     task, n = request.task, request.arm.n_joints
     joints = motion.coordinates[[0, -1], :n]
     if task.space == task.JOINT:
@@ -250,7 +250,7 @@ def _deviation_from_request(request: RecordedRequest, motion: RecordedMotion,
 
 def _optimality(model: ArmModel, motion: RecordedMotion, parameters: Parameters,
                 limits: CheckLimits) -> list[Finding]:
-    """Return whether torques keep their bounds and follow from the costates."""
+    """Return the violation of the torque bounds, and the errors of torques and Hamiltonian."""
     n, size = model.arm.n_joints, max(float(np.abs(motion.torques).max()), _TINY)
     lower, upper = model.arm.torque_bounds(motion.rates[:, :n])
     bounds = np.where(motion.torques >= 0, upper, -lower)

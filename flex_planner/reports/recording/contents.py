@@ -197,14 +197,14 @@ def _scenario(path: Path | str) -> Mapping[str, Any]:
 
 
 def _topics(path: Path | str) -> list[str]:
-    """Return the names of the topics that tell of request and outcome."""
+    """Return the names of the topics with the request and its outcome."""
     wanted = {f'{_TYPES}{name}' for name in _WANTED}
     return [entry.topic.name for entry in read_metadata(path).topics
             if entry.topic.type_name in wanted]
 
 
 def _rows(points: Sequence[Any], field: str) -> Array:
-    """Return a field of all points, a point a row."""
+    """Return a field of all points, one row per point."""
     return np.array([getattr(point, field) for point in points], dtype=np.float64)
 
 

@@ -1,4 +1,4 @@
-"""The plots of a report, as what plots.js draws."""
+"""The plots of a report, as data for plots.js."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ def _over_time(key: str, title: str, unit: str, times: Array, values: Array,
 
 
 def _bands(frequencies: NaturalFrequencies | None) -> Bands | None:
-    """Return where spectra should have their peaks: under given torques the joints are free."""
+    """Return the frequencies at which spectra peak: under given torques the joints are free."""
     if frequencies is None:
         return None
     ranges = frequencies.free.tolist()
@@ -172,7 +172,7 @@ def _spectrum(key: str, title: str, unit: str, times: Array, values: Array,
 
 
 def _tip(motion: RecordedMotion, check: MotionCheck | None) -> Plot:
-    """Return the path of the tip, and where the check went."""
+    """Return the path of the tip as planned, and as re-simulated by the check."""
     path = motion.tip
     series = [Series(name='planned', x=path[:, 0], y=path[:, 1], colour=0)]
     if check is not None:

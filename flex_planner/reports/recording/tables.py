@@ -41,7 +41,7 @@ class ReportTable:
 
 
 def verdict(request: RecordedRequest, check: MotionCheck | None = None) -> str:
-    """Return in a sentence what came of the request."""
+    """Return the outcome of the request in a sentence."""
     report = request.report
     if not request.solved:
         return f'Failed, error {report.error_code}: {report.error_msg or "no reason is recorded"}'
@@ -86,7 +86,7 @@ def numbers(values: Iterable[float]) -> str:
 
 
 def _task(request: RecordedRequest) -> ReportTable:
-    """Return what was asked."""
+    """Return the task of the request."""
     task = request.task
     if task.space == task.CARTESIAN:
         ends = [f'({point.x:g}, {point.y:g}) m' for point in (task.start_point, task.goal_point)]
@@ -106,7 +106,7 @@ def _task(request: RecordedRequest) -> ReportTable:
 
 
 def _outcome(request: RecordedRequest) -> ReportTable:
-    """Return what came of it."""
+    """Return the outcome of the request."""
     report = request.report
     seconds = report.planning_time.sec + report.planning_time.nanosec * 1e-9
     rows = [('error code', str(report.error_code))]
@@ -139,7 +139,7 @@ def _certificate(request: RecordedRequest) -> ReportTable:
 
 
 def _joints(request: RecordedRequest) -> ReportTable:
-    """Return what the motors have to give."""
+    """Return the peak torques and speeds of the motors."""
     report, n = request.report, request.arm.n_joints
     shares = report.peak_speed_shares if len(report.peak_speed_shares) else np.full(n, np.nan)
     saturation = report.saturation if len(report.saturation) else np.full(n, np.nan)
@@ -154,7 +154,7 @@ def _joints(request: RecordedRequest) -> ReportTable:
 
 
 def _frequencies(frequencies: NaturalFrequencies) -> ReportTable:
-    """Return how the arm rings with the payload of the plan."""
+    """Return the natural frequencies of the arm with the payload of the plan."""
     pairs = zip(frequencies.free, frequencies.locked, strict=True)
     return ReportTable(
         title='Natural frequencies over the postures of the motion [Hz]',
@@ -164,7 +164,7 @@ def _frequencies(frequencies: NaturalFrequencies) -> ReportTable:
 
 
 def _search(search: Any) -> ReportTable:
-    """Return how the maximum payload was searched."""
+    """Return method and result of the search for the maximum payload."""
     return ReportTable(title='Search for the maximum payload', rows=(
         ('method', 'payload as an unknown at a rising price' if search.method == search.DIRECT
          else 'payload raised step by step'),
@@ -176,7 +176,7 @@ def _search(search: Any) -> ReportTable:
 
 
 def _trials(search: Any) -> list[ReportTable]:
-    """Return the payloads met on the way."""
+    """Return the payloads that the search solved or tried."""
     found = []
     if len(search.front_payloads):
         front = zip(search.front_payloads, search.front_efforts, search.front_prices, strict=True)

@@ -1,4 +1,4 @@
-"""What the planner node says of itself on /diagnostics."""
+"""The status of the planner node on /diagnostics."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _BROKEN = (PlanReport.RECORDING_FAILED, PlanReport.UNKNOWN)
 @dataclass(slots=True)
 class Record:
     """
-    How the requests so far ended.
+    Counts of the requests so far by their ends.
 
     Attributes
     ----------

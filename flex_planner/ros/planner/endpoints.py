@@ -28,7 +28,7 @@ _FEEDBACK_PERIOD = 0.1  # [s]
 
 class RequestHandlers(NamedTuple):
     """
-    What endpoints do with requests.
+    The operations of endpoints on requests.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Endpoint:
         Of the service and of the action; the request has the fields of the goal, and the
         response those of the result.
     handlers : RequestHandlers
-        Where requests are handed in.
+        Take and conclude requests.
     work : callable
         Returns the outcome of a request; runs in the thread of the worker.
     fill : callable
@@ -108,7 +108,7 @@ class Endpoint:
         return result
 
     def _on_cancel(self, goal: ServerGoalHandle) -> CancelResponse:
-        """Give a goal up, unless its outcome is there."""
+        """Cancel a goal, unless it is concluded already."""
         entry = self._goals.get(_key(goal))
         if entry is None or entry[1].future.done():
             return CancelResponse.REJECT
@@ -116,7 +116,7 @@ class Endpoint:
         return CancelResponse.ACCEPT
 
     def _send_feedback(self) -> None:
-        """Tell every client where its goal is, also while the solver says nothing new."""
+        """Send every client the progress of its goal, also if that is unchanged."""
         for goal, pending in list(self._goals.values()):
             if not pending.future.done():
                 goal.publish_feedback(_feedback(self._action, pending.state))

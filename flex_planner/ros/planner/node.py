@@ -109,7 +109,7 @@ class PlannerNode(Node):  # type: ignore[misc]
         return self._queue.submit(work, self._settings, self.executor)
 
     async def _conclude(self, pending: PendingRequest, task: MotionTask) -> Outcome:
-        """Return what a request led to: an exception here would end the node."""
+        """Return the outcome of a request; an exception here would end the node."""
         try:
             outcome: Outcome = await pending.future
             if task.publish and outcome.publishable:
@@ -154,7 +154,7 @@ class PlannerNode(Node):  # type: ignore[misc]
 
 
 def main(args: list[str] | None = None) -> None:
-    """Run the planner node until it is told to stop."""
+    """Run the planner node until a signal ends it."""
     sys.setswitchinterval(_SWITCH_INTERVAL)
     run_node(PlannerNode, 'flex_planner', args)
 

@@ -1,4 +1,4 @@
-"""What the planner node puts into a recording of one request."""
+"""The contents of the recording of one request."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ import yaml
 
 class OutcomeRecorder:
     """
-    Writes one recording a request.
+    Writes one recording per request.
 
     The request comes first, at the time it was accepted; report and trajectories follow when
     they were ready, then the samples at the times a controller would reach them.

@@ -52,7 +52,7 @@ _LOG = logging.getLogger(__name__)
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Outcome:
     """
-    What a request led to.
+    The outcome of a request.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class Outcome:
     plan, reference : Plan, SampledPlan or None
         What the trajectory was made of.
     search : PayloadSearch or None
-        What came of a search for the maximum payload.
+        Result of a search for the maximum payload.
 
     """
 
@@ -230,7 +230,7 @@ def _failure(code: int, sentence: str) -> Outcome:
 
 
 def unknown_failure(error: Exception) -> Outcome:
-    """Return the outcome of an exception that nobody foresaw."""
+    """Return the outcome of an unexpected exception."""
     return _failure(PlanReport.UNKNOWN, f'{type(error).__name__}: {error}')
 
 

@@ -1,4 +1,4 @@
-"""Where requests are handed in and their outcomes are waited for, without blocking callbacks."""
+"""The queue of requests, whose outcomes are awaited without blocking callbacks."""
 
 from __future__ import annotations
 
@@ -67,12 +67,12 @@ class RequestQueue:
 
     @property
     def waiting(self) -> int:
-        """How many requests wait."""
+        """Return the number of waiting requests."""
         return self._worker.waiting
 
     @property
     def active(self) -> RequestState | None:
-        """Return what is at work, None if nothing is."""
+        """Return the state of the request at work, None if there is none."""
         active = self._active
         return active.state if active else None
 
@@ -99,9 +99,9 @@ class RequestQueue:
 
     def withdraw(self, pending: PendingRequest) -> None:
         """
-        Cancel a request, whose outcome is there at once.
+        Cancel a request and conclude it at once.
 
-        A solver that works on it gives up at its next iteration.
+        A solver that works on it stops at its next iteration.
 
         """
         pending.state.withdrawn = True
@@ -110,7 +110,7 @@ class RequestQueue:
         pending.conclude(canceled_outcome(pending.state))
 
     def close(self, timeout: float) -> bool:
-        """Take no more, tell the one at work to give up, and return whether it did [s]."""
+        """Take no more, stop the one at work, and return whether it ended in time [s]."""
         return self._worker.stop(timeout)
 
     def _serve(self, work: Work, pending: PendingRequest) -> None:

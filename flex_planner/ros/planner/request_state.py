@@ -53,7 +53,7 @@ class RequestState:
         return time.monotonic_ns() - self.accepted_ns
 
     def is_canceled(self) -> bool:
-        """Return whether to give up."""
+        """Return whether to stop working on it."""
         return self.withdrawn or self.stopping()
 
     def report(self, progress: Progress) -> None:

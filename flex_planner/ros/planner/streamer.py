@@ -55,7 +55,7 @@ class Streamer:
 
     @property
     def failure(self) -> str:
-        """Return why nothing can be streamed, empty while the process runs."""
+        """Return the reason why nothing can be streamed, empty while the process runs."""
         code = self._process.poll()
         return '' if code is None else (
             f'the process that streams ~/reference_states {_end(code)}; it is started again with '
@@ -93,7 +93,7 @@ class Streamer:
 
 
 def _end(code: int) -> str:
-    """Return in words how a process ended that had this exit code."""
+    """Return the end of a process in words, from its exit code."""
     if code >= 0:
         return f'has ended with code {code}'
     with suppress(ValueError):

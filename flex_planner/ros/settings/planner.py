@@ -23,7 +23,7 @@ MIN_RECORDING_SIZE, MAX_RECORDING_SIZE = 2**16, 2**40
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlannerSettings:
     """
-    A snapshot of the node's parameters; each request is served with the one at its arrival.
+    The node's parameters; a request uses those at the time of its arrival.
 
     Raises
     ------
@@ -41,7 +41,7 @@ class PlannerSettings:
     allowed_planning_time: float = parameter_field(
         30.0, 'Time limit of a request that sets none [s].', lowest=1e-3, highest=3600.0)
     effort_weights: list[float] = parameter_field(
-        [1.0], 'Diagonal of R where a request gives none: one entry a joint.')
+        [1.0], 'Diagonal of R where a request gives none: one entry per joint.')
     payload_accuracy: float = parameter_field(
         1e-3, 'Largest error of a maximum payload where a request gives none [kg].',
         lowest=MIN_ACCURACY, highest=MAX_ACCURACY)
@@ -69,7 +69,7 @@ class PlannerSettings:
         0.02, 'Samples get closer until linear interpolation of the torque is this exact [N m].',
         lowest=1e-6, highest=1e6)
     reference_rate: float = parameter_field(
-        100.0, 'States a second that are streamed along a published plan [Hz].', lowest=1.0,
+        100.0, 'Rate of the states that are streamed along a published plan [Hz].', lowest=1.0,
         highest=1000.0)
     map_store: str = parameter_field(
         '', 'Store of a map of this arm that flex-planner map has made: requests near one of its '
@@ -115,12 +115,12 @@ class PlannerSettings:
                               error_tolerance=self.error_tolerance)
 
     def sampling(self) -> SamplingSettings:
-        """Return how trajectories are sampled."""
+        """Return the settings of the sampling of trajectories."""
         return SamplingSettings(longest_step=self.sampling_step,
                                 torque_tolerance=self.torque_tolerance)
 
     def output_folder(self) -> Path:
-        """Return where recordings go."""
+        """Return the folder of the recordings."""
         if self.recording_folder:
             return Path(self.recording_folder)
         home = os.environ.get('ROS_HOME') or os.path.join(os.path.expanduser('~'), '.ros')

@@ -23,7 +23,7 @@ class SimulatorSettings:
     Raises
     ------
     InvalidValueError
-        If a list does not have one entry a joint, or a value breaks its bound.
+        If a list does not have one entry per joint, or a value breaks its bound.
 
     """
 
@@ -104,13 +104,13 @@ class SimulatorSettings:
 
     @property
     def mismatch(self) -> Mismatch:
-        """Return how the simulated arm differs from that of the arm file."""
+        """Return the differences of the simulated arm from that of the arm file."""
         return Mismatch(modes=self.modes, rigidity_scale=self.rigidity_scale,
                         added_friction=np.asarray(self.added_friction))
 
     @property
     def control(self) -> Control:
-        """Return how the joints are driven."""
+        """Return the control of the joints."""
         return Control(
             gains=Gains(stiffness=np.asarray(self.stiffness), damping=np.asarray(self.damping)),
             rate=self.control_rate, feedforward=self.feedforward,
