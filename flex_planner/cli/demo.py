@@ -79,7 +79,7 @@ class DemoClient(Node):  # type: ignore[misc]
         end = time.monotonic() + limit
         while not done():
             if time.monotonic() > end:
-                raise DemoError(f'{what}: nothing within {limit:g} s')
+                raise DemoError(f'no {what} within {limit:g} s')
             rclpy.spin_once(self, timeout_sec=0.05)
 
     def wait_for_nodes(self) -> None:

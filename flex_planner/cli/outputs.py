@@ -125,7 +125,7 @@ def _recorder(request: Request, folder: Path) -> RequestRecorder | None:
 
         return RequestRecorder(request, folder / 'recordings')
     except (ImportError, RecordingError) as error:
-        print(f'flex-planner: nothing will be recorded, which takes ROS 2: {error}',
+        print(f'flex-planner: no recording is written, because that needs ROS 2: {error}',
               file=sys.stderr)
         return None
 

@@ -125,5 +125,5 @@ def run_with_progress(arm: Arm, time_limit: float,
         display.close()
     if canceled():
         raise CanceledError(f'canceled after {display.elapsed:.1f} s, in the phase '
-                            f'{display.phase!r}; nothing is written')
+                            f'{display.phase!r}; nothing was written')
     return result

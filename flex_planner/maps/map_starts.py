@@ -60,7 +60,8 @@ class MapStarts:
     def __init__(self, path: Path, arm: Arm) -> None:
         group = open_group(path, 'r')
         if 'motions' not in group:
-            raise MapStoreError(f'the map {path} keeps no motions to start from')
+            raise MapStoreError(f'the map {path} keeps no motions to start from: compute one '
+                                'with keep_motions: true')
         _check_arm(path, group.attrs['arm'], arm)
         self._path, self._group = path, group
         self._names: list[str] = list(group['motions'].attrs['signature'])

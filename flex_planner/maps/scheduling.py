@@ -114,7 +114,7 @@ class _Flight:
         self._most, self._count_at = max(1, _AHEAD * there), now + _COUNTED
         self._seen = now if there else self._seen
         if now > self._seen + _DESERTED:
-            raise ClusterError(f'no worker has been there for {_DESERTED:g} s; finished blocks '
+            raise ClusterError(f'there has been no worker for {_DESERTED:g} s; finished blocks '
                                'are kept, and are not computed again')
 
     def next_result(self) -> tuple[Block, Sequence[CellResult]] | None:

@@ -76,7 +76,7 @@ class MapStore:
                 write_empty(Path(scratch, 'new'), study)
                 os.rename(Path(scratch, 'new'), path)
         except (OSError, KeyError) as error:  # zarr makes a KeyError of some
-            _tell(error, path, 'no map is begun')
+            _tell(error, path, 'the map is not created')
         return cls(path)
 
     @classmethod
@@ -128,9 +128,9 @@ class MapStore:
             found = [f'shape: {study.shape}, there {self.codes.shape}']
         if found:
             self.close()
-            raise MapStoreError(f'{self.path} has a map of something else ('
+            raise MapStoreError(f'{self.path} holds the map of another study or version ('
                                 f'{"; ".join(found)}); choose another --output, or start '
-                                'it anew with --reset')
+                                'anew with --reset')
         return self
 
     def is_complete(self, block: Block) -> bool:
@@ -232,7 +232,7 @@ def open_group(path: Path, mode: str) -> Any:
             return group
     except (ValueError, KeyError, FileNotFoundError, NotADirectoryError):
         pass  # what zarr says of a folder that is none of its own
-    raise MapStoreError(f'{path} is there, but is no map')
+    raise MapStoreError(f'{path} exists, but is not a map')
 
 
 def cells(block: Block) -> list[tuple[int, ...]]:

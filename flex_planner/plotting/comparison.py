@@ -49,7 +49,7 @@ def draw_comparison(path: Path, comparison: Comparison) -> None:
         handles, labels = distance.get_legend_handles_labels()
         figure.legend(handles, labels, loc='outside lower center', ncols=len(results))
     figure.suptitle(f'{comparison.flexible.arm.name}: one task, planned and carried out in '
-                    f'{len(results)} ways')
+                    f'{len(results)} modes')
     save(figure, path)
 
 

@@ -126,7 +126,8 @@ def _file_metadata(file: Path) -> RecordingMetadata:
     with _open(file) as reader:
         summary = reader.get_summary()
         if summary is None or summary.statistics is None:
-            raise RecordingError(f'{file} has no summary: its writer did not finish')
+            raise RecordingError(f'{file} has no summary: its writer did not finish; '
+                                 'try flex-planner recover')
         extent = FileSummary(
             name=file.name, start_ns=summary.statistics.message_start_time,
             end_ns=summary.statistics.message_end_time,
@@ -164,7 +165,7 @@ def _reading(path: Path) -> Iterator[None]:
     except OSError as error:
         raise RecordingError(f'cannot read {path}: {error.strerror or error}') from error
     except DAMAGE as error:
-        raise RecordingError(f'{path} is damaged or no MCAP file: {error}') from error
+        raise RecordingError(f'{path} is damaged or not an MCAP file: {error}') from error
 
 
 def _verify(stream: BinaryIO) -> None:

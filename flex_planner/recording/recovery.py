@@ -62,7 +62,7 @@ def recover_recording(path: Path | str, types: MessageTypes) -> Path:
     records = [record for file in files for record in _complete_records(file)]
     messages = [record for record in records if isinstance(record, SerializedMessage)]
     if not records:
-        raise RecordingError(f'{path} holds nothing that is complete')
+        raise RecordingError(f'{path} holds no complete message or attachment')
     for topic, type_hash in {(message.topic, message.type_hash) for message in messages}:
         check_definition(path, topic, type_hash, types)
     with Recording.create(target.parent, target.name, types,

@@ -47,7 +47,7 @@ def _share(before: str, share: float, whole: str) -> str:
 def certificate_rows(certificate: Certificate) -> list[Row]:
     """Return the residuals of a plan; the message of a report has the same entries."""
     return [
-        ('certificate', 'every plan is checked by means that did not make it'),
+        ('certificate', 'every plan is checked by independent means'),
         ('  collocation residual', f'{certificate.collocation_residual:.1e}'),
         ('  boundary error (eq. 17)', f'{certificate.boundary_error:.1e}'),
         ('  Hamiltonian drift', f'{certificate.hamiltonian_drift:.1e}'),
@@ -127,8 +127,9 @@ def _bracket(found: MaxPayload) -> str:
     below = f'{found.payload:.6g} kg' if found.payload else 'none found'
     if not np.isfinite(found.upper):
         return below
-    status = 'is too much' if found.status is PlanStatus.SOLVED else 'was tried in vain'
-    return f'{below}; {found.upper:.6g} kg {status}'
+    if found.status is PlanStatus.SOLVED:
+        return f'{below}; {found.upper:.6g} kg is too much'
+    return f'{below}; no solution at {found.upper:.6g} kg'
 
 
 def _limit(found: MaxPayload) -> str:

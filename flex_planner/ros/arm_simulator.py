@@ -132,7 +132,8 @@ class ArmSimulator(Node):  # type: ignore[misc]
             self.get_logger().warning(
                 f'the simulation is {late:.2f} s late: this machine is too slow for '
                 f'control_rate = {self._settings.control_rate:g} Hz with '
-                f'{self._arm.n_modes} modes', throttle_duration_sec=_WARNING_PERIOD)
+                f'{self._arm.n_modes} modes: lower one of them',
+                throttle_duration_sec=_WARNING_PERIOD)
 
     def _now(self) -> float:
         """Return the time since the start [s]."""

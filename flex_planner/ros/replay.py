@@ -46,7 +46,7 @@ class ReplaySettings:
         1.0, 'Speed of the playback, 2 is twice as fast.', lowest=1e-3, highest=1e3,
         read_only=True)
     start: float = parameter_field(
-        0.0, 'What to leave out at the beginning of the recording [s].', lowest=0.0, highest=1e9,
+        0.0, 'Time to leave out at the beginning of the recording [s].', lowest=0.0, highest=1e9,
         read_only=True)
     delay: float = parameter_field(
         1.0, 'Time before the first message, in which subscribers find the publishers [s].',

@@ -322,7 +322,7 @@ def test_interrupt_ends_the_search_and_leaves_nothing(long_search: subprocess.Po
     out, err = long_search.communicate(timeout=20)
     assert (long_search.returncode, out) == (130, '')
     assert re.fullmatch(r'flex-planner: canceled after [\d.]+ s, in the phase '
-                        r"'payload raised'; nothing is written\n", err)
+                        r"'payload raised'; nothing was written\n", err)
     assert not list(tmp_path.iterdir())
 
 
@@ -334,7 +334,8 @@ def test_plan_is_drawn_also_without_ros(tmp_path: Path) -> None:
          f'from flex_planner.cli import main; sys.exit(main({arguments}))'],
         text=True, capture_output=True, timeout=60, env=dict(os.environ))
     assert result.returncode == 0
-    assert result.stderr.startswith('flex-planner: nothing will be recorded, which takes ROS 2: ')
+    assert result.stderr.startswith(
+        'flex-planner: no recording is written, because that needs ROS 2: ')
     (picture,) = tmp_path.iterdir()
     assert picture.name == 'korayem_rigid_motion.png'
     assert is_picture(str(picture))

@@ -141,9 +141,9 @@ def test_comments_and_order_of_the_study_file_do_not_matter(path: Path) -> None:
 
 def test_reset_removes_a_map_and_nothing_else(tmp_path: Path) -> None:
     (tmp_path / 'precious').touch()
-    with pytest.raises(MapStoreError, match='is there, but is no map'):
+    with pytest.raises(MapStoreError, match='exists, but is not a map'):
         MapStore.of(tmp_path, small_study(), reset=True)
-    with pytest.raises(MapStoreError, match='is there, but is no map'):
+    with pytest.raises(MapStoreError, match='exists, but is not a map'):
         MapStore.of(tmp_path / 'precious', small_study(), reset=True)
     assert (tmp_path / 'precious').exists()
 
@@ -158,7 +158,7 @@ def test_a_map_is_written_by_one_process_at_a_time(path: Path) -> None:
 
 def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     (tmp_path / 'file').touch()
-    with pytest.raises(OSError, match='no map is begun') as caught:
+    with pytest.raises(OSError, match='the map is not created') as caught:
         MapStore.of(tmp_path / 'file' / 'small.zarr', small_study())
     assert caught.value.filename == str(tmp_path / 'file' / 'small.zarr')
 
@@ -169,7 +169,7 @@ def test_a_disk_that_is_full_from_the_beginning_leaves_nothing(
         raise OSError(errno.ENOSPC, 'No space left on device')
 
     monkeypatch.setattr(zarr.DirectoryStore, '_tofile', staticmethod(to_file))
-    with pytest.raises(OSError, match='No space left on device; no map is begun'):
+    with pytest.raises(OSError, match='No space left on device; the map is not created'):
         MapStore.of(path, small_study())
     assert list(path.parent.iterdir()) == []
 

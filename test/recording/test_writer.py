@@ -307,7 +307,7 @@ def test_definitions_are_found_under_the_ament_prefixes(tmp_path: Path, interfac
     (share / 'tiny_interfaces').symlink_to(interfaces)
     paths = {'AMENT_PREFIX_PATH': f'/nowhere{os.pathsep}{tmp_path / "prefix"}'}
     assert definition_folder('tiny_interfaces', paths) == share / 'tiny_interfaces'
-    with pytest.raises(RecordingError, match='no definitions of absent_msgs in /nowhere'):
+    with pytest.raises(RecordingError, match='no message definitions of absent_msgs in /nowhere'):
         definition_folder('absent_msgs', paths)
 
 
@@ -595,7 +595,7 @@ def test_existing_name_is_not_overwritten(
     if taken == 'link':
         target.symlink_to('nowhere')
     before = sorted(tmp_path.rglob('*'))
-    with pytest.raises(RecordingError, match='exists and is not overwritten'):
+    with pytest.raises(RecordingError, match='exists and is never overwritten'):
         record(tmp_path, types)
     assert sorted(tmp_path.rglob('*')) == before
 
@@ -605,7 +605,7 @@ def test_name_taken_meanwhile_is_not_overwritten(
     tmp_path: Path, types: MessageTypes, content: bool
 ) -> None:
     with (
-        pytest.raises(RecordingError, match='exists and is not overwritten'),
+        pytest.raises(RecordingError, match='exists and is never overwritten'),
         Recording.create(tmp_path, 'plan', types),
     ):
         (tmp_path / 'plan').mkdir()
@@ -821,7 +821,7 @@ def test_file_of_another_kind_is_refused(tmp_path: Path, types: MessageTypes) ->
     with pytest.raises(RecordingError, match='has no summary'):
         read_metadata(tmp_path)
     (tmp_path / 'a.mcap').write_text('no recording')
-    with pytest.raises(RecordingError, match='is damaged or no MCAP file'):
+    with pytest.raises(RecordingError, match='is damaged or not an MCAP file'):
         read_metadata(tmp_path)
 
 

@@ -25,7 +25,7 @@ _STIFFNESS, _DAMPING = 100.0, 10.0
 def add_command(commands: Commands) -> None:
     """Add ``flex-planner compare``."""
     parser = commands.add_parser(
-        'compare', help='show what planning for flexible links is worth',
+        'compare', help='compare planning with flexible and with rigid links',
         description='Plan a motion with flexible and with rigid links, and carry out both on a '
         'simulated flexible arm, with and without a joint controller.')
     add_task(parser, payload='mass at the tip (default: 0)')
@@ -33,18 +33,19 @@ def add_command(commands: Commands) -> None:
     add('--plant-payload', type=float, metavar='KG', help='mass at the tip of the simulated arm '
         '(default: that of the task)')
     add('--plant-modes', type=int, default=-1, metavar='N',
-        help='modes of each of its links (default: as planned)')
+        help='modes of each link of the simulated arm (default: as planned)')
     add('--rigidity-scale', type=float, default=1.0, metavar='FACTOR',
-        help='of its links (default: 1)')
-    add('--added-friction', metavar='D,D,...', help='of its joints [N m s/rad] (default: none)')
+        help='factor on the rigidity of its links (default: 1)')
+    add('--added-friction', metavar='D,D,...',
+        help='viscous friction added to its joints [N m s/rad] (default: none)')
     add('--stiffness', type=float, default=_STIFFNESS, metavar='P',
-        help='of the joint controller [N m/rad] (default: %(default)g)')
+        help='proportional gain of the joint controller [N m/rad] (default: %(default)g)')
     add('--damping', type=float, default=_DAMPING, metavar='D',
-        help='of the joint controller [N m s/rad] (default: %(default)g)')
+        help='derivative gain of the joint controller [N m s/rad] (default: %(default)g)')
     add('--rate', type=float, default=1000.0, metavar='HZ',
-        help='of the joint controller (default: %(default)g)')
+        help='rate of the joint controller (default: %(default)g)')
     add('--settling', type=float, default=1.0, metavar='S',
-        help='how long to watch the arm after its arrival (default: %(default)g)')
+        help='time to watch the arm after its arrival (default: %(default)g)')
     add('--output', type=Path, default=Path('output'), metavar='DIR',
         help='folder for the picture (default: output)')
     add('--no-plot', action='store_true', help='draw nothing')

@@ -29,16 +29,16 @@ def add_command(commands: Commands) -> None:
     parser = commands.add_parser(
         'map', help='compute a quantity over a grid of motions',
         description='Compute the maximum payload, or another quantity, for every cell of a grid, '
-        'and draw it. What is there already is not computed again.')
+        'and draw it. Cells that are computed already are kept.')
     add = parser.add_argument
     add('study', type=Path, metavar='STUDY', help='study file; with --draw also a store')
     add('--output', type=Path, default=Path('output/maps'), metavar='PATH',
         help='folder for store and pictures, or a store that ends in .zarr (default: %(default)s)')
-    add('--workers', type=int, metavar='N', help='processes (default: one a processor)')
+    add('--workers', type=int, metavar='N', help='worker processes (default: one per processor)')
     add('--scheduler', default='', metavar='ADDRESS',
         help='compute on the Dask cluster with this scheduler, such as tcp://host:8786')
-    add('--draw', action='store_true', help='compute nothing, draw what is there')
-    add('--reset', action='store_true', help='remove the map that is there, and start anew')
+    add('--draw', action='store_true', help='draw the stored cells, compute nothing')
+    add('--reset', action='store_true', help='remove the existing map, and start anew')
     add('--no-plot', action='store_true', help='draw nothing')
     parser.set_defaults(run=_map)
 
@@ -106,7 +106,7 @@ def _run(options: argparse.Namespace, study: Study, store: MapStore) -> Tally:
     done = int((store.codes != CellCode.PENDING).sum())
     display = MapDisplay(sys.stderr)
     if done:
-        print(f'{store.path}: {done} of {store.codes.size} cells are there already')
+        print(f'{store.path}: {done} of {store.codes.size} cells are computed already')
     try:
         with interruptible() as canceled:
             tally = run_map(study, store, workers=options.workers or 0,
@@ -116,6 +116,6 @@ def _run(options: argparse.Namespace, study: Study, store: MapStore) -> Tally:
         display.close()
     if canceled() and tally.done < tally.cells:
         again = ' without --reset' if options.reset else ''
-        raise CanceledError(f'canceled; {tally.done} of {tally.cells} cells are kept in '
-                            f'{store.path}, the same command{again} goes on from there')
+        raise CanceledError(f'canceled: {tally.done} of {tally.cells} cells are kept in '
+                            f'{store.path}; run the same command{again} to go on')
     return tally

@@ -28,9 +28,9 @@ def add_command(commands: Commands) -> None:
         help=f'folder for {_PAGE} and {_PICTURES} (default: %(default)s)')
     add('--section', action='append', metavar='N.N', help='compute this section only; may be '
         'repeated')
-    add('--reduced', action='store_true', help='leave out what takes long')
+    add('--reduced', action='store_true', help='leave out the parts that take long')
     add('--processes', type=int, default=os.cpu_count() or 1, metavar='N',
-        help='how many at a time (default: one a processor, %(default)s)')
+        help='sections computed at a time (default: one per processor, %(default)s)')
     add('--no-plot', action='store_true', help='draw nothing')
     parser.set_defaults(run=_paper)
 

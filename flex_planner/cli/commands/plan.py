@@ -31,7 +31,7 @@ _STEP = 1.0
 def add_commands(commands: Commands) -> None:
     """Add ``flex-planner plan`` and ``flex-planner payload``."""
     plan = commands.add_parser(
-        'plan', help='plan a motion', description='Plan the motion that costs least.')
+        'plan', help='plan a motion', description='Plan the motion of least cost.')
     add_task(plan, payload='mass at the tip (default: 0)')
     add_objectives(plan)
     add_outputs(plan)
@@ -39,7 +39,7 @@ def add_commands(commands: Commands) -> None:
     payload = commands.add_parser(
         'payload', help='find the largest payload',
         description='Find the largest payload that the arm can carry, and plan the motion.')
-    add_task(payload, payload='least payload that is of interest (default: 0)')
+    add_task(payload, payload='smallest payload of interest (default: 0)')
     _add_search(payload)
     add_outputs(payload)
     payload.set_defaults(run=_payload)
@@ -48,10 +48,11 @@ def add_commands(commands: Commands) -> None:
 def _add_search(parser: argparse.ArgumentParser) -> None:
     """Add the options of the search."""
     parser.add_argument('--method', choices=[method.name.lower() for method in PayloadMethod],
-                        default='direct', help='with the payload as an unknown (default), or '
-                        'raised step by step as in the paper, which takes longer')
+                        default='direct', help='direct: the payload is an unknown (default); '
+                        'incremental: it is raised step by step as in the paper, which takes '
+                        'longer')
     parser.add_argument('--accuracy', type=float, default=1e-3, metavar='KG',
-                        help='of the largest payload (default: 0.001)')
+                        help='accuracy of the largest payload (default: 0.001)')
     parser.add_argument('--step', type=float, metavar='KG',
                         help='first step of the incremental method (default: 1)')
 

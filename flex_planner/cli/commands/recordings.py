@@ -46,8 +46,8 @@ def _add_replay(commands: Commands) -> None:
     parser.add_argument('--rate', type=float, default=1.0, metavar='FACTOR',
                         help='speed of the playback, 2 is twice as fast (default: 1)')
     parser.add_argument('--start', type=float, default=0.0, metavar='S',
-                        help='what to leave out at the beginning (default: 0); what latched '
-                        'topics hold by then is sent all the same')
+                        help='time to leave out at the beginning (default: 0); latched messages '
+                        'from before it are sent all the same')
     parser.add_argument('--delay', type=float, default=1.0, metavar='S',
                         help='time before the first message, in which subscribers find the '
                         'publishers (default: 1)')
@@ -71,9 +71,9 @@ def _add_report(commands: Commands) -> None:
 
 def _add_recover(commands: Commands) -> None:
     parser = commands.add_parser(
-        'recover', help='save what is complete of a recording that broke off',
-        description='Make a recording of what is complete of one whose writer was killed (the '
-        'hidden folder .<name>.<hex>) or that is damaged. The original stays as it is.')
+        'recover', help='save the complete part of a recording that broke off',
+        description='Make a recording of the complete part of one that is damaged, or whose '
+        'writer was killed (the hidden folder .<name>.<hex>). The original stays as it is.')
     _add_recording(parser)
     parser.set_defaults(run=_recover)
 
@@ -93,7 +93,7 @@ def _replay(options: argparse.Namespace) -> int:
     try:
         from flex_planner.ros.replay import replay, ReplaySettings
     except ImportError as error:
-        print(f'flex-planner: a replay takes ROS 2: {error}', file=sys.stderr)
+        print(f'flex-planner: a replay needs ROS 2: {error}', file=sys.stderr)
         return 1
     replay(ReplaySettings(recording=str(options.recording), rate=rate, start=start, delay=delay,
                           loop=options.loop), [])
@@ -116,7 +116,7 @@ def _report(options: argparse.Namespace) -> int:
 def _check(request: RecordedRequest) -> MotionCheck:
     """Check the motion of a recording."""
     if request.motion is None:
-        raise RecordingError(f'{request.path} holds no motion to check: '
+        raise RecordingError(f'{request.path} has no motion to check: '
                              f'{request.report.error_msg or "the request failed"}')
 
     def work(model: ArmModel, monitor: Monitor) -> MotionCheck:
@@ -126,7 +126,7 @@ def _check(request: RecordedRequest) -> MotionCheck:
 
 
 def _recover(options: argparse.Namespace) -> int:
-    """Save what is complete of a recording."""
+    """Save the complete part of a recording."""
     types = MessageTypes.load([definition_folder('flex_planner_interfaces')])
     path = recover_recording(options.recording, types)
     print(table([('recovered', f'{read_metadata(path).message_count} messages'),

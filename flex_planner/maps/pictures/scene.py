@@ -95,7 +95,8 @@ def study_of(dataset: xr.Dataset) -> Study | None:
             accuracy=_ACCURACY if quantity.is_searched else math.nan)
     except (FlexPlannerError, KeyError, TypeError, ValueError, AttributeError,
             yaml.YAMLError) as error:
-        _log.warning('the arm of this map is not drawn, its study is not understood: %s', error)
+        _log.warning('the arm is not drawn, because the study of the map cannot be read: %s',
+                     error)
         return None
 
 

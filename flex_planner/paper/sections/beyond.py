@@ -94,7 +94,7 @@ def clamped_links(*, reduced: bool = False) -> Section:
     return Section(
         key='6.2', title='Beyond the paper: clamped links',
         text='Pinned-pinned shapes keep the tip on the chord, and leave out the work of the '
-        'torque on the slope at the hub. Clamped-free shapes do neither. One mode a link; two '
+        'torque on the slope at the hub. Clamped-free shapes do neither. One mode per link; two '
         'modes are not solved at the limit.',
         tables=(Table(title='Table V with both kinds of shapes', rows=rows, header=(
             'EI [N m^2]', 'paper [kg]', 'pinned-pinned [kg]', 'clamped-free [kg]')),)
@@ -161,9 +161,9 @@ def modes(*, reduced: bool = False) -> Section:
         key='6.4', title='Beyond the paper: how many modes',
         text=f'Pinned-pinned links of {_SOFT:g} N m^2.',
         tables=(Table(title='Least effort with 1 kg, and largest payload', rows=rows, header=(
-            'modes a link', 'J', 'largest payload [kg]')),),
+            'modes per link', 'J', 'largest payload [kg]')),),
         claims=(Claim(
-            said='Two modes a link are enough.',
+            said='Two modes per link are enough.',
             found=f'From one to two modes J with 1 kg changes by '
             f'{costs[2] / costs[1] - 1:.1e} of itself, the payload by '
             f'{(limits[2].payload - limits[1].payload) * 1e3:.1f} g'

@@ -43,7 +43,7 @@ def study(*, reduced: bool = False) -> Section:
     return Section(
         key='5.2', title='Minimum effort and speed',
         text='The tip goes from (0.5, 0) m to (0.5, 0.5) m in 1 s with 1 kg; R = 1/8, W_2 = w_2 '
-        'at the joints. Rigid links, and the arm of Table I with two modes a link (EI = 50 '
+        'at the joints. Rigid links, and the arm of Table I with two modes per link (EI = 50 '
         'N m^2); the independent check is IPOPT on the rigid arm, from a straight line.',
         tables=(_table(speeds, rigid, flexible, independent),), claims=claims,
         pictures=_pictures(samples, links), values=values)

@@ -66,7 +66,7 @@ def study(*, reduced: bool = False) -> Section:
     share = float((away[100.0] / range_).max())
     return Section(
         key='5.1', title='The model: rigid and flexible arm, hanging',
-        text='The arm of Table I with two pinned-pinned modes a link is let go at rest at '
+        text='The arm of Table I with two pinned-pinned modes per link is let go at rest at '
         'theta = (-1.5, -0.5) rad from the horizontal, in a vertical plane, and swings for 2 s '
         '(DOP853, relative tolerance 1e-10).',
         tables=(_table(swings, away, values['hanging_energy_drift']),),

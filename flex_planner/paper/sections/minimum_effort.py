@@ -34,7 +34,7 @@ def study(*, reduced: bool = False) -> Section:
     independent = {name: format_value(check, check.cost) for name, check in checks.items()}
     return Section(
         key='5.4', title='Minimum effort',
-        text='The arm of Table VI, one pinned-pinned mode a link, turns from (0, 180) deg to '
+        text='The arm of Table VI, one pinned-pinned mode per link, turns from (0, 180) deg to '
         '(180, 0) deg in 2 s; R = 1, motors of 13.5 and 4 N m at any speed. The paper does not '
         'say what J_1 to J_3 turn with; its readings are compared, and the first is taken below. '
         'The independent check is IPOPT from a straight line.',

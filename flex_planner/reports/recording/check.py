@@ -142,7 +142,7 @@ def check_motion(request: RecordedRequest, model: ArmModel | None = None,
     """
     motion, parameters = request.motion, request.parameters
     if motion is None:
-        raise RecordingError(f'{request.path} has no motion that could be checked: '
+        raise RecordingError(f'{request.path} has no motion to check: '
                              f'{request.report.error_msg or "it failed"}')
     model, limits = model or ArmModel(request.arm), limits or CheckLimits()
     ends = [_at_rest(model, row, parameters) for row in motion.coordinates[[0, -1]]]
@@ -206,7 +206,7 @@ def _resimulation(request: RecordedRequest, motion: RecordedMotion, miss: Array,
     return [
         Finding(name='tip error at the end', unit='m', value=float(distance[-1]), limit=most,
                 recorded=float(request.report.tip_error)),
-        Finding(name='tip off its path', unit='m', value=float(distance.max()), limit=most),
+        Finding(name='largest tip deviation', unit='m', value=float(distance.max()), limit=most),
         Finding(name='boundary error (eq. 17)', unit='', value=float(miss @ miss / 2),
                 limit=request.tolerance, recorded=float(request.report.boundary_error))]
 
@@ -218,7 +218,7 @@ def _joint_path(motion: RecordedMotion, states: Array, n: int, limits: CheckLimi
              (states[:, n_t:n_t + n], motion.rates[:, :n]))
     shares = [np.abs(found - recorded).max() / max(np.ptp(recorded, axis=0).max(), _TINY)
               for found, recorded in pairs]
-    return Finding(name='joints off their path', unit='', limit=limits.joint_deviation,
+    return Finding(name='largest joint deviation', unit='', limit=limits.joint_deviation,
                    value=float(np.max(shares)))
 
 
@@ -226,7 +226,7 @@ def _deviation_from_rest(motion: RecordedMotion, ends: list[Array],
                          limits: CheckLimits) -> list[Finding]:
     """Return the distances of the first and the last sample from rest."""
     samples = np.hstack([motion.coordinates, motion.rates])[[0, -1]]
-    return [Finding(name=f'{name} from rest', unit='', limit=limits.end_error,
+    return [Finding(name=f'deviation from rest, {name}', unit='', limit=limits.end_error,
                     value=float(np.abs(sample - end).max()))
             for name, sample, end in zip(('start', 'goal'), samples, ends, strict=True)]
 
@@ -243,7 +243,7 @@ def _deviation_from_request(request: RecordedRequest, motion: RecordedMotion,
         unbent = np.hstack([joints, np.zeros((2, request.arm.n_modes))])
         found, unit = tip_position(request.arm, unbent), 'm'
         asked = np.array([(point.x, point.y) for point in (task.start_point, task.goal_point)])
-    return [Finding(name=f'{name} from what was asked', unit=unit, limit=limits.end_error,
+    return [Finding(name=f'deviation from task, {name}', unit=unit, limit=limits.end_error,
                     value=float(np.abs(miss).max()))
             for name, miss in zip(('start', 'goal'), found - asked, strict=True)]
 

@@ -190,7 +190,7 @@ def _search_plots(search: Any) -> list[Plot]:
     if len(search.front_payloads):
         payloads = np.asarray(search.front_payloads)
         for key, title, unit, values in (
-                ('front', 'Effort that carries a payload', 'J [N²m²s]', search.front_efforts),
+                ('front', 'Least effort for each payload', 'J [N²m²s]', search.front_efforts),
                 ('prices', 'Price of a payload', 'dJ/dm [N²m²s/kg]', search.front_prices)):
             line = Series(name=unit, x=payloads, y=np.asarray(values), colour=0)
             dots = Series(name='solved', x=payloads, y=np.asarray(values), colour=0, dots=True)

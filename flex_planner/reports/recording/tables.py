@@ -169,7 +169,7 @@ def _search(search: Any) -> ReportTable:
         ('method', 'payload as an unknown at a rising price' if search.method == search.DIRECT
          else 'payload raised step by step'),
         ('largest payload', f'{search.payload:.6g} kg'),
-        ('too much, or in vain', f'{search.payload_upper:.6g} kg'),
+        ('too much, or no solution', f'{search.payload_upper:.6g} kg'),
         ('accuracy asked for', f'{search.payload_accuracy:g} kg'),
         ('limiting joint', '–' if search.limiting_joint < 0 else
          f'{search.limiting_joint + 1}{", which can hold no more" if search.held else ""}')))
@@ -180,7 +180,7 @@ def _trials(search: Any) -> list[ReportTable]:
     found = []
     if len(search.front_payloads):
         front = zip(search.front_payloads, search.front_efforts, search.front_prices, strict=True)
-        found.append(ReportTable(title='What a payload costs',
+        found.append(ReportTable(title='Effort and price of each payload',
                                  columns=('payload [kg]', 'J [N²m²s]', 'dJ/dm [N²m²s/kg]'),
                                  rows=tuple(_cells(row) for row in front)))
     if len(search.tried_payloads):

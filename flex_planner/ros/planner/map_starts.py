@@ -56,8 +56,8 @@ def _load_map(store: str, arm: Arm) -> MapStarts:
     try:
         from flex_planner.maps.map_starts import MapStarts
     except ImportError as error:
-        raise FlexPlannerError(f'map_store is {store!r}, but to read maps takes '
-                               f"pip install 'flex_planner[maps]' ({error})") from error
+        raise FlexPlannerError(f'map_store is {store!r}, but the packages that read maps are '
+                               f"missing: pip install 'flex_planner[maps]' ({error})") from error
     try:
         return MapStarts(Path(store), arm)
     except FlexPlannerError as error:

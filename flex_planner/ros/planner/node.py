@@ -74,8 +74,8 @@ class PlannerNode(Node):  # type: ignore[misc]
         self.get_logger().info(f'preparing the dynamics of {arm.name}')
         starts = Starts(self._settings.map_store, arm)
         if self._settings.map_store:
-            self.get_logger().info(f'{len(starts)} motions of {self._settings.map_store} are '
-                                   'there to start from')
+            self.get_logger().info(f'requests may start from {len(starts)} motions of '
+                                   f'{self._settings.map_store}')
         self._planner = RequestPlanner(
             ArmModel(arm), OutcomeRecorder(arm, self.get_fully_qualified_name()), starts)
         self._queue = RequestQueue(self._settings.queue_length)

@@ -143,8 +143,8 @@ class RequestPlanner:
 
         def search_payload(task: Task, monitor: Monitor) -> Outcome:
             if objectives_from_message(request.task) is not None:
-                raise InvalidTaskError('objectives such as max_joint_speeds do not go with a '
-                                       'search for the maximum payload')
+                raise InvalidTaskError('objectives such as max_joint_speeds cannot be combined '
+                                       'with a search for the maximum payload: leave them out')
             options = search_options(request, settings)
             cell = self._starts.near(task, searched=True)
             found = find_max_payload(
@@ -244,4 +244,4 @@ def canceled_outcome(state: RequestState) -> Outcome:
 def busy_outcome(queue_length: int) -> Outcome:
     """Return the outcome of a request that finds the queue full."""
     return _failure(PlanReport.BUSY, f'{queue_length} requests are waiting already; '
-                                     'the parameter queue_length allows no more')
+                                     'the parameter queue_length allows no more: try again later')

@@ -10,7 +10,7 @@ import time
 from flex_planner.base.progress import Progress
 from flex_planner.ros.settings.planner import PlannerSettings
 
-_WAITING = Progress(phase='waiting for the requests before', iteration=0, residual=math.inf,
+_WAITING = Progress(phase='waiting for earlier requests', iteration=0, residual=math.inf,
                     intervals=0)
 
 

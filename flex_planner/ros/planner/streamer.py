@@ -74,7 +74,7 @@ class Streamer:
                 self._write(data)
                 return
         self._node.get_logger().warning(
-            'the process that streams ~/reference_states is gone: it is started again')
+            'the process that streams ~/reference_states has ended: starting it again')
         self.close()
         self._process = self._start_process()
         self._write(data)

@@ -33,7 +33,7 @@ class PlannerSettings:
     """
 
     elbow: int = parameter_field(
-        -1, 'Sign of the second joint angle, +1 or -1, where a request leaves elbow at 0.',
+        -1, 'Sign of the second joint angle, +1 or -1, for requests whose elbow is 0.',
         lowest=-1, highest=1)
     tolerance: float = parameter_field(
         1e-3, 'eps of eq. (17): largest half squared error of the final state.',
@@ -41,13 +41,13 @@ class PlannerSettings:
     allowed_planning_time: float = parameter_field(
         30.0, 'Time limit of a request that sets none [s].', lowest=1e-3, highest=3600.0)
     effort_weights: list[float] = parameter_field(
-        [1.0], 'Diagonal of R where a request gives none: one entry per joint.')
+        [1.0], 'Diagonal of R for requests that give none: one entry per joint.')
     payload_accuracy: float = parameter_field(
-        1e-3, 'Largest error of a maximum payload where a request gives none [kg].',
+        1e-3, 'Largest error of a maximum payload, for requests that give none [kg].',
         lowest=MIN_ACCURACY, highest=MAX_ACCURACY)
     payload_step: float = parameter_field(
-        1.0, 'First step of the incremental search for it where a request gives none; where that '
-        'is less than the accuracy, the accuracy counts [kg].',
+        1.0, 'First step of the incremental search for a maximum payload, for requests that give '
+        'none; at least the accuracy is used [kg].',
         lowest=MIN_ACCURACY, highest=MAX_PAYLOAD)
     joint_names: list[str] = parameter_field(
         ['joint1'], 'Names of the joints in trajectories, from the base outwards.',
@@ -59,21 +59,21 @@ class PlannerSettings:
     max_intervals: int = parameter_field(
         2000, 'Most intervals of a mesh.', lowest=4, highest=20000)
     max_iterations: int = parameter_field(
-        60, 'Newton iterations on one mesh.', lowest=1, highest=1000)
+        60, 'Most Newton iterations on one mesh.', lowest=1, highest=1000)
     error_tolerance: float = parameter_field(
         1e-6, 'Largest estimated error of states and costates relative to their magnitude.',
         lowest=1e-11, highest=1.0)
     sampling_step: float = parameter_field(
         0.01, 'Longest time between published samples [s].', lowest=2.5e-4, highest=1.0)
     torque_tolerance: float = parameter_field(
-        0.02, 'Samples get closer until linear interpolation of the torque is this exact [N m].',
+        0.02, 'Largest error of linear interpolation of the torque between the samples [N m].',
         lowest=1e-6, highest=1e6)
     reference_rate: float = parameter_field(
         100.0, 'Rate of the states that are streamed along a published plan [Hz].', lowest=1.0,
         highest=1000.0)
     map_store: str = parameter_field(
-        '', 'Store of a map of this arm that flex-planner map has made: requests near one of its '
-        'cells start from the motion there. Empty for none.', read_only=True)
+        '', 'Store of a map of this arm, made by flex-planner map: requests near one of its cells '
+        'start from the motion of that cell. Empty for none.', read_only=True)
     queue_length: int = parameter_field(
         8, 'Requests that may wait; more are answered BUSY.', lowest=1, highest=1000,
         read_only=True)
@@ -81,7 +81,7 @@ class PlannerSettings:
         '', 'Folder of the recordings; empty for $ROS_HOME/flex_planner.', read_only=True)
     record: bool = parameter_field(True, 'Whether to record every request with its outcome.')
     max_recording_size: int = parameter_field(
-        0, 'Size from which on a recording continues in another file, at least 65536 [bytes]; 0: '
+        0, 'Size at which a recording continues in another file, at least 65536 [bytes]; 0: '
         'recordings are never split.', lowest=0, highest=MAX_RECORDING_SIZE)
 
     def __post_init__(self) -> None:

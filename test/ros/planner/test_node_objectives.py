@@ -89,4 +89,4 @@ def test_search_for_the_maximum_payload_takes_no_objectives(worker: RequestPlann
     request.task.max_joint_speeds = [0.8, 0.8]
     outcome = worker.find_max_payload(request, RequestState(settings=settings))
     assert outcome.report.error_code == PlanReport.INVALID_TASK
-    assert 'do not go with a search for the maximum payload' in outcome.report.error_msg
+    assert 'cannot be combined with a search for the maximum payload' in outcome.report.error_msg
