@@ -21,7 +21,9 @@ from flex_planner.ros.messages.plans import (
     report_from_plan,
     report_trajectory,
 )
+from flex_planner.ros.planner.outcome import Outcome
 from flex_planner.ros.planner.recorder import OutcomeRecorder
+from flex_planner.ros.planner.request_state import RequestState
 from flex_planner.ros.settings.planner import PlannerSettings
 from flex_planner_interfaces.msg import (
     FlexibleTrajectory,
@@ -81,9 +83,9 @@ class RequestRecorder:
         if plan is not None and reference is not None:
             trajectory = report_trajectory(report, plan, reference, self._settings)
         report.planning_time = duration_message(took)
-        return self._recorder.write(
-            self._settings, time.time_ns() - took, self._message, report, trajectory, plan,
-            reference, lambda: False, search=search)
+        state = RequestState(settings=self._settings, stamp_ns=time.time_ns() - took)
+        return self._recorder.write(self._message, state, Outcome(
+            report=report, trajectory=trajectory, plan=plan, reference=reference, search=search))
 
 
 def task_message(request: Request) -> MotionTask:

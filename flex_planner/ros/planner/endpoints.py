@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from flex_planner.ros.messages.payload_searches import fill_response, search_without_result
 from flex_planner.ros.messages.plans import duration_message
-from flex_planner.ros.planner.request_planner import Outcome
+from flex_planner.ros.planner.outcome import Outcome
 from flex_planner.ros.planner.request_queue import PendingRequest, Work
 from flex_planner.ros.planner.request_state import RequestState
 from flex_planner_interfaces.msg import MotionTask, PlanReport

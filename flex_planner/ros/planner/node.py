@@ -11,8 +11,9 @@ from flex_planner.ros.messages.plans import duration_seconds
 from flex_planner.ros.planner.diagnostics import Diagnostics, Record
 from flex_planner.ros.planner.endpoints import Endpoint, fill_plan, fill_search, RequestHandlers
 from flex_planner.ros.planner.map_starts import Starts
+from flex_planner.ros.planner.outcome import Outcome, unknown_failure
 from flex_planner.ros.planner.recorder import OutcomeRecorder
-from flex_planner.ros.planner.request_planner import Outcome, RequestPlanner, unknown_failure
+from flex_planner.ros.planner.request_planner import RequestPlanner
 from flex_planner.ros.planner.request_queue import PendingRequest, RequestQueue, Work
 from flex_planner.ros.planner.streamer import Streamer
 from flex_planner.ros.runtime.parameters import (

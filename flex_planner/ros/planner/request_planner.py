@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 import logging
 from pathlib import Path
 import shutil
 
 from flex_planner.base.errors import FlexPlannerError, InvalidTaskError
-from flex_planner.base.progress import Monitor, StoppedError, StopReason
+from flex_planner.base.progress import Monitor, StoppedError
 from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_path, WARM_START
-from flex_planner.planning.sampling import sample_plan, SampledPlan
+from flex_planner.planning.sampling import sample_plan
 from flex_planner.ros.messages.payload_searches import (
     report_from_search,
     search_message,
@@ -25,7 +25,6 @@ from flex_planner.ros.messages.payload_searches import (
 from flex_planner.ros.messages.plans import (
     duration_message,
     error_code,
-    failure_report,
     objectives_from_message,
     planning_time_limit,
     report_from_plan,
@@ -35,6 +34,7 @@ from flex_planner.ros.messages.plans import (
 )
 from flex_planner.ros.messages.trajectory_rules import trajectory_violations
 from flex_planner.ros.planner.map_starts import Starts
+from flex_planner.ros.planner.outcome import failure_outcome, Outcome, unknown_failure
 from flex_planner.ros.planner.recorder import OutcomeRecorder
 from flex_planner.ros.planner.request_state import RequestState
 from flex_planner.ros.settings.planner import PlannerSettings
@@ -47,36 +47,6 @@ from flex_planner_interfaces.msg import (
 from flex_planner_interfaces.srv import FindMaxPayload
 
 _LOG = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Outcome:
-    """
-    The outcome of a request.
-
-    Attributes
-    ----------
-    report : PlanReport
-        Always filled.
-    trajectory : FlexibleTrajectory
-        Empty unless there is a plan.
-    plan, reference : Plan, SampledPlan or None
-        What the trajectory was made of.
-    search : PayloadSearch or None
-        Result of a search for the maximum payload.
-
-    """
-
-    report: PlanReport
-    trajectory: FlexibleTrajectory
-    plan: Plan | None = None
-    reference: SampledPlan | None = None
-    search: PayloadSearch | None = None
-
-    @property
-    def publishable(self) -> bool:
-        """Whether a controller may have the trajectory."""
-        return bool(self.report.error_code == PlanReport.NONE)
 
 
 class RequestPlanner:
@@ -176,9 +146,9 @@ class RequestPlanner:
                               canceled=state.is_canceled, report=state.report)
             outcome = work(task, monitor)
         except FlexPlannerError as error:
-            outcome = _failure(error_code(error), str(error))
+            outcome = failure_outcome(error_code(error), str(error))
         except StoppedError as stop:
-            outcome = _failure(STOP_CODES[stop.reason], stop.reason.value)
+            outcome = failure_outcome(STOP_CODES[stop.reason], stop.reason.value)
         except Exception as error:
             _LOG.exception('planning failed')
             outcome = unknown_failure(error)
@@ -194,9 +164,7 @@ class RequestPlanner:
             return outcome
         self._report_in_work = outcome.report
         try:
-            path = self._recorder.write(
-                state.settings, state.stamp_ns, message, outcome.report, outcome.trajectory,
-                outcome.plan, outcome.reference, state.stopping, search=outcome.search)
+            path = self._recorder.write(message, state, outcome)
         except Exception as error:
             foreseen = isinstance(error, FlexPlannerError)
             _LOG.error('recording failed: %s', error, exc_info=not foreseen)
@@ -223,25 +191,3 @@ def _outcome(report: PlanReport, plan: Plan | None, settings: PlannerSettings,
     if broken:
         raise RuntimeError(f'the trajectory would be refused: {"; ".join(broken)}')
     return Outcome(report=report, trajectory=trajectory, plan=plan, reference=reference)
-
-
-def _failure(code: int, sentence: str) -> Outcome:
-    return Outcome(report=failure_report(code, sentence), trajectory=FlexibleTrajectory())
-
-
-def unknown_failure(error: Exception) -> Outcome:
-    """Return the outcome of an unexpected exception."""
-    return _failure(PlanReport.UNKNOWN, f'{type(error).__name__}: {error}')
-
-
-def canceled_outcome(state: RequestState) -> Outcome:
-    """Return the outcome of a request that its client gave up."""
-    outcome = _failure(PlanReport.CANCELED, StopReason.CANCELED.value)
-    outcome.report.planning_time = duration_message(state.elapsed_ns)
-    return outcome
-
-
-def busy_outcome(queue_length: int) -> Outcome:
-    """Return the outcome of a request that finds the queue full."""
-    return _failure(PlanReport.BUSY, f'{queue_length} requests are waiting already; '
-                                     'the parameter queue_length allows no more: try again later')

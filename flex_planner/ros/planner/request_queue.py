@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 import threading
 
-from flex_planner.ros.planner.request_planner import (
+from flex_planner.ros.planner.outcome import (
     busy_outcome,
     canceled_outcome,
     Outcome,

@@ -36,7 +36,7 @@ from flex_planner.ros.messages.plans import (
     STATUS_CODES,
     task_from_message,
 )
-from flex_planner.ros.planner.request_planner import busy_outcome, unknown_failure
+from flex_planner.ros.planner.outcome import busy_outcome, unknown_failure
 from flex_planner.ros.settings.planner import PlannerSettings
 from flex_planner_interfaces.msg import MotionTask, PlanReport
 from geometry_msgs.msg import Point

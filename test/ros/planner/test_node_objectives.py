@@ -9,8 +9,9 @@ from typing import Any
 
 from flex_planner.arms.arm import Arm
 from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.ros.planner.outcome import Outcome
 from flex_planner.ros.planner.recorder import OutcomeRecorder
-from flex_planner.ros.planner.request_planner import Outcome, RequestPlanner
+from flex_planner.ros.planner.request_planner import RequestPlanner
 from flex_planner.ros.planner.request_state import RequestState
 from flex_planner.ros.settings.planner import PlannerSettings
 from flex_planner_interfaces.msg import PlanReport

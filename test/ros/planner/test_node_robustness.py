@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from array import array
-from collections import RequestHandlers
+from collections import Counter
 from collections.abc import Iterator
 import os
 import signal
@@ -47,7 +47,7 @@ def test_hundred_requests_at_once_are_all_answered(planner: Planner) -> None:
     check_that_it_serves(planner)
     futures = [planner.send_plan(payload_mass=0.01 * k) for k in range(100)]
     planner.wait('all answers', lambda: all(future.done() for future in futures))
-    codes = RequestHandlers(future.result().report.error_code for future in futures)
+    codes = Counter(future.result().report.error_code for future in futures)
     assert set(codes) == {PlanReport.NONE, PlanReport.BUSY}
     assert codes[PlanReport.NONE] >= QUEUE
     solved = [future.result().trajectory.payload_mass for future in futures
@@ -57,7 +57,7 @@ def test_hundred_requests_at_once_are_all_answered(planner: Planner) -> None:
 
 def test_hundred_goals_in_a_row_all_end(planner: Planner) -> None:
     goals = [planner.plan_goal(payload_mass=0.01 * k) for k in range(100)]
-    codes = RequestHandlers(goal.end()[1].report.error_code for goal in goals)
+    codes = Counter(goal.end()[1].report.error_code for goal in goals)
     assert set(codes) <= {PlanReport.NONE, PlanReport.BUSY}
     assert codes[PlanReport.NONE] >= QUEUE
     check_that_it_serves(planner)

@@ -12,8 +12,9 @@ from flex_planner.arms.arm import Arm, Joint
 from flex_planner.base.progress import StoppedError, StopReason
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.ros.planner import request_planner
+from flex_planner.ros.planner.outcome import Outcome
 from flex_planner.ros.planner.recorder import OutcomeRecorder
-from flex_planner.ros.planner.request_planner import Outcome, RequestPlanner
+from flex_planner.ros.planner.request_planner import RequestPlanner
 from flex_planner.ros.planner.request_state import RequestState
 from flex_planner.ros.settings.planner import PlannerSettings
 from flex_planner_interfaces.msg import PayloadSearch, PlanReport

@@ -8,7 +8,7 @@ import time
 from typing import Any
 
 from flex_planner.base.progress import Progress
-from flex_planner.ros.planner.request_planner import Outcome, unknown_failure
+from flex_planner.ros.planner.outcome import Outcome, unknown_failure
 from flex_planner.ros.planner.request_queue import RequestQueue
 from flex_planner.ros.planner.request_state import RequestState
 from flex_planner.ros.settings.planner import PlannerSettings
