@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
 import sys
 
@@ -38,11 +39,10 @@ def add_commands(commands: Commands) -> None:
 
 
 def _add_replay(commands: Commands) -> None:
-    parser = commands.add_parser(
-        'replay', help='publish a recording again (needs ROS 2)',
-        description='Publish a recording on its topics, at its times and with its quality of '
-        'service, then end; Ctrl-C ends it earlier.')
-    _add_recording(parser)
+    parser = _add_command(
+        commands, 'replay', _replay, 'publish a recording again (needs ROS 2)',
+        'Publish a recording on its topics, at its times and with its quality of service, then '
+        'end; Ctrl-C ends it earlier.')
     parser.add_argument('--rate', type=float, default=1.0, metavar='FACTOR',
                         help='speed of the playback, 2 is twice as fast (default: 1)')
     parser.add_argument('--start', type=float, default=0.0, metavar='S',
@@ -52,36 +52,36 @@ def _add_replay(commands: Commands) -> None:
                         help='time before the first message, in which subscribers find the '
                         'publishers (default: 1)')
     parser.add_argument('--loop', action='store_true', help='begin again at the end')
-    parser.set_defaults(run=_replay)
 
 
 def _add_report(commands: Commands) -> None:
-    parser = commands.add_parser(
-        'report', help='make an HTML page of a recorded plan, check it against the model',
-        description='Make one HTML file of a recorded request: task, outcome, certificate, and '
-        'plots to zoom into. It needs neither ROS nor a network.')
-    _add_recording(parser)
+    parser = _add_command(
+        commands, 'report', _report,
+        'make an HTML page of a recorded plan, check it against the model',
+        'Make one HTML file of a recorded request: task, outcome, certificate, and plots to zoom '
+        'into. It needs neither ROS nor a network.')
     parser.add_argument('--output', type=Path, metavar='HTML',
                         help='the file (default: <recording>.html)')
     parser.add_argument('--check', action='store_true',
                         help='apply the recorded torques to the recorded arm, compare with the '
                         'recorded plan, and fail where they differ')
-    parser.set_defaults(run=_report)
 
 
 def _add_recover(commands: Commands) -> None:
-    parser = commands.add_parser(
-        'recover', help='save the complete part of a recording that broke off',
-        description='Make a recording of the complete part of one that is damaged, or whose '
-        'writer was killed (the hidden folder .<name>.<hex>). The original stays as it is.')
-    _add_recording(parser)
-    parser.set_defaults(run=_recover)
+    _add_command(
+        commands, 'recover', _recover, 'save the complete part of a recording that broke off',
+        'Make a recording of the complete part of one that is damaged, or whose writer was killed '
+        '(the hidden folder .<name>.<hex>). The original stays as it is.')
 
 
-def _add_recording(parser: argparse.ArgumentParser) -> None:
-    """Add the recording that a command is about."""
+def _add_command(commands: Commands, name: str, run: Callable[[argparse.Namespace], int],
+                 summary: str, description: str) -> argparse.ArgumentParser:
+    """Add a command that is about one recording."""
+    parser = commands.add_parser(name, help=summary, description=description)
     parser.add_argument('recording', type=Path, metavar='RECORDING',
                         help='folder of a recording, or its .mcap file')
+    parser.set_defaults(run=run)
+    return parser
 
 
 def _replay(options: argparse.Namespace) -> int:

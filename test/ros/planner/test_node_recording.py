@@ -272,7 +272,7 @@ def recorded_search(response: FindMaxPayload.Response, **asked: Any) -> PayloadS
 
 
 @pytest.fixture(scope='module')
-def search_payload(planner: Planner) -> FindMaxPayload.Response:
+def searched(planner: Planner) -> FindMaxPayload.Response:
     answer = planner.search(publish=True, **SEARCHED)
     assert answer.report.error_code == PlanReport.NONE, answer.report.error_msg
     return answer
