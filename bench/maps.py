@@ -25,6 +25,7 @@ from flex_planner.maps.quantities import Quantity
 from flex_planner.maps.run_map import run_map
 from flex_planner.maps.store import MapStore
 from flex_planner.maps.study import Study
+from flex_planner.maps.study_motion import StudyMotion
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.planning.plan import PlanStatus
 from flex_planner.reports.motion import table
@@ -44,8 +45,9 @@ def study(arm: str) -> Study:
     given = load_arm(arm)
     single = Mismatch(modes=1).apply(given) if given.n_modes else given
     return Study(name='bench', arm=single, quantity=Quantity.MAX_PAYLOAD, axes=axes,
-                 start=End(name='start', point=np.array([0.5, 0.0])), goal=End(name='goal'),
-                 effort_weights=np.array([0.125, 0.125]), accuracy=1e-3,
+                 motion=StudyMotion(start=End(name='start', point=np.array([0.5, 0.0])),
+                                    goal=End(name='goal'),
+                                    effort_weights=np.array([0.125, 0.125])), accuracy=1e-3,
                  block_shape=(BLOCK, BLOCK), text='name: bench\n')
 
 

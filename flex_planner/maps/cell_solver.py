@@ -125,11 +125,11 @@ class CellSolver:
         """Carry a plan out on the arm that is simulated."""
         study = self._study
         arm, carried = study.plant(index)
-        gains = study.gains or Gains.of(arm.n_joints, 0.0, 0.0)
+        gains = study.simulated.gains or Gains.of(arm.n_joints, 0.0, 0.0)
         goal = tip_position(task.arm, plan.problem.goal[:task.arm.n_coordinates])
         setting = Setting(model=PlantModel(arm), gains=gains, rate=_RATE, payload_mass=carried,
-                          goal=goal, settling=study.settling, monitor=monitor)
-        mode = ExecutionMode.FLEXIBLE if study.gains else ExecutionMode.FLEXIBLE_OPEN
+                          goal=goal, settling=study.simulated.settling, monitor=monitor)
+        mode = ExecutionMode.FLEXIBLE if study.simulated.gains else ExecutionMode.FLEXIBLE_OPEN
         executed = execute_plan(mode, plan, sample_finely(plan, monitor), setting)
         return Vibration(plan=plan, peak_to_peak=executed.residual.tip)
 

@@ -23,6 +23,7 @@ from flex_planner.maps.cell_results import CellCode
 from flex_planner.maps.end_points import are_close, End
 from flex_planner.maps.quantities import Quantity
 from flex_planner.maps.study import load_study, Study, StudyError
+from flex_planner.maps.study_motion import StudyMotion
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.task import postures_from_points, Task
 from flex_planner.planning.plan_path import plan_path
@@ -151,11 +152,13 @@ def study_of(folder: Path, content: object) -> Study:
     return load_study(path)
 
 
-def over(arm: str, axes: dict[str, list[float]], **fields: Any) -> Study:
+def over(arm: str, axes: dict[str, list[float]], block_shape: tuple[int, ...] = (),
+         **fields: Any) -> Study:
     """Return a study of effort over some axes."""
     ends = {name: End(name=name, point=point) for name, point in
             (('start', (0.5, 0.0)), ('goal', (0.5, 0.5)))}
-    return Study(name='', arm=load_arm(arm), quantity=Quantity.MIN_EFFORT, **{**ends, **fields},
+    return Study(name='', arm=load_arm(arm), quantity=Quantity.MIN_EFFORT,
+                 block_shape=block_shape, motion=StudyMotion(**{**ends, **fields}),
                  axes=tuple(Axis(name=name, values=np.array(values, dtype=np.float64))
                             for name, values in axes.items()))
 
@@ -175,10 +178,11 @@ def test_study_is_read_as_written(tmp_path: Path) -> None:
                                                                ('payload_mass', 'kg')]
     assert study.axes[0].values.tolist() == [-0.5, -0.25, 0.0, 0.25, 0.5]
     assert [link.modes for link in study.arm.links] == [1, 1]
-    assert (study.block_shape, study.cell_time_limit, study.settling) == ((2, 1), 30.0, 2.0)
-    assert study.mismatch.added_friction.tolist() == [0.1, 0.1]
-    assert study.gains is not None
-    assert study.gains.stiffness.tolist() == [100.0, 100.0]
+    assert (study.block_shape, study.cell_time_limit) == ((2, 1), 30.0)
+    assert study.simulated.settling == 2.0
+    assert study.simulated.mismatch.added_friction.tolist() == [0.1, 0.1]
+    assert study.simulated.gains is not None
+    assert study.simulated.gains.stiffness.tolist() == [100.0, 100.0]
     assert math.isnan(study.accuracy)
     assert study.text == (tmp_path / 'study.yaml').read_text()
 

@@ -20,6 +20,7 @@ from flex_planner.maps.pictures.data import MapAxis, MapData
 from flex_planner.maps.pictures.panels import edges
 from flex_planner.maps.quantities import Quantity
 from flex_planner.maps.study import Study
+from flex_planner.maps.study_motion import StudyMotion
 from flex_planner.optimal_control.task import Task
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -90,8 +91,8 @@ def study_of(dataset: xr.Dataset) -> Study | None:
             arm=_arm(yaml.safe_load(dataset.attrs['arm'])),
             axes=tuple(Axis(name=str(name), values=dataset[name].values)
                        for name in dataset['code'].dims),
-            start=_end('start', content), goal=_end('goal', content),
-            elbow=content.get('elbow', -1), payload_mass=_PAYLOAD,
+            motion=StudyMotion(start=_end('start', content), goal=_end('goal', content),
+                               elbow=content.get('elbow', -1), payload_mass=_PAYLOAD),
             accuracy=_ACCURACY if quantity.is_searched else math.nan)
     except (FlexPlannerError, KeyError, TypeError, ValueError, AttributeError,
             yaml.YAMLError) as error:
