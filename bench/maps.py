@@ -52,7 +52,7 @@ def study(arm: str) -> Study:
 
 
 def rate(one: Study, workers: int) -> float:
-    """Return the cells that so many processes solve in a second."""
+    """Return the cells per second of a number of processes."""
     with tempfile.TemporaryDirectory() as folder:
         with MapStore.of(Path(folder, 'bench.zarr'), one) as store:
             tally = run_map(one, store, workers=workers)

@@ -1,10 +1,9 @@
 """
-Maximum payload: time to a result that is right, against IPOPT maximising the payload.
+Maximum payload: time to a correct result, against IPOPT maximising the payload.
 
-A result is right if the payload is within an accuracy of the limit, and if its torque, applied to
-the original dynamics, brings the tip to the goal, see `ACCURACIES`. Both sides pay for their
-solution; the re-simulation that checks it is not counted for IPOPT, and is for the planner, whose
-search does it.
+A result is correct if the payload is within an accuracy of the limit, and if its torque, applied
+to the original dynamics, brings the tip to the goal, see `ACCURACIES`. The time of the solution
+counts for both; that of the re-simulation only for the planner, whose search does it.
 
 """
 

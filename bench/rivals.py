@@ -219,7 +219,7 @@ def _boundary_value_solution(problem: MotionProblem, tolerance: float, monitor: 
 
 
 def _cost(problem: MotionProblem, found: Any) -> float:
-    """Return J along the cubic interpolant of solve_bvp, by five Gauss points an interval."""
+    """Return J along the cubic interpolant of solve_bvp, by five Gauss points per interval."""
     points, weights = np.polynomial.legendre.leggauss(5)
     steps = np.diff(found.x)
     times = found.x[:-1, None] + steps[:, None] * (points + 1) / 2

@@ -1,8 +1,8 @@
 """
-How quickly a planner answers while it solves.
+Response times of a planner while it solves.
 
 Run by ``tools/run python -m bench.stress``; fails if parameters take too long, or the node ends.
-That five hundred requests of all kinds are answered is tested in ``test/test_node_endurance.py``.
+``test/ros/planner/test_node_endurance.py`` tests that five hundred requests are all answered.
 
 """
 
@@ -32,7 +32,7 @@ NODE = '/flex_planner'
 
 
 class Client:
-    """Sends requests and waits for what comes back."""
+    """Sends requests and waits for the answers."""
 
     def __init__(self) -> None:
         self.node = rclpy.create_node('stress')

@@ -1,5 +1,5 @@
 """
-Ask a planner node: by its service, and by its action with progress and cancellation.
+Call a planner node by its service, and by its action with progress and cancellation.
 
 Start a planner in another terminal; this works with any arm of two joints.
 
@@ -27,7 +27,7 @@ PATIENCE = 30.0  # [s]
 TASK = MotionTask(space=MotionTask.CARTESIAN, start_point=Point(x=0.5, y=0.0),
                   goal_point=Point(x=0.5, y=0.5), duration=1.0, payload_mass=1.0,
                   publish=True)  # on the controller's topic, if it passes its certificate
-# slow to plan for a flexible arm, whose links swing a thousand times on the way
+# slow to plan for a flexible arm, whose links swing a thousand times during the motion
 SLOW = MotionTask(space=MotionTask.CARTESIAN, start_point=TASK.start_point,
                   goal_point=TASK.goal_point, duration=100.0, payload_mass=1.0)
 
@@ -41,15 +41,15 @@ def call_service(node: Node) -> None:
     if report.error_code != PlanReport.NONE:
         sys.exit(f'error {report.error_code}: {report.error_msg}')
     print(f'service: J = {report.cost:.4f}, tip error {report.tip_error * 1e3:.1e} mm, '
-          f'recorded in {report.recording or "nothing"}')
+          f'recording {report.recording or "none"}')
 
 
 def call_action(node: Node) -> None:
-    """Plan something slow, watch for a while, and give up."""
+    """Start a slow plan, watch its progress for a while, and cancel it."""
     client, heard = ActionClient(node, PlanPathAction, NAME), list[str]()
 
     def on_feedback(message: Any) -> None:
-        progress = message.feedback  # ten times a second
+        progress = message.feedback  # ten times per second
         heard.append(f'{progress.phase}, iteration {progress.iteration}')
         if heard.count(heard[-1]) == 1:
             print(f'action: {heard[-1]}')

@@ -1,5 +1,5 @@
 r"""
-Follow a plan as a joint controller does: planned torque first, PD for what is left.
+Follow a plan as a joint controller does: the planned torque, and PD for the remaining error.
 
 The node compares what the planner streams on ~/reference_states with /joint_states, and publishes
 torques as a JointGroupEffortController takes them. The plan on ~/joint_trajectory names the joints

@@ -1,9 +1,9 @@
 """
 Record a plan, read the recording back, check it again from the recording alone, report.
 
-A recording is what the planner node leaves of every request: rosbag2-compatible MCAP with the
-request, its outcome, the trajectories, and the arm. Whoever has it can rebuild arm and motion
-without the planner. Making it takes ROS 2, reading it does not.
+The planner node records every request as rosbag2-compatible MCAP: the request, its outcome, the
+trajectories, and the arm. Arm and motion can be rebuilt from it without the planner. Writing a
+recording needs ROS 2, reading it does not.
 
     tools/run python examples/replay_and_report.py
 
