@@ -1,8 +1,8 @@
 """
 Time to a solution of a given accuracy, against other ways to the same motion.
 
-The reference is the planner's own solution at a tolerance of 1e-10; the rivals confirm it: they come
-as near to it as their accuracy allows.
+The reference is the planner's own solution at a tolerance of 1e-10; the rivals confirm it, since
+they come as near to it as their accuracy allows.
 
 """
 

@@ -96,10 +96,11 @@ def check_motors(quantity: Quantity, arm: Arm) -> None:
     limited = _has_limit(arm)
     if quantity is Quantity.MAX_PAYLOAD and not any(limited):
         raise InvalidValueError('arm', 'without a limited motor',
-                                'one with a stall torque, or no payload is the largest')
+                                'one with a stall torque: otherwise there is no largest payload')
     if quantity is Quantity.MIN_DURATION and not all(limited):
         raise InvalidValueError('arm', 'with an unlimited motor',
-                                'one with stall torques, or no duration is the shortest')
+                                'one with stall torques at all joints: otherwise there is no '
+                                'shortest duration')
 
 
 def _has_limit(arm: Arm) -> list[bool]:

@@ -168,7 +168,8 @@ def check_custom_data(custom_data: Mapping[str, str]) -> Mapping[str, str]:
     """Return a read-only copy of custom data, which rosbag2 reads as strings only."""
     for key, value in custom_data.items():
         if not _is_text(key) or not _is_text(value):
-            raise InvalidValueError(f'custom_data[{key!r}]', value, 'a string under a string')
+            raise InvalidValueError(f'custom_data[{key!r}]', value,
+                                    'a string with a string as its key')
     return MappingProxyType(dict(custom_data))
 
 

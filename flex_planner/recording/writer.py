@@ -97,7 +97,8 @@ class Recording:
 
         """
         if not NAME.fullmatch(name):
-            raise InvalidValueError('name', name, 'letters, digits, _ and, not in front, - and .')
+            raise InvalidValueError('name', name, 'letters, digits and _, and after the first '
+                                    'character - and .')
         if max_bytes is not None and max_bytes < 1:
             raise InvalidValueError('max_bytes', max_bytes, 'at least 1')
         path = Path(folder) / name
@@ -168,7 +169,7 @@ class Recording:
 
         """
         if not name or not name.isprintable() or name in self._attachments:
-            raise InvalidValueError('name of an attachment', name, 'printable and not taken')
+            raise InvalidValueError('name of an attachment', name, 'printable and used only once')
         time = _integer_time('time_ns', time_ns)
         with self._writing():
             self._file.attach(name, data, media_type, time)

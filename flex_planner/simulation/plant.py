@@ -199,8 +199,8 @@ class Plant:
                         self._steps = max(self._fewest, self._steps // 2)
                     return state
                 self._steps *= 2
-        raise RunawayError(f'the simulated arm has run away after {self.time:.3f} s: gains that '
-                           'are too high for the rate of the controller, or too much torque')
+        raise RunawayError(f'the simulated arm has run away after {self.time:.3f} s: the gains '
+                           'are too high for the rate of the controller, or the torques too large')
 
     def _take_steps(self, torque: Array) -> tuple[Array, float]:
         """Return the state after equal steps, and the error of the worst of them."""
