@@ -39,7 +39,7 @@ takes minutes from 2 links with 2 modes on, and was not run there.
 
 
 def versions() -> dict[str, str]:
-    """Return what the figures depend on."""
+    """Return the versions and the machine that the figures depend on."""
     import casadi
     import scipy
     import sympy
@@ -54,12 +54,12 @@ def versions() -> dict[str, str]:
 SOLVER = """
 ## The solver
 
-The paper's arm with two modes a link (24 unknowns), its motion of section 5.2, without (1 kg) and
-with (5.5 kg) saturated motors. Every method runs at the coarsest level that reaches the accuracy;
-the errors are relative, of J and of the worst initial costate. solve_bvp has the same compiled
-functions and Jacobian, IPOPT the same dynamics with exact derivatives; the time to derive its
-programme (0.1 to 0.7 s) is not counted. *Cold* is a straight line, *warm* the solution with 0.5 %
-other payload. `nan`: not run warm, because it took too long.
+The paper's arm with two modes per link (24 unknowns), its motion of section 5.2, without (1 kg)
+and with (5.5 kg) saturated motors. Every method runs at the coarsest level that reaches the
+accuracy; the errors are relative, of J and of the worst initial costate. solve_bvp has the same
+compiled functions and Jacobian, IPOPT the same dynamics with exact derivatives; the time to
+derive its programme (0.1 to 0.7 s) is not counted. *Cold* is a straight line, *warm* the solution
+with 0.5 % other payload. `nan`: not run warm, because it took too long.
 
 {table}
 

@@ -1,4 +1,4 @@
-"""How the cost of a plan grows with links and modes, and where its time goes."""
+"""Growth of the cost of a plan with links and modes, and the time of its parts."""
 
 from __future__ import annotations
 

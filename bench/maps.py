@@ -1,5 +1,5 @@
 """
-Capacity maps: cells a second on one and on two processes, from neighbours and from nothing.
+Capacity maps: cells per second in one and in two processes, from neighbours and cold.
 
 Run by ``tools/run python -m bench.maps``, on an idle machine; takes ten minutes.
 
@@ -21,9 +21,11 @@ from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.maps.axes import Axis
 from flex_planner.maps.block_solver import blocks, solve_block
 from flex_planner.maps.end_points import End
+from flex_planner.maps.quantities import Quantity
 from flex_planner.maps.run_map import run_map
 from flex_planner.maps.store import MapStore
-from flex_planner.maps.study import Quantity, Study
+from flex_planner.maps.study import Study
+from flex_planner.maps.study_motion import StudyMotion
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.planning.plan import PlanStatus
 from flex_planner.reports.motion import table
@@ -36,20 +38,21 @@ _MEGABYTE = 1024  # in the unit of ru_maxrss
 
 
 def study(arm: str) -> Study:
-    """Return the middle of the workspace, where every cell is solved; one mode a link if any."""
+    """Return the middle of the workspace, where every cell is solved; one mode per link if any."""
     side = SIDES[arm]
     axes = (Axis(name='goal_x', values=np.linspace(0.2, 0.6, side, dtype=np.float64)),
             Axis(name='goal_y', values=np.linspace(0.3, 0.7, side, dtype=np.float64)))
     given = load_arm(arm)
-    single = Mismatch(modes=1).applied(given) if given.n_modes else given
+    single = Mismatch(modes=1).apply(given) if given.n_modes else given
     return Study(name='bench', arm=single, quantity=Quantity.MAX_PAYLOAD, axes=axes,
-                 start=End(name='start', point=np.array([0.5, 0.0])), goal=End(name='goal'),
-                 effort_weights=np.array([0.125, 0.125]), accuracy=1e-3,
+                 motion=StudyMotion(start=End(name='start', point=np.array([0.5, 0.0])),
+                                    goal=End(name='goal'),
+                                    effort_weights=np.array([0.125, 0.125])), accuracy=1e-3,
                  block_shape=(BLOCK, BLOCK), text='name: bench\n')
 
 
 def rate(one: Study, workers: int) -> float:
-    """Return the cells that so many processes solve in a second."""
+    """Return the cells per second of a number of processes."""
     with tempfile.TemporaryDirectory() as folder:
         with MapStore.of(Path(folder, 'bench.zarr'), one) as store:
             tally = run_map(one, store, workers=workers)
@@ -57,7 +60,7 @@ def rate(one: Study, workers: int) -> float:
 
 
 def costs(one: Study) -> dict[str, float]:
-    """Return what a cell costs in its block and on its own [s], and the memory it takes [MB]."""
+    """Return the time of a cell in its block and on its own [s], and the memory it takes [MB]."""
     with one_thread_each(), ProcessPoolExecutor(1, multiprocessing.get_context('spawn')) as pool:
         return pool.submit(_costs, one).result()
 
@@ -89,8 +92,8 @@ def rows(arm: str) -> list[tuple[str, str]]:
     gain = statistics.median(two / one for one, two in rates)
     found = costs(one)
     return [(f'{one.arm.name}', f'{side} x {side} cells in blocks of {BLOCK} x {BLOCK}'),
-            ('  cells a second, 1 process', f'{single:.1f}'),
-            ('  cells a second, 2 processes', f'{double:.1f}'),
+            ('  cells per second, 1 process', f'{single:.1f}'),
+            ('  cells per second, 2 processes', f'{double:.1f}'),
             ('  gain, median of the runs', f'{gain:.2f}'),
             ('  a cell in its block, mean', f'{found["whole block"]:.3f} s'),
             ('  a cell from neighbors, median', f'{found["from neighbors"]:.3f} s'),

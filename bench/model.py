@@ -76,7 +76,7 @@ def random_points(arm: Arm) -> tuple[Array, Array]:
 
 
 def start_seconds(arm: Arm, cache: str) -> float:
-    """Return how long a fresh process takes from the arm to ready functions."""
+    """Return the time that a fresh process takes from the arm to ready functions."""
     code = (
         'import sys, time, pickle\n'
         'began = time.perf_counter()\n'

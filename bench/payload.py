@@ -1,10 +1,9 @@
 """
-Maximum payload: time to a result that is right, against IPOPT maximising the payload.
+Maximum payload: time to a correct result, against IPOPT maximising the payload.
 
-A result is right if the payload is within an accuracy of the limit, and if its torque, applied to
-the original dynamics, brings the tip to the goal, see `ACCURACIES`. Both sides pay for their
-solution; the re-simulation that checks it is not counted for IPOPT, and is for the planner, whose
-search does it.
+A result is correct if the payload is within an accuracy of the limit, and if its torque, applied
+to the original dynamics, brings the tip to the goal, see `ACCURACIES`. The time of the solution
+counts for both; that of the re-simulation only for the planner, whose search does it.
 
 """
 
@@ -125,7 +124,7 @@ def _rival(arm: str, problem: MotionProblem, limit: float, name: str, accuracy: 
 
 
 def _tip_error(problem: MotionProblem, settings: DirectSettings, found: DirectResult) -> float:
-    """Return how far IPOPT's torque, as its scheme interpolates it, leads past the goal."""
+    """Return the miss at the goal under IPOPT's torque, interpolated as by its scheme."""
     mesh = Mesh.of(settings.scheme, settings.degree, settings.intervals)
     breaks = np.linspace(0, problem.task.duration, settings.intervals + 1, dtype=np.float64)
     points = mesh.points * settings.intervals

@@ -1,7 +1,7 @@
 """
 Other ways to the same motions: SciPy's solve_bvp, and direct collocation with IPOPT.
 
-Each rival runs at a level: a tolerance of solve_bvp, a number of intervals for IPOPT. `matched`
+Each rival runs at a level: a tolerance of solve_bvp, a number of intervals for IPOPT. `find_match`
 looks for the level that reaches an accuracy, so that times of equally good results are compared.
 solve_bvp evaluates the planner's own compiled functions, IPOPT the programme of
 `flex_planner.optimal_control.direct.programme`.
@@ -115,8 +115,8 @@ class Match:
     search_seconds: float
 
 
-def matched(accuracy: float, run: Callable[[float, Monitor], Run], levels: Sequence[float],
-            reference: Reference, *, seconds: float = 120.0) -> Match:
+def find_match(accuracy: float, run: Callable[[float, Monitor], Run], levels: Sequence[float],
+               reference: Reference, *, seconds: float = 120.0) -> Match:
     """
     Run a rival level by level until both errors are below the accuracy.
 
@@ -196,7 +196,7 @@ def warm_boundary_value_run(problem: MotionProblem, tolerance: float,
 
 def _boundary_value_solution(problem: MotionProblem, tolerance: float, monitor: Monitor,
                              first: Any) -> Any:
-    """Return what solve_bvp returns; its arrays hold a point a column."""
+    """Return the result of solve_bvp; its arrays have one column per point."""
     half, rows = problem.size // 2, np.eye(problem.size // 2, problem.size)
     none = np.zeros_like(rows)
     jacobians = np.vstack([rows, none]), np.vstack([none, rows])
@@ -219,7 +219,7 @@ def _boundary_value_solution(problem: MotionProblem, tolerance: float, monitor: 
 
 
 def _cost(problem: MotionProblem, found: Any) -> float:
-    """Return J along the cubic interpolant of solve_bvp, by five Gauss points an interval."""
+    """Return J along the cubic interpolant of solve_bvp, by five Gauss points per interval."""
     points, weights = np.polynomial.legendre.leggauss(5)
     steps = np.diff(found.x)
     times = found.x[:-1, None] + steps[:, None] * (points + 1) / 2
@@ -231,15 +231,15 @@ def direct_run(problem: MotionProblem, scheme: str, intervals: float,
                monitor: Monitor | None = None, *, degree: int = 3) -> Run:
     """Run direct collocation from a straight line."""
     direct = _direct(problem, scheme, intervals, degree)
-    return _direct_outcome(direct, _solved(direct, problem, monitor, None))
+    return _direct_outcome(direct, _solve(direct, problem, monitor, None))
 
 
 def warm_direct_run(problem: MotionProblem, scheme: str, intervals: float,
                     monitor: Monitor | None = None, *, degree: int = 3) -> Run:
     """Run direct collocation from its unknowns and multipliers for the neighbour, not timed."""
     direct = _direct(problem, scheme, intervals, degree)
-    first = _solved(direct, neighbour(problem), monitor, None)
-    return _direct_outcome(direct, _solved(direct, problem, monitor, first))
+    first = _solve(direct, neighbour(problem), monitor, None)
+    return _direct_outcome(direct, _solve(direct, problem, monitor, first))
 
 
 def _direct(problem: MotionProblem, scheme: str, intervals: float, degree: int) -> DirectProblem:
@@ -247,8 +247,8 @@ def _direct(problem: MotionProblem, scheme: str, intervals: float, degree: int) 
         scheme=scheme, degree=degree, intervals=int(intervals), tolerance=_IPOPT_TOLERANCE))
 
 
-def _solved(direct: DirectProblem, problem: MotionProblem, monitor: Monitor | None,
-            warm: DirectResult | None) -> DirectResult:
+def _solve(direct: DirectProblem, problem: MotionProblem, monitor: Monitor | None,
+           warm: DirectResult | None) -> DirectResult:
     """Return the result of direct collocation for a motion."""
     return direct.solve(problem.parameters, problem.start, problem.goal, problem.task.duration,
                         warm=warm, monitor=monitor)

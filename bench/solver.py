@@ -1,8 +1,8 @@
 """
 Time to a solution of a given accuracy, against other ways to the same motion.
 
-The reference is the planner's own solution at a tolerance of 1e-10; that it is the right one is
-shown by the rivals, which come as near to it as they are asked to.
+The reference is the planner's own solution at a tolerance of 1e-10; the rivals confirm it, since
+they come as near to it as their accuracy allows.
 
 """
 
@@ -108,7 +108,7 @@ def measure(payload: float) -> list[Row]:
 def _rows(name: str, problem: MotionProblem, reference: Reference, cold: Runner, warm: Runner,
           levels: Sequence[float], repeats: int) -> list[Row]:
     """Search the levels that reach each accuracy, and time them."""
-    met = _searched(problem, reference, cold, levels)
+    met = _search_rows(problem, reference, cold, levels)
     rows = []
     for accuracy in ACCURACIES:
         good = [run for run in met if max(reference.errors(run)) < accuracy]
@@ -128,8 +128,8 @@ def _rows(name: str, problem: MotionProblem, reference: Reference, cold: Runner,
     return rows
 
 
-def _searched(problem: MotionProblem, reference: Reference, cold: Runner,
-              levels: Sequence[float]) -> list[Run]:
+def _search_rows(problem: MotionProblem, reference: Reference, cold: Runner,
+                 levels: Sequence[float]) -> list[Run]:
     """Return the runs at one level after another, up to the best accuracy or the time."""
     monitor, met = Monitor(time_limit=SEARCH_SECONDS), []
     for level in levels:

@@ -1,8 +1,8 @@
 """
-How quickly a planner answers while it solves.
+Response times of a planner while it solves.
 
 Run by ``tools/run python -m bench.stress``; fails if parameters take too long, or the node ends.
-That five hundred requests of all kinds are answered is tested in ``test/test_node_endurance.py``.
+``test/ros/planner/test_node_endurance.py`` tests that five hundred requests are all answered.
 
 """
 
@@ -32,7 +32,7 @@ NODE = '/flex_planner'
 
 
 class Client:
-    """Sends requests and waits for what comes back."""
+    """Sends requests and waits for the answers."""
 
     def __init__(self) -> None:
         self.node = rclpy.create_node('stress')
@@ -65,7 +65,7 @@ class Client:
         return self.wait(self._goals.send_goal_async(action.PlanPath.Goal(task=task(**fields))))
 
     def latency(self) -> float:
-        """Return how long a parameter takes to read [ms]."""
+        """Return the time to read a parameter [ms]."""
         began = time.monotonic()
         self.wait(self._parameters.call_async(GetParameters.Request(names=['tolerance'])))
         return (time.monotonic() - began) * 1e3

@@ -1,5 +1,5 @@
 r"""
-Follow a plan as a joint controller does: planned torque first, PD for what is left.
+Follow a plan as a joint controller does: the planned torque, and PD for the remaining error.
 
 The node compares what the planner streams on ~/reference_states with /joint_states, and publishes
 torques as a JointGroupEffortController takes them. The plan on ~/joint_trajectory names the joints
@@ -67,7 +67,7 @@ class Controller(Node):
         self.done = list(now.position[:n]) == list(plan.points[-1].positions)
 
     def summary(self) -> str:
-        """Return how the motion went."""
+        """Return the largest errors of the motion."""
         return f'followed: at most {max(self._errors):.4f} rad off, PD {max(self._shares):.2f} N m'
 
 

@@ -1,8 +1,8 @@
 """
-Find the largest payload of an arm, and what every payload below it costs.
+Find the largest payload of an arm, and the least effort for smaller ones.
 
 The result is a bracket: a payload that a certified plan carries, and one that is too much for the
-motors. The search meets motions of least effort near the limit, ordinary plans add lighter ones.
+motors. The search solves motions of least effort near the limit; ordinary plans add lighter ones.
 Effort and the price of a little more payload, dJ/dm_p, are the payload-effort front.
 
     tools/run python examples/find_the_payload.py
@@ -28,7 +28,7 @@ PICTURE = Path('output') / 'find_the_payload.png'
 
 
 def main() -> None:
-    """Search, and show bracket and front."""
+    """Search, then print and draw the bracket and the front."""
     model = ArmModel(load_arm('korayem_ei50'))
     start, goal = postures_from_points(model.arm, (0.5, 0.0), (0.5, 0.5), elbow=-1)
     task = Task(arm=model.arm, start_positions=start, goal_positions=goal, duration=1.0,
@@ -42,7 +42,7 @@ def main() -> None:
     for joint, share in enumerate(found.plan.saturation, 1):
         print(f'with it the motor of joint {joint} is on its limit for {share:.1%} of the time')
 
-    print('\npayload [kg]      J     dJ/dm_p   (the last grams are dear)')
+    print('\npayload [kg]      J     dJ/dm_p   (the last grams cost most)')
     plan = None
     for payload in (0.0, 2.0, 4.0, 5.5):
         plan = plan_path(replace(task, payload_mass=payload), model=model, start_from=plan)

@@ -2,8 +2,8 @@
 Keep joint speeds below a limit: the planner finds the smallest weights that do it.
 
 Section 5.2 of Korayem et al. 2009, whose fig. 1 adjusts weights by hand until the motion is as
-wanted. Here the limit is given, and the weight is answered, with the proof that a slightly
-smaller one is not enough.
+wanted. Here the limit is given, and the planner finds the weight, with the proof that a
+slightly smaller one is not enough.
 
     tools/run python examples/keep_a_speed.py
 
@@ -48,8 +48,8 @@ def main() -> None:
               f'{margin.relaxed_weight:.4f} does not ({margin.relaxed_share:.2%})')
 
     # 0.52 rad in a second need 0.52 rad/s at the very least, and motors take time to speed up
-    hopeless = plan_path(task, model=model, objectives=speed_limit(0.55))
-    print(f'\nat most 0.55 rad/s: {hopeless.message}')
+    impossible = plan_path(task, model=model, objectives=speed_limit(0.55))
+    print(f'\nat most 0.55 rad/s: {impossible.message}')
 
 
 def speed_limit(limit: float) -> Objectives:

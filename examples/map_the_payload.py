@@ -1,8 +1,8 @@
 """
-Map what an arm carries to every place, and start a search from the nearest cell.
+Map the largest payload over the workspace, and start a search from the nearest cell.
 
-A study says what is asked; its cells are computed on all processors and kept in a store that
-xarray reads. The motions behind the numbers are kept, too: a search near a cell goes on from one.
+A study describes the cells; they are computed on all processors and kept in a store that xarray
+reads. The motions are kept too: a search near a cell starts from its motion.
 
     tools/run python examples/map_the_payload.py
 

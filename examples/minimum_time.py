@@ -1,5 +1,5 @@
 """
-Find the shortest time for a motion, what time is worth, and what less time costs in payload.
+Find the shortest time for a motion, plan at a price of time, and trade payload for time.
 
     tools/run python examples/minimum_time.py
 
@@ -23,7 +23,7 @@ PICTURE = Path('output') / 'minimum_time.png'
 
 
 def main() -> None:
-    """Look at one motion from three sides."""
+    """Plan one motion in these three ways."""
     model = ArmModel(load_arm('korayem_rigid'))
     start, goal = postures_from_points(model.arm, (0.5, 0.0), (0.5, 0.5), elbow=-1)
     task = Task(arm=model.arm, start_positions=start, goal_positions=goal, duration=1.0,
@@ -35,10 +35,10 @@ def main() -> None:
         sys.exit(shortest.message)
     print(f'shortest time with 1 kg: {shortest.lower:.5f} to {shortest.duration:.5f} s')
 
-    # as fast as is worth it: the duration is free, and a second has a price
+    # at a price: the duration is free, and every second adds to the cost
     for price in (1.0, 10.0, 100.0):
         plan = plan_path(minimum_time(task, price), model=model)
-        print(f'at a price of {price:5.1f} a second: {plan.task.duration:.4f} s, '
+        print(f'at a price of {price:5.1f} per second: {plan.task.duration:.4f} s, '
               f'effort {plan.effort:7.2f} N^2 m^2 s, {plan.status.value}')
 
     # the same front from its other side: less time, less payload

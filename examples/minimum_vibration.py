@@ -1,8 +1,8 @@
 """
-Keep the links from ringing on the way: weigh the rates of the bending in the cost.
+Reduce the vibration of the links during a motion: weigh the rates of the bending in the cost.
 
 Section 5.5 of Korayem et al. 2009. A plan of least effort leaves no vibration behind, but the
-links ring while it lasts. `minimum_vibration` puts a weight on the modal rates; the joints then
+links vibrate while it lasts. `minimum_vibration` puts a weight on the modal rates; the joints then
 move more smoothly, at more effort.
 
     tools/run python examples/minimum_vibration.py

@@ -25,7 +25,7 @@ PICTURE = Path('output') / 'plan_a_path.png'
 
 
 def main() -> None:
-    """Plan, and show what a plan holds."""
+    """Plan a motion, then print and draw it."""
     arm = load_arm('korayem_ei50')  # a preset of config/arms, or the path of a YAML file
     start, goal = postures_from_points(arm, (0.5, 0.0), (0.5, 0.5), elbow=-1)
     task = Task(arm=arm, start_positions=start, goal_positions=goal, duration=1.0,

@@ -1,9 +1,9 @@
 """
 Record a plan, read the recording back, check it again from the recording alone, report.
 
-A recording is what the planner node leaves of every request: rosbag2-compatible MCAP with the
-request, its outcome, the trajectories, and the arm. Whoever has it can rebuild arm and motion
-without the planner. Making it takes ROS 2, reading it does not.
+The planner node records every request as rosbag2-compatible MCAP: the request, its outcome, the
+trajectories, and the arm. Arm and motion can be rebuilt from it without the planner. Writing a
+recording needs ROS 2, reading it does not.
 
     tools/run python examples/replay_and_report.py
 
@@ -28,7 +28,7 @@ import numpy as np
 FOLDER = Path('output')
 
 
-def recorded() -> Path:
+def record_plan() -> Path:
     """Plan a motion, record it as the node would, and return the folder."""
     arm, points = load_arm('korayem_ei50'), (np.array([0.5, 0.0]), np.array([0.5, 0.5]))
     start, goal = postures_from_points(arm, *points, elbow=-1)
@@ -44,7 +44,7 @@ def recorded() -> Path:
 
 def main() -> None:
     """Record, read, check, report."""
-    path = recorded()
+    path = record_plan()
     print(f'recording: {path}')
 
     # as messages, in the order of their times; any rosbag2 tool reads them as well

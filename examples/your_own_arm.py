@@ -1,5 +1,5 @@
 """
-Describe an arm of your own in a file, see what it means, and plan with it.
+Describe your own arm in a file, print its properties, and plan with it.
 
 An arm file has physical quantities in SI units, docs/arm_files.md lists them. This one is an
 aluminium beam at a hub, clamped, upright under gravity. Its functions are compiled when it is
@@ -31,8 +31,8 @@ links:
     youngs_modulus: 7.0e+10
     section: {width: 0.04, thickness: 0.004}
     modes: 2
-    mode_family: clamped_mass   # shapes of a cantilever that carries...
-    shape_mass: 0.2             # ...about what the payload will be
+    mode_family: clamped_mass   # shapes of a cantilever with a load...
+    shape_mass: 0.2             # ...of about the expected payload
     shape_inertia: 0.0
     damping_ratio: 0.005
 joints:
@@ -53,7 +53,7 @@ def main() -> None:
     try:
         load_arm(str(misspelt))
     except ArmFileError as error:  # every mistake is named by its place in the file
-        print(f'a mistake is found: {error}\n')
+        print(f'the mistake is found: {error}\n')
 
     model, payload = ArmModel(load_arm(str(file))), 0.2
     hanging, level = np.array([-np.pi / 2]), np.array([0.0])

@@ -196,9 +196,9 @@ class Arm:
     links : tuple of Link
         1 to 8.
     joints : tuple of Joint
-        One a link.
+        One per link.
     nodes : tuple of Node
-        One a joint and one for the tip; empty for none.
+        One per joint and one for the tip; empty for none.
     gravity : array_like, shape (2,)
         In the plane of motion [m/s^2]; zero for a horizontal plane.
 
@@ -226,10 +226,10 @@ class Arm:
     def __post_init__(self) -> None:
         n = integer('number of links', len(self.links), at_least=1, at_most=MAX_LINKS)
         if len(self.joints) != n:
-            raise InvalidValueError('number of joints', len(self.joints), f'{n}, one a link')
+            raise InvalidValueError('number of joints', len(self.joints), f'{n}, one per link')
         if len(self.nodes) not in (0, n + 1):
             raise InvalidValueError('number of nodes', len(self.nodes),
-                                    f'0 or {n + 1}, one a joint and one for the tip')
+                                    f'0 or {n + 1}, one per joint and one for the tip')
         if not self.nodes:
             object.__setattr__(self, 'nodes', (Node(),) * (n + 1))
         object.__setattr__(self, 'gravity', vector('gravity', self.gravity, 2, unit='m/s^2'))
@@ -257,7 +257,7 @@ class Arm:
 
     @property
     def modal_slices(self) -> tuple[slice, ...]:
-        """Return where each link's modal coordinates are among the generalized ones."""
+        """Return the slice of each link's modal coordinates among the generalized ones."""
         ends = np.cumsum([self.n_joints, *(link.modes for link in self.links)])
         return tuple(slice(int(a), int(b)) for a, b in zip(ends[:-1], ends[1:], strict=True))
 

@@ -25,7 +25,7 @@ class ArmFileError(FlexPlannerError):
 
 
 def config_folders() -> list[Path]:
-    """Return where presets are looked for: ROS shares, the source tree, the Python prefix."""
+    """Return the folders that may hold presets: source tree, ROS shares, Python prefix."""
     prefixes = [Path(entry) for entry in os.environ.get('AMENT_PREFIX_PATH', '').split(':')
                 if entry]
     shares = [prefix / 'share' / 'flex_planner' / 'config'
@@ -161,13 +161,13 @@ def _cross_section(section: YamlSection) -> tuple[float, float]:
     return math.nan, math.nan
 
 
-def _one_of(section: YamlSection, ways: Mapping[str, Callable[[float], float]]) -> float:
-    """Return a quantity that may be given in several ways, but has to be given in one."""
-    given = [name for name in ways if section.has(name)]
+def _one_of(section: YamlSection, conversions: Mapping[str, Callable[[float], float]]) -> float:
+    """Return a quantity that a file may give by several fields, but must give by one."""
+    given = [name for name in conversions if section.has(name)]
     if len(given) != 1:
-        raise InvalidValueError(section.name(' or '.join(ways)),
-                                ' and '.join(given) or None, 'given, one of them')
-    result = ways[given[0]](_number(section, given[0]))
+        raise InvalidValueError(section.name(' or '.join(conversions)),
+                                ' and '.join(given) or None, 'given, exactly one of them')
+    result = conversions[given[0]](_number(section, given[0]))
     if math.isnan(result):
         needs = 'section' if given[0] == 'density' else 'section or second_moment_of_area'
         raise InvalidValueError(section.name(needs), None, f'given with {given[0]}')

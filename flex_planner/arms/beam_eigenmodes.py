@@ -111,7 +111,7 @@ def clamped_eigenvalue(order: int, load: TipLoad) -> float:
 
 
 def frequency_equation(value: float, load: TipLoad) -> float:
-    """Return what vanishes at the eigenvalues of a clamped beam with a tip load."""
+    """Return the frequency function of a clamped beam with a tip load, 0 at its eigenvalues."""
     gap, deflection, _, slope = _tip_functions(value)
     free = 2 - gap if value < _SERIES_BELOW else 1 / math.cosh(value) + math.cos(value)
     mass, inertia = load.mass_ratio * value, load.inertia_ratio * value**3
@@ -120,7 +120,7 @@ def frequency_equation(value: float, load: TipLoad) -> float:
 
 def eigenvalues_below(value: float, load: TipLoad) -> int:
     """
-    Return how many eigenvalues of a clamped beam with a tip load lie below a value > 0.
+    Return the number of eigenvalues of a clamped beam with a tip load below a value > 0.
 
     Wittrick and Williams 1971: the eigenvalues of the beam clamped at both ends, and one for
     each negative eigenvalue of the dynamic stiffness of its tip.

@@ -113,8 +113,9 @@ def inverse_kinematics(arm: Arm, point: ArrayLike, elbow: int,
     elif arm.n_joints == 2:
         positions = _two_links(arm, target, elbow)
     else:
-        positions = _nearest(arm, target, _bent(arm, target, elbow) if near is None else near)
-    positions = _turned_into_limits(arm, positions, near)
+        wanted = _bent_posture(arm, target, elbow) if near is None else near
+        positions = _nearest_posture(arm, target, wanted)
+    positions = _turn_into_limits(arm, positions, near)
     check_singularity(arm, positions)
     return positions
 
@@ -139,7 +140,7 @@ def _two_links(arm: Arm, point: Array, elbow: int) -> Array:
     return np.array([np.remainder(theta_1 + np.pi, 2 * np.pi) - np.pi, theta_2])
 
 
-def _bent(arm: Arm, point: Array, elbow: int) -> Array:
+def _bent_posture(arm: Arm, point: Array, elbow: int) -> Array:
     """Return a posture bent evenly to one side, its tip in the direction of a point."""
     share = np.clip(np.hypot(*point) / arm.reach, 0, 1)
     posture = np.full(arm.n_joints, elbow * 2 * np.arccos(share) / (arm.n_joints - 1))
@@ -149,7 +150,7 @@ def _bent(arm: Arm, point: Array, elbow: int) -> Array:
     return posture
 
 
-def _nearest(arm: Arm, point: Array, near: Array) -> Array:
+def _nearest_posture(arm: Arm, point: Array, near: Array) -> Array:
     """Return the posture closest to a given one among those that reach a point."""
     rigid, (lower, upper) = arm.rigid(), arm.angle_limits()
     from scipy.optimize import least_squares  # a tenth of a second, and not every task needs it
@@ -178,7 +179,7 @@ def _starts(near: Array, lower: Array, upper: Array) -> list[Array]:
     return [middle, *random.uniform(low, high, (_CANDIDATES, near.size))]
 
 
-def _turned_into_limits(arm: Arm, positions: Array, near: Array | None) -> Array:
+def _turn_into_limits(arm: Arm, positions: Array, near: Array | None) -> Array:
     """Return the same posture by the full turns that suit the joint limits, then `near`."""
     result = positions.copy()
     for i, joint in enumerate(arm.joints):

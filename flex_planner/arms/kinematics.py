@@ -1,5 +1,5 @@
 """
-Where the arm is and how fast it moves: frames, bent links, tip.
+Position and velocity of the arm: frames, bent links, tip.
 
 Written with array operations and apart from :mod:`flex_planner.dynamics.planar_chain`, so that
 each can check the other.
@@ -43,7 +43,7 @@ def link_points(arm: Arm, coordinates: Array, stations: int = 2) -> Array:
     coordinates : numpy.ndarray, shape (..., n_t)
         q.
     stations : int
-        Points a link, at least 2: both ends are included.
+        Points per link, at least 2: both ends are included.
 
     Returns
     -------

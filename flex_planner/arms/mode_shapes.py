@@ -40,7 +40,7 @@ class LinkModes:
     stiffness : numpy.ndarray, shape (n_modes, n_modes)
         Integral of phi'' phi''^T [1/m^3]; the flexural rigidity multiplies it.
     tip_deflection, tip_slope : numpy.ndarray, shape (n_modes,)
-        What a unit of each mode displaces and turns the frame of the next link by,
+        Displacement and turn of the frame of the next link per unit of each mode,
         [m/m] and [rad/m].
 
     """
@@ -132,14 +132,14 @@ def clamped_mass(length: float, count: int, load: TipLoad | None = None) -> Link
     modes = [ClampedMode.of(order, load or TipLoad()) for order in range(1, count + 1)]
     points, weights = _gauss_legendre()
 
-    def stacked(x: Array, derivative: int = 0) -> Array:
+    def stack_modes(x: Array, derivative: int = 0) -> Array:
         columns = [mode(np.asarray(x) / length, derivative) for mode in modes]
         return np.stack(columns, axis=-1) if modes else np.zeros((*np.shape(x), 0))
 
-    sizes = np.sqrt(weights @ stacked(points * length) ** 2)
+    sizes = np.sqrt(weights @ stack_modes(points * length) ** 2)
 
     def evaluate(x: Array, derivative: int) -> Array:
-        values: Array = stacked(x, derivative) / sizes / length**derivative
+        values: Array = stack_modes(x, derivative) / sizes / length**derivative
         return values
 
     stations = points * length

@@ -1,1 +1,1 @@
-"""."""
+"""Errors, validation, progress, YAML files and processes: what every package stands on."""

@@ -1,4 +1,4 @@
-"""How long work reports where it is, and how it is told to stop."""
+"""Progress of long work, and requests to stop it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class StopReason(Enum):
 
 
 class StoppedError(Exception):
-    """Work was stopped from outside, in a place that has no other way to return."""
+    """Work was stopped from outside, at a point where it cannot return a result."""
 
     def __init__(self, reason: StopReason) -> None:
         self.reason = reason
@@ -81,7 +81,7 @@ class Monitor:
         return time.monotonic() - self.started
 
     def stop_reason(self) -> StopReason | None:
-        """Return why to stop now, or None to go on."""
+        """Return the reason to stop now, or None to go on."""
         if self.canceled():
             return StopReason.CANCELED
         if self.elapsed > self.time_limit:

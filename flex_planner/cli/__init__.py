@@ -11,7 +11,7 @@ from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.progress import StoppedError, StopReason
 from flex_planner.cli.commands import arm, compare, paper, plan, recordings
 from flex_planner.cli.commands import map as maps
-from flex_planner.cli.options import with_joined_lists
+from flex_planner.cli.options import join_lists
 from flex_planner.cli.progress_line import CanceledError
 
 _CANCELED = 130  # what a shell makes of a process that SIGINT ended
@@ -28,7 +28,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     """
     given = sys.argv[1:] if arguments is None else arguments
-    options = _parser().parse_args(with_joined_lists(given))
+    options = _parser().parse_args(join_lists(given))
     try:
         return int(options.run(options))
     except (FlexPlannerError, OSError) as error:

@@ -79,7 +79,7 @@ class DemoClient(Node):  # type: ignore[misc]
         end = time.monotonic() + limit
         while not done():
             if time.monotonic() > end:
-                raise DemoError(f'{what}: nothing within {limit:g} s')
+                raise DemoError(f'no {what} within {limit:g} s')
             rclpy.spin_once(self, timeout_sec=0.05)
 
     def wait_for_nodes(self) -> None:
@@ -142,7 +142,7 @@ def motion_from_message(trajectory: FlexibleTrajectory) -> Motion:
 
 def _table(arm: Arm, report: PlanReport, delay: float, execution: Execution,
            files: dict[str, object]) -> str:
-    """Return what the demonstration found, as lines of text."""
+    """Return the results of the demonstration, as lines of text."""
     late = execution.tip[execution.tip_times > execution.tip_times[-1] - SETTLING / 2]
     errors = np.linalg.norm(late - GOAL, axis=1) * 1e3
     planning = duration_seconds(report.planning_time)

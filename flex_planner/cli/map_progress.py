@@ -1,4 +1,4 @@
-"""What ``flex-planner map`` shows while it computes, and when it is done."""
+"""Progress and summary of ``flex-planner map``."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _BAR = 10
 
 
 class MapDisplay(Display):
-    """Shows how far a map is: on a terminal as a line that is rewritten, elsewhere at times."""
+    """Shows the progress of a map: on a terminal in one line, elsewhere a line now and then."""
 
     def show(self, tally: Tally) -> None:
         """Show it, unless it was shown a moment ago."""
@@ -34,7 +34,7 @@ class MapDisplay(Display):
 
 
 def progress_line(tally: Tally, *, bar: bool = False) -> str:
-    """Return how far a map is, in a line."""
+    """Return the progress of a map in a line."""
     full = _BAR * tally.done // tally.cells
     drawn = f'[{"#" * full}{"." * (_BAR - full)}] ' if bar else ''
     text = f'{drawn}{tally.done}/{tally.cells} cells, {tally.failed} failed'
@@ -45,7 +45,7 @@ def progress_line(tally: Tally, *, bar: bool = False) -> str:
 
 
 def outcome_rows(tally: Tally, dataset: xr.Dataset) -> list[Row]:
-    """Return what came of a map, and how long it took."""
+    """Return the numbers of cells by result, the range of values, and the time."""
     rows = [('cells', f'{tally.done} of {tally.cells}')]
     rows += [(f'  {code.name.lower().replace("_", " ")}', f'{tally.of(code)}, {code.meaning}')
              for code in CellCode if tally.of(code)]

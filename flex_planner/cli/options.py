@@ -18,7 +18,7 @@ Commands: TypeAlias = 'argparse._SubParsersAction[argparse.ArgumentParser]'
 _NEGATIVE_LIST = re.compile(r'-[\d.].*,')
 
 
-def with_joined_lists(arguments: Sequence[str]) -> list[str]:
+def join_lists(arguments: Sequence[str]) -> list[str]:
     """Return the arguments with ``--to -1,2`` as ``--to=-1,2``: argparse would see an option."""
     joined: list[str] = []
     for argument in arguments:

@@ -1,4 +1,4 @@
-"""Pictures and recordings of what a command found."""
+"""Pictures and recordings of a command's results."""
 
 from __future__ import annotations
 
@@ -66,34 +66,34 @@ class Outputs:
                    recorder=_recorder(request, options.output) if records else None)
 
     def write_plan(self, plan: Plan, reference: SampledPlan | None) -> Iterator[Row]:
-        """Write what came of a plan; yield names and paths, one by one as they are written."""
+        """Write pictures and recording of a plan; yield names and paths as they are written."""
         if self.draws and plan.solved:
-            yield self._motion(plan)
+            yield self._draw_motion(plan)
         if self.recorder is not None:
             yield 'recording', str(self.recorder.record_plan(plan, reference))
 
     def write_search(self, found: MaxPayload, accuracy: float, step: float,
                      reference: SampledPlan | None) -> Iterator[Row]:
-        """Write what came of a search, see `write_plan`."""
+        """Write pictures and recording of a search, see `write_plan`."""
         solved = found.plan if found.plan is not None and found.plan.solved else None
         if self.draws and (solved or found.front.payloads.size or found.trials):
             from flex_planner.plotting import draw_max_payload
 
             path = self.folder / f'{self.stem}_max_payload.png'
             draw_max_payload(path, found, _joint_names(found.task.arm.n_joints),
-                             _drawn(solved) if solved else None)
+                             _fine_motion(solved) if solved else None)
             yield 'picture of the search', str(path)
         if self.draws and solved:
-            yield self._motion(solved)
+            yield self._draw_motion(solved)
         if self.recorder is not None:
             yield 'recording', str(self.recorder.record_search(found, accuracy, step, reference))
 
-    def _motion(self, plan: Plan) -> Row:
+    def _draw_motion(self, plan: Plan) -> Row:
         """Draw the motion of a plan."""
         from flex_planner.plotting import draw_motion
 
         path = self.folder / f'{self.stem}_motion.png'
-        draw_motion(path, plan.arm, _joint_names(plan.arm.n_joints), _drawn(plan))
+        draw_motion(path, plan.arm, _joint_names(plan.arm.n_joints), _fine_motion(plan))
         return 'picture of the motion', str(path)
 
 
@@ -119,13 +119,13 @@ def check_folder(folder: Path) -> None:
 
 
 def _recorder(request: Request, folder: Path) -> RequestRecorder | None:
-    """Return what records the outcome, or None where ROS 2 is missing, which is told."""
+    """Return the recorder, or None, with a message, where ROS 2 is missing."""
     try:
         from flex_planner.cli.recorder import RequestRecorder
 
         return RequestRecorder(request, folder / 'recordings')
     except (ImportError, RecordingError) as error:
-        print(f'flex-planner: nothing will be recorded, which takes ROS 2: {error}',
+        print(f'flex-planner: no recording is written, because that needs ROS 2: {error}',
               file=sys.stderr)
         return None
 
@@ -134,7 +134,7 @@ def _joint_names(count: int) -> list[str]:
     return [f'joint{i}' for i in range(1, count + 1)]
 
 
-def _drawn(plan: Plan) -> Motion:
+def _fine_motion(plan: Plan) -> Motion:
     """Return a solved plan as arrays, finer than a controller needs it."""
     from flex_planner.plotting import Motion
 

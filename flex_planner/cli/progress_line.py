@@ -79,7 +79,7 @@ class Display:
 
 @contextmanager
 def interruptible() -> Iterator[Callable[[], bool]]:
-    """Provide what tells whether Ctrl-C was pressed; pressed again, it interrupts at once."""
+    """Provide a function that says whether Ctrl-C was pressed; a second time it interrupts."""
     pressed = Event()
 
     def on_interrupt(number: int, frame: FrameType | None) -> None:
@@ -94,7 +94,8 @@ def interruptible() -> Iterator[Callable[[], bool]]:
         signal.signal(signal.SIGINT, before)
 
 
-def watched(arm: Arm, time_limit: float, work: Callable[[ArmModel, Monitor], Result]) -> Result:
+def run_with_progress(arm: Arm, time_limit: float,
+                      work: Callable[[ArmModel, Monitor], Result]) -> Result:
     """
     Return the result of work on an arm, showing its progress.
 
@@ -124,5 +125,5 @@ def watched(arm: Arm, time_limit: float, work: Callable[[ArmModel, Monitor], Res
         display.close()
     if canceled():
         raise CanceledError(f'canceled after {display.elapsed:.1f} s, in the phase '
-                            f'{display.phase!r}; nothing is written')
+                            f'{display.phase!r}; nothing was written')
     return result

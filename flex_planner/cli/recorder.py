@@ -19,9 +19,11 @@ from flex_planner.ros.messages.plans import (
     duration_message,
     OBJECTIVE_FIELDS,
     report_from_plan,
-    reported_trajectory,
+    report_trajectory,
 )
+from flex_planner.ros.planner.outcome import Outcome
 from flex_planner.ros.planner.recorder import OutcomeRecorder
+from flex_planner.ros.planner.request_state import RequestState
 from flex_planner.ros.settings.planner import PlannerSettings
 from flex_planner_interfaces.msg import (
     FlexibleTrajectory,
@@ -36,7 +38,7 @@ _NODE = '/flex_planner'  # so that the topics are those of the node
 
 class RequestRecorder:
     """
-    Records what came of a request, as the node would.
+    Records a request and its outcome, as the node would.
 
     Parameters
     ----------
@@ -79,11 +81,11 @@ class RequestRecorder:
         """Write a recording; the request is said to have come when planning began."""
         trajectory, took = FlexibleTrajectory(), int(seconds * 1e9)
         if plan is not None and reference is not None:
-            trajectory = reported_trajectory(report, plan, reference, self._settings)
+            trajectory = report_trajectory(report, plan, reference, self._settings)
         report.planning_time = duration_message(took)
-        return self._recorder.write(
-            self._settings, time.time_ns() - took, self._message, report, trajectory, plan,
-            reference, lambda: False, search=search)
+        state = RequestState(settings=self._settings, stamp_ns=time.time_ns() - took)
+        return self._recorder.write(self._message, state, Outcome(
+            report=report, trajectory=trajectory, plan=plan, reference=reference, search=search))
 
 
 def task_message(request: Request) -> MotionTask:

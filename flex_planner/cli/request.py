@@ -33,7 +33,7 @@ _RENAMED = {**_POINTS, 'payload_mass': '--payload'}
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Request:
     """
-    What a command was asked for.
+    The request of a command line.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class Request:
 
         """
         arm = load_arm(options.arm)
-        with named_as_options():
+        with translate_errors():
             limit = number('time_limit', options.time_limit, above=0, at_most=MAX_TIME_LIMIT,
                            unit='s')
             points = _points(options)
@@ -84,7 +84,7 @@ class Request:
 
     @property
     def sampling(self) -> SamplingSettings:
-        """Return how a plan is sampled: closely, but not more often than is allowed."""
+        """Return the settings of the sampling: close, within the largest number of samples."""
         closest = SamplingSettings()
         return replace(closest, longest_step=max(closest.longest_step,
                                                  self.task.duration / (MAX_SAMPLES - 1)))
@@ -122,24 +122,25 @@ def add_task(parser: argparse.ArgumentParser, payload: str) -> None:
                        ('position', 'W_1: positions (default: zeros)')):
         add(f'--{name}-weights', metavar='W,W,...', help=f'diagonal of {what}')
     add('--tolerance', type=float, default=1e-3, metavar='EPS',
-        help='largest half squared error of the final state, eq. (17) (default: 0.001)')
+        help='largest allowed half squared error of the final state, eq. (17) (default: 0.001)')
     add('--time-limit', type=float, default=MAX_TIME_LIMIT, metavar='S',
-        help='give up after this time (default and most: %(default)g)')
+        help='give up after this time (default and maximum: %(default)g)')
 
 
 def add_objectives(parser: argparse.ArgumentParser) -> None:
     """Add the options that limit a motion, by weights that are found."""
     for name, unit, what in (
-            ('joint-speeds', 'RAD/S', 'absolute joint speeds; found weights W_2 meet them'),
-            ('torque-shares', 'SHARE', 'torques as shares of their limits; found weights R meet '
-             'them'),
-            ('modal-rates', 'M/S', 'absolute modal rates; found weights W_2 meet them')):
+            ('joint-speeds', 'RAD/S', 'absolute joint speeds, met by weights W_2 that are '
+             'searched'),
+            ('torque-shares', 'SHARE', 'torques as shares of their limits, met by weights R that '
+             'are searched'),
+            ('modal-rates', 'M/S', 'absolute modal rates, met by weights W_2 that are searched')):
         parser.add_argument(f'--max-{name}', metavar=f'{unit},{unit},...',
-                            help=f'largest {what}; inf for no limit')
+                            help=f'limits on the {what}; inf for no limit')
 
 
 @contextmanager
-def named_as_options() -> Iterator[None]:
+def translate_errors() -> Iterator[None]:
     """Let errors of the core name options instead of its own fields."""
     try:
         yield

@@ -13,6 +13,8 @@ from flex_planner.base.yaml_files import YamlSection
 from flex_planner.optimal_control.task import MAX_DURATION, MAX_PAYLOAD
 import numpy as np
 
+Block = tuple[slice, ...]
+
 MAX_AXES = 4
 MAX_CELLS = 100_000_000
 MAX_COORDINATE = 1e3
@@ -107,7 +109,7 @@ class Axis:
 
     @property
     def title(self) -> str:
-        """Return what it is in words."""
+        """Return the axis in words."""
         return AXES[self.name].title
 
 
@@ -185,7 +187,7 @@ def tiles(shape: tuple[int, ...]) -> tuple[int, ...]:
     sides = [1] * len(shape)
     left = _TILE_CELLS
     for axis, power in zip(reversed(longest), (1 / len(longest), 1), strict=False):
-        sides[axis] = _even(shape[axis], left**power)
+        sides[axis] = _even_side(shape[axis], left**power)
         left = max(1, left // sides[axis])
     while _count(shape, sides) < min(_LEAST_BLOCKS, math.prod(shape)):
         widest = max(range(len(shape)), key=lambda axis: sides[axis])
@@ -193,7 +195,7 @@ def tiles(shape: tuple[int, ...]) -> tuple[int, ...]:
     return tuple(sides)
 
 
-def _even(length: int, side: float) -> int:
+def _even_side(length: int, side: float) -> int:
     """Return a side near to a wanted one that leaves no thin strip at the end."""
     return -(-length // max(1, round(length / side)))
 

@@ -18,10 +18,11 @@ from flex_planner.base.processes import return_memory
 from flex_planner.base.progress import Monitor, StoppedError
 from flex_planner.capacity.extrapolation import step_ratio
 from flex_planner.capacity.results import MinDuration
+from flex_planner.maps.axes import Block
 from flex_planner.maps.cell_results import CellCode, CellResult
-from flex_planner.maps.cell_solver import CellSolver, Found, NearCells, task_of
-from flex_planner.maps.end_points import close
-from flex_planner.maps.study import Block, Study
+from flex_planner.maps.cell_solver import CellSolution, CellSolver, NearCells, task_of
+from flex_planner.maps.end_points import are_close
+from flex_planner.maps.study import Study
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan_problem import STOP_STATUS
 
@@ -38,7 +39,7 @@ def blocks(study: Study) -> list[Block]:
 
 def solve_block(study: Study, block: Block, monitor: Monitor | None = None) -> list[CellResult]:
     """
-    Return what became of every cell of a block, in the order of their indices.
+    Return the results of all cells of a block, in the order of their indices.
 
     A cell that fails is a result with a code, whatever happened.
 
@@ -52,24 +53,24 @@ def solve_block(study: Study, block: Block, monitor: Monitor | None = None) -> l
         May cancel, which leaves cells pending.
 
     """
-    return _Block(study, block, monitor).results()
+    return _BlockRun(study, block, monitor).results()
 
 
-class _Block:
-    """A block on its way: what was found so far, and what each cell started from."""
+class _BlockRun:
+    """The solutions of a block so far, and the neighbours that each cell started from."""
 
     def __init__(self, study: Study, block: Block, monitor: Monitor | None) -> None:
         self._study, self._monitor, self._solver = study, monitor, CellSolver(study)
         self._cells = list(product(*(range(part.start, part.stop) for part in block)))
         self._results = {result.index: result for result in study.known_failures(block)}
-        self._done: dict[Index, Found] = {}
+        self._done: dict[Index, CellSolution] = {}
         self._starts: dict[Index, NearCells] = {}
 
     def results(self) -> list[CellResult]:
-        """Return what became of the cells."""
+        """Return the results of the cells."""
         for index in self._cells:
             if index not in self._results:
-                self._results[index] = self._added(index)
+                self._results[index] = self._add(index)
         # what did not converge may do so from the neighbours on the other sides
         for index in reversed(self._cells):
             if self._results[index].code is CellCode.NOT_CONVERGED:
@@ -82,22 +83,22 @@ class _Block:
         start = _near_cells(self._study, index, self._study.task(index), self._done)
         if start == self._starts[index]:
             return
-        second = self._added(index)
+        second = self._add(index)
         self._results[index] = replace(second, iterations=first.iterations + second.iterations,
                                        seconds=first.seconds + second.seconds)
 
-    def _added(self, index: Index) -> CellResult:
-        """Return what became of a cell, and keep its motion for the neighbours."""
+    def _add(self, index: Index) -> CellResult:
+        """Return the result of a cell, and keep its motion for the neighbours."""
         began, limited = time.monotonic(), Monitor(time_limit=self._study.cell_time_limit)
         if self._monitor is not None:
             limited.canceled = self._monitor.canceled
-        result = self._solved(index, limited)
+        result = self._solve(index, limited)
         return_memory()
         start = self._starts.get(index, NearCells())
         return replace(result, message=result.message[:_LONGEST_MESSAGE],
                        warm=start.near is not None, seconds=time.monotonic() - began)
 
-    def _solved(self, index: Index, monitor: Monitor) -> CellResult:
+    def _solve(self, index: Index, monitor: Monitor) -> CellResult:
         """Solve a cell; whatever happens is a result."""
         try:
             task = self._study.task(index)
@@ -120,12 +121,12 @@ class _Block:
 
 
 def _near_cells(study: Study, index: Index, task: Task,
-                done: dict[Index, Found]) -> NearCells:
+                done: dict[Index, CellSolution]) -> NearCells:
     """Return the cells that a cell starts from."""
     best = NearCells()
     for axis in reversed(range(len(index))):  # along a line of the block where there is one
         for back in (1, -1):
-            near, far = (_there(index, axis, steps * back, task, done) for steps in (1, 2))
+            near, far = (_cell_before(index, axis, steps * back, task, done) for steps in (1, 2))
             if near is None:
                 continue
             if far is not None and type(far) is type(near):
@@ -136,8 +137,8 @@ def _near_cells(study: Study, index: Index, task: Task,
     return best
 
 
-def _there(index: Index, axis: int, back: int, task: Task,
-           done: dict[Index, Found]) -> Found | None:
-    """Return what was found so many cells before one, unless the arm turns the other way."""
+def _cell_before(index: Index, axis: int, back: int, task: Task,
+                 done: dict[Index, CellSolution]) -> CellSolution | None:
+    """Return the solution some cells before one, unless the arm turns the other way round."""
     found = done.get((*index[:axis], index[axis] - back, *index[axis + 1:]))
-    return found if found is not None and close(task_of(found), task) else None
+    return found if found is not None and are_close(task_of(found), task) else None

@@ -1,4 +1,4 @@
-"""What may become of a cell of a map."""
+"""The results of single cells of a map."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from flex_planner.planning.plan import PlanStatus
 
 
 class CellCode(IntEnum):
-    """What became of a cell; stored as its number, explained in the store's metadata."""
+    """Kinds of results of a cell; stored as a number, explained in the store's metadata."""
 
     PENDING = 0
     SOLVED = 1
@@ -30,7 +30,7 @@ class CellCode(IntEnum):
 
     @classmethod
     def of(cls, status: PlanStatus) -> CellCode:
-        """Return what the status of a plan or search means for its cell."""
+        """Return the code of a cell whose plan or search has a status."""
         return _OF_STATUS[status]
 
 
@@ -59,12 +59,12 @@ _OF_STATUS = {
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CellResult:
     """
-    What became of a cell.
+    The result of a cell.
 
     Attributes
     ----------
     index : tuple of int
-        Its place, one entry an axis of the study.
+        Its place, one entry per axis of the study.
     code : CellCode
         `value` counts only where it is ``SOLVED``.
     message : str
@@ -72,8 +72,8 @@ class CellResult:
     value : float
         The quantity of the study, in its unit; NaN unless solved.
     bound : float
-        How far the true value is at most, where a search encloses it: an upper bound of a maximum
-        payload, a lower one of a minimum duration; NaN elsewhere.
+        Bound of the true value where a search encloses it: upper for a maximum payload, lower
+        for a minimum duration; NaN elsewhere.
     cost : float
         J of eq. (6); NaN unless solved.
     tip_error : float

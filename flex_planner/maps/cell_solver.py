@@ -24,7 +24,7 @@ from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.strategies.first_extremals import solve_first
-from flex_planner.simulation.comparison import finely_sampled
+from flex_planner.simulation.comparison import sample_finely
 from flex_planner.simulation.execution import execute_plan, ExecutionMode, Setting
 from flex_planner.simulation.joint_control import Gains
 import numpy as np
@@ -44,14 +44,14 @@ class Vibration:
     peak_to_peak: float
 
 
-Found: TypeAlias = MaxPayload | MinDuration | Plan | Vibration
+CellSolution: TypeAlias = MaxPayload | MinDuration | Plan | Vibration
 
 
 class NearCells(NamedTuple):
     """What a cell starts from: two cells on a line with it, the nearer one first; or fewer."""
 
-    near: Found | None = None
-    far: Found | None = None
+    near: CellSolution | None = None
+    far: CellSolution | None = None
     ratio: float = 1.0
 
 
@@ -70,9 +70,9 @@ class CellSolver:
         self._study, self._model = study, ArmModel(study.arm)
 
     def solve(self, index: tuple[int, ...], task: Task, monitor: Monitor,
-              start: NearCells) -> Found:
+              start: NearCells) -> CellSolution:
         """
-        Solve the task of a cell, starting from cells near it.
+        Return the solution of the task of a cell, starting from cells near it.
 
         Raises
         ------
@@ -93,9 +93,10 @@ class CellSolver:
         plan = plan_path(task, model=model, solver=solver, start_from=_plan_of(start.near))
         if study.quantity is Quantity.MIN_EFFORT or not plan.solved:
             return plan
-        return self._shaken(index, task, plan, monitor)
+        return self._measure_vibration(index, task, plan, monitor)
 
-    def _find_payload(self, problem: MotionProblem, solver: Solver, start: NearCells) -> Found:
+    def _find_payload(self, problem: MotionProblem, solver: Solver,
+                      start: NearCells) -> CellSolution:
         """
         Return the largest payload, or the shortest duration where that is too long.
 
@@ -104,7 +105,7 @@ class CellSolver:
 
         """
         task, late = problem.task, isinstance(start.near, MinDuration)
-        if self._says_much and (late or _may_be_none(problem, solver, start)):
+        if self._duration_decides and (late or _may_carry_nothing(problem, solver, start)):
             shortest = find_min_duration(
                 task, model=self._model, solver=solver, accuracy=_SHORT * task.duration,
                 start_from=_neighbours(start) if late else None)
@@ -115,29 +116,29 @@ class CellSolver:
                                 start_from=None if late else _neighbours(start))
 
     @property
-    def _says_much(self) -> bool:
+    def _duration_decides(self) -> bool:
         """Whether a shortest duration holds for all motions: not where they may swing first."""
         arm = self._study.arm
         limited = [np.isfinite(joint.motor.stall_torque) for joint in arm.joints]
         return all(limited) and not arm.gravity.any()
 
-    def _shaken(self, index: tuple[int, ...], task: Task, plan: Plan,
-                monitor: Monitor) -> Vibration:
+    def _measure_vibration(self, index: tuple[int, ...], task: Task, plan: Plan,
+                           monitor: Monitor) -> Vibration:
         """Carry a plan out on the arm that is simulated."""
         study = self._study
         arm, carried = study.plant(index)
-        gains = study.gains or Gains.of(arm.n_joints, 0.0, 0.0)
+        gains = study.simulated.gains or Gains.of(arm.n_joints, 0.0, 0.0)
         goal = tip_position(task.arm, plan.problem.goal[:task.arm.n_coordinates])
         setting = Setting(model=ArmDynamics(arm), gains=gains, rate=_RATE, payload_mass=carried,
-                          goal=goal, settling=study.settling, monitor=monitor)
-        way = ExecutionMode.FLEXIBLE if study.gains else ExecutionMode.FLEXIBLE_OPEN
-        outcome = execute_plan(way, plan, finely_sampled(plan, monitor), setting)
-        return Vibration(plan=plan, peak_to_peak=outcome.residual.tip)
+                          goal=goal, settling=study.simulated.settling, monitor=monitor)
+        mode = ExecutionMode.FLEXIBLE if study.simulated.gains else ExecutionMode.FLEXIBLE_OPEN
+        executed = execute_plan(mode, plan, sample_finely(plan, monitor), setting)
+        return Vibration(plan=plan, peak_to_peak=executed.residual.tip)
 
-    def result(self, index: tuple[int, ...], found: Found) -> CellResult:
-        """Return what was found as a result."""
+    def result(self, index: tuple[int, ...], found: CellSolution) -> CellResult:
+        """Return the result of a cell from its solution."""
         if isinstance(found, MinDuration) and self._study.quantity is Quantity.MAX_PAYLOAD:
-            return _too_late(index, found)
+            return _late_result(index, found)
         plan = _plan_of(found)
         solution = found.plan if isinstance(found, Vibration) else found
         code = CellCode.of(solution.status)
@@ -148,7 +149,8 @@ class CellSolver:
         return CellResult(index=index, code=code, message=solution.message, value=value,
                           bound=bound, cost=plan.cost, tip_error=plan.certificate.tip_error,
                           iterations=solution.iterations,
-                          motion=_kept(found, plan) if self._study.keeps_motions else None)
+                          motion=(_motion_to_keep(found, plan) if self._study.keeps_motions
+                                  else None))
 
 
 def _settings(problem: MotionProblem) -> SolverSettings:
@@ -165,8 +167,8 @@ def _neighbours(start: NearCells) -> Neighbours:
     return Neighbours(near=near, far=far, ratio=start.ratio)
 
 
-def _may_be_none(problem: MotionProblem, solver: Solver, start: NearCells) -> bool:
-    """Return whether neighbours, or a first trial, let expect that nothing can be carried."""
+def _may_carry_nothing(problem: MotionProblem, solver: Solver, start: NearCells) -> bool:
+    """Return whether neighbours, or a first trial, suggest that nothing can be carried."""
     near, far = start.near, start.far
     if not isinstance(near, MaxPayload):
         return not solve_first(problem, solver.coarse()).converged
@@ -174,8 +176,8 @@ def _may_be_none(problem: MotionProblem, solver: Solver, start: NearCells) -> bo
     return near.payload + 2 * start.ratio * slope < problem.task.payload_mass
 
 
-def _kept(found: Found, plan: Plan) -> KeptMotion | None:
-    """Return what others may start from: near a limit, the last motion but one on the way."""
+def _motion_to_keep(found: CellSolution, plan: Plan) -> KeptMotion | None:
+    """Return the motion for others to start from: near a limit, the last but one of the search."""
     if isinstance(found, MaxPayload) and found.extremals:
         extremal = found.extremals[-2:][0]
         motion = thin_out(extremal, Solver().coarse())
@@ -183,28 +185,28 @@ def _kept(found: Found, plan: Plan) -> KeptMotion | None:
     return None if plan.solution is None else KeptMotion.of(plan.problem, plan.solution)
 
 
-def _too_late(index: tuple[int, ...], found: MinDuration) -> CellResult:
-    """Return that a motion takes longer than it may."""
+def _late_result(index: tuple[int, ...], found: MinDuration) -> CellResult:
+    """Return the result of a cell whose motion takes longer than it may."""
     task = found.task
     return CellResult(index=index, code=CellCode.INFEASIBLE, iterations=found.iterations, message=(
         f'the motion takes at least {found.lower:.4g} s with {task.payload_mass:g} kg, and '
         f'{task.duration:g} s were asked for'))
 
 
-def task_of(found: Found) -> Task:
-    """Return the task of what was found."""
+def task_of(found: CellSolution) -> Task:
+    """Return the task of a solution."""
     return found.plan.task if isinstance(found, Vibration) else found.task
 
 
-def _plan_of(found: Found | None) -> Plan | None:
-    """Return the plan of what was found."""
+def _plan_of(found: CellSolution | None) -> Plan | None:
+    """Return the plan of a solution."""
     if found is None or isinstance(found, Plan):
         return found
     return found.plan
 
 
-def _value(found: Found) -> tuple[float, float]:
-    """Return the quantity, and how far it is at most."""
+def _value(found: CellSolution) -> tuple[float, float]:
+    """Return the quantity, and the bound of its true value."""
     if isinstance(found, MaxPayload):
         return found.payload, found.upper
     if isinstance(found, MinDuration):

@@ -1,4 +1,4 @@
-"""The processes that a map is computed in: a Dask cluster of one's own, or one that is there."""
+"""The processes that compute a map: a local Dask cluster, or an existing one."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def local_cluster(workers: int) -> Iterator[Client]:
 @contextmanager
 def remote_cluster(address: str) -> Iterator[Client]:
     """
-    Provide a client of a cluster that is there.
+    Provide a client of an existing cluster.
 
     Parameters
     ----------

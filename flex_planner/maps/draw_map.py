@@ -9,17 +9,17 @@ from flex_planner.base.validation import Array
 from flex_planner.maps.cell_results import CellCode
 from flex_planner.maps.pictures.data import combinations, MapData
 from flex_planner.maps.pictures.panels import (
-    arranged,
     draw_cells,
     draw_contours,
     finish_map,
-    kinds_shown,
+    grid_shape,
+    legend_entries,
     MOST_PANELS,
     scale,
     show_scale,
 )
 from flex_planner.maps.pictures.scene import draw_arm, find_scene, frame, study_of
-from flex_planner.maps.pictures.slices import along, draw_slices, through_points
+from flex_planner.maps.pictures.slices import draw_slices, lines_along, lines_through_points
 from flex_planner.maps.store import MapStoreError, open_map
 from flex_planner.maps.study import Study
 from flex_planner.plotting.figures import save
@@ -38,7 +38,7 @@ _FLAT = 0.92
 
 def draw_map(store: Path, folder: Path) -> list[Path]:
     """
-    Draw a map, as far as it is.
+    Draw a map, finished or not.
 
     Over the workspace the quantity is drawn as colours with contours and the arm, a diagram for
     each combination of further values; if one of them is the duration, also against it for some
@@ -85,21 +85,21 @@ def _read(store: Path) -> tuple[MapData, Study | None]:
 
 def _figures(data: MapData, study: Study | None) -> dict[str, Figure]:
     """Return the pictures that suit the axes of a map, by name."""
-    plane, varied = _plane(data), data.varied()
+    plane, varied = _plane(data), data.varied_axes()
     duration = [place for place in data.places('duration') if place in varied]
     if plane is None:
         x, *lines = duration + [place for place in data.places('payload_mass') + tuple(varied)
                                 if place in varied and place not in duration] or [0]
-        return {'slices' if lines else 'line': draw_slices(data, x, *along(data, lines[:1]))}
+        return {'slices' if lines else 'line': draw_slices(data, x, *lines_along(data, lines[:1]))}
     figures = {'map': _map(data, plane, study)}
     if duration and _is_workspace(data, plane) and (data.codes == CellCode.SOLVED).any():
-        figures['slices'] = draw_slices(data, duration[0], *through_points(data, plane))
+        figures['slices'] = draw_slices(data, duration[0], *lines_through_points(data, plane))
     return figures
 
 
 def _plane(data: MapData) -> tuple[int, int] | None:
     """Return the axes that span the pictures, the first to the right; None for lines."""
-    varied = data.varied()
+    varied = data.varied_axes()
     for names in _PLANES:
         pair = data.places(*names)
         if len(pair) == 2 and set(pair) <= set(varied):
@@ -134,20 +134,20 @@ def _map(data: MapData, plane: tuple[int, int], study: Study | None) -> Figure:
     if any(np.isfinite(values).any() for values, _ in cuts):
         bar = figure.colorbar(mesh, ax=diagrams, label=data.label, extend=_extend(norm, cuts))
         show_scale(bar.ax.yaxis, norm)
-    entries += kinds_shown(np.stack([codes for _, codes in cuts]), data.kinds)
+    entries += legend_entries(np.stack([codes for _, codes in cuts]), data.kinds)
     finish_map(figure, data, omitted, entries)
     return figure
 
 
 def _extend(norm: Normalize, cuts: list[tuple[Array, NDArray[np.int8]]]) -> str:
-    """Return at which end of the colours there are values beyond them."""
+    """Return the end of the colour scale beyond which there are values."""
     below = any((values[np.isfinite(values)] < norm.vmin).any() for values, _ in cuts)
     return 'min' if below else 'neither'
 
 
 def _diagrams(count: int, side: float) -> tuple[Figure, list[Axes]]:
     """Return a figure with diagrams in rows."""
-    columns, rows = arranged(count)
+    columns, rows = grid_shape(count)
     figure = Figure(figsize=(side * columns + 1.2, _FLAT * side * rows + 1.2),
                     layout='constrained')
     diagrams = list(np.atleast_1d(figure.subplots(rows, columns)).ravel())

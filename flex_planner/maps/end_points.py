@@ -115,7 +115,7 @@ def middle_posture(arm: Arm, end: End, axes: tuple[Axis, ...], elbow: int) -> Ar
     if not given or end.angles.size:
         return None
     middle = {name: float(values.mean()) for name, values in given.items()}
-    grid = np.meshgrid(*(_thinned(values) for values in given.values()))
+    grid = np.meshgrid(*(_thin(values) for values in given.values()))
     points = np.stack([part.ravel() for part in grid], axis=1)
     distances = np.linalg.norm(points - np.array(list(middle.values())), axis=1)
     for place in np.argsort(distances, kind='stable'):
@@ -127,12 +127,12 @@ def middle_posture(arm: Arm, end: End, axes: tuple[Axis, ...], elbow: int) -> Ar
     return None
 
 
-def _thinned(values: Array) -> Array:
+def _thin(values: Array) -> Array:
     """Return some of the values, not more than a few dozen."""
     return values[::max(1, values.size // _CANDIDATES)]
 
 
-def close(first: Task, second: Task) -> bool:
+def are_close(first: Task, second: Task) -> bool:
     """
     Return whether no joint of two motions is half a turn or more apart at start and goal.
 

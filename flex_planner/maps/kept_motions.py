@@ -1,8 +1,8 @@
 """
 The motions behind the numbers of a map, kept as starts for others like them.
 
-What a motion solves is told by its signature, a vector; how near two motions are, by the entry of
-it that differs most.
+The signature of a motion is a vector of all that it solves; two motions are as near as the entry
+that differs most.
 
 """
 
@@ -33,7 +33,7 @@ _HEAD = 3  # payload, price, number of nodes
 
 
 def signature_fields(task: Task) -> list[str]:
-    """Return what each entry of the signature of such a task belongs to."""
+    """Return the quantity that each entry of a task's signature belongs to."""
     n = task.arm.n_joints
     parameters = task_parameters(task)
     sizes = {field.name: np.size(getattr(parameters, field.name)) for field in fields(Parameters)}
@@ -42,7 +42,7 @@ def signature_fields(task: Task) -> list[str]:
 
 
 def signature(task: Task, parameters: Parameters | None = None) -> Array:
-    """Return what a motion from rest to rest solves, shape (k,); see `signature_fields`."""
+    """Return the signature of a motion from rest to rest, shape (k,); see `signature_fields`."""
     parameters = parameters or task_parameters(task)
     return np.concatenate([task.start_positions, task.goal_positions, [task.duration],
                            parameters.stacked()])
@@ -51,7 +51,7 @@ def signature(task: Task, parameters: Parameters | None = None) -> Array:
 def distances(signatures: NDArray[np.floating], own: Array, names: list[str],
               *, searched: bool) -> Array:
     """
-    Return how far motions (j, k) are from one (k,), shape (j,); up to 1 is near.
+    Return the distances of motions (j, k) from one (k,), shape (j,); up to 1 is near.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def distances(signatures: NDArray[np.floating], own: Array, names: list[str],
     names : list of str
         See `signature_fields`.
     searched : bool
-        Whether a largest payload is looked for, which weights on the way have no part in.
+        Whether a largest payload is searched, which does not depend on weights.
 
     """
     counted = [k for k, name in enumerate(names) if not (searched and name in _NOT_SEARCHED)]
@@ -85,7 +85,7 @@ class KeptMotion:
     payload : float
         m_p [kg].
     price : float
-        dJ/dm_p where it was met on the way to the largest payload; 0 elsewhere [1/kg].
+        dJ/dm_p if a search for the largest payload solved it; 0 otherwise [1/kg].
     mesh : numpy.ndarray, shape (N + 1,)
         From 0 to the duration [s].
     nodes : numpy.ndarray, shape (N + 1, 4 n_t)
@@ -107,14 +107,14 @@ class KeptMotion:
                    payload=problem.parameters.payload_mass, mesh=solution.mesh,
                    nodes=solution.nodes)
 
-    def packed(self) -> Packed:
+    def pack(self) -> Packed:
         """Return payload, price, mesh and nodes; single precision is plenty for a start."""
         mesh, kept = np.unique(self.mesh.astype(np.float32), return_index=True)
         return np.concatenate([[self.payload, self.price, mesh.size], mesh,
                                self.nodes[kept].ravel()], dtype=np.float32)
 
     @classmethod
-    def unpacked(cls, own: Array, packed: Packed) -> KeptMotion:
+    def unpack(cls, own: Array, packed: Packed) -> KeptMotion:
         """Return the motion of a signature and what `packed` made of it."""
         head, values = packed[:_HEAD].tolist(), packed[_HEAD:].astype(np.float64)
         payload, price, count = head[0], head[1], int(head[2])

@@ -1,4 +1,4 @@
-"""The motions of a finished map, looked up by whoever plans one like them."""
+"""The motions of a map as starts for plans and searches like them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from flex_planner.arms.arm_files import plain_arm
 from flex_planner.maps.cell_results import CellCode
 from flex_planner.maps.kept_motions import distances, KeptMotion, signature
 from flex_planner.maps.quantities import Quantity
-from flex_planner.maps.store import MapStoreError, opened_group
+from flex_planner.maps.store import MapStoreError, open_group
 from flex_planner.optimal_control.task import Task
 import numpy as np
 import yaml
@@ -41,7 +41,7 @@ class MapStarts:
 
     A map of largest payloads serves searches for them, one of least effort or vibration plans.
 
-    What is in memory is one vector a cell; motions are read when they are asked for.
+    Only one vector per cell is kept in memory; motions are read on demand.
 
     Parameters
     ----------
@@ -58,9 +58,10 @@ class MapStarts:
     """
 
     def __init__(self, path: Path, arm: Arm) -> None:
-        group = opened_group(path, 'r')
+        group = open_group(path, 'r')
         if 'motions' not in group:
-            raise MapStoreError(f'the map {path} keeps no motions to start from')
+            raise MapStoreError(f'the map {path} keeps no motions to start from: compute one '
+                                'with keep_motions: true')
         _check_arm(path, group.attrs['arm'], arm)
         self._path, self._group = path, group
         self._names: list[str] = list(group['motions'].attrs['signature'])
@@ -95,7 +96,7 @@ class MapStarts:
         index = tuple(int(k) for k in self._cells[nearest])
         there = np.asarray(self._group['motions/signature'][index])
         packed = self._group['motions/motion'][index]
-        return KnownCell(place=self._place(index), motion=KeptMotion.unpacked(there, packed))
+        return KnownCell(place=self._place(index), motion=KeptMotion.unpack(there, packed))
 
     def _place(self, index: tuple[int, ...]) -> str:
         """Return a cell in words."""

@@ -1,4 +1,4 @@
-"""What a map shows, and which axes it can be drawn over."""
+"""The quantities that a map can show, and the axes that suit each of them."""
 
 from __future__ import annotations
 
@@ -83,25 +83,26 @@ def check_axes(quantity: Quantity, arm: Arm, axes: Sequence[Axis]) -> None:
 
 
 def _no_effect(arm: Arm, name: str) -> str:
-    """Return why an axis changes nothing about an arm, or nothing."""
+    """Return the reason why an axis has no effect on an arm, or an empty text."""
     if name == 'stiffness_scale' and not arm.n_modes:
         return 'every link of the arm is rigid'
-    if name == 'motor_scale' and not any(_limited(arm)):
+    if name == 'motor_scale' and not any(_has_limit(arm)):
         return 'no motor of the arm has a limit'
     return ''
 
 
 def check_motors(quantity: Quantity, arm: Arm) -> None:
     """Refuse an arm without the motor limits that a quantity comes from."""
-    limited = _limited(arm)
+    limited = _has_limit(arm)
     if quantity is Quantity.MAX_PAYLOAD and not any(limited):
         raise InvalidValueError('arm', 'without a limited motor',
-                                'one with a stall torque, or no payload is the largest')
+                                'one with a stall torque: otherwise there is no largest payload')
     if quantity is Quantity.MIN_DURATION and not all(limited):
         raise InvalidValueError('arm', 'with an unlimited motor',
-                                'one with stall torques, or no duration is the shortest')
+                                'one with stall torques at all joints: otherwise there is no '
+                                'shortest duration')
 
 
-def _limited(arm: Arm) -> list[bool]:
-    """Return which motors have a stall torque."""
+def _has_limit(arm: Arm) -> list[bool]:
+    """Return for each motor whether it has a stall torque."""
     return [math.isfinite(joint.motor.stall_torque) for joint in arm.joints]

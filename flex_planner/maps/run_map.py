@@ -17,9 +17,10 @@ from flex_planner.maps.cluster import (
     remote_cluster,
     threads,
 )
-from flex_planner.maps.scheduling import compute, Solver
+from flex_planner.maps.quantities import Quantity
+from flex_planner.maps.scheduling import BlockSolver, compute
 from flex_planner.maps.store import MapStore
-from flex_planner.maps.study import Quantity, Study
+from flex_planner.maps.study import Study
 from flex_planner.maps.tally import Tally
 from flex_planner.optimal_control.arm_model import ArmModel
 
@@ -28,7 +29,7 @@ _OFTEN = 0.05  # [s], between two looks at it
 
 
 def run_map(study: Study, store: MapStore, *, workers: int = 0, scheduler: str = '',
-            solve: Solver = solve_block, begin: Callable[[str], None] = lambda phase: None,
+            solve: BlockSolver = solve_block, begin: Callable[[str], None] = lambda phase: None,
             report: Callable[[Tally], None] = lambda tally: None,
             canceled: Callable[[], bool] = lambda: False) -> Tally:
     """
@@ -39,18 +40,18 @@ def run_map(study: Study, store: MapStore, *, workers: int = 0, scheduler: str =
     study, store
         What is computed, and where it goes.
     workers : int
-        Processes on this machine; 0 for one a processor. Never more than blocks.
+        Processes on this machine; 0 for one per processor. Never more than blocks.
     scheduler : str
         Address of a cluster to use instead; empty for none.
     solve : callable
         What solves a block.
     begin : callable
-        Told what is being done.
+        Receives the name of each phase.
     report, canceled : callable
         As of :func:`compute`, which also says what is raised and returned.
 
     """
-    left = [block for block in blocks(study) if not store.complete(block)]
+    left = [block for block in blocks(study) if not store.is_complete(block)]
     if not left:
         return Tally(store.codes)
     if scheduler:

@@ -16,13 +16,14 @@ from typing import TypeAlias
 
 from distributed import Client, Future, get_worker, KilledWorker
 from flex_planner.base.progress import Monitor
+from flex_planner.maps.axes import Block
 from flex_planner.maps.cell_results import CellCode, CellResult
 from flex_planner.maps.cluster import ATTEMPTS, ClusterError, LOST, threads
-from flex_planner.maps.store import Block, cells, MapStore
+from flex_planner.maps.store import cells, MapStore
 from flex_planner.maps.study import Study
 from flex_planner.maps.tally import Tally
 
-Solver: TypeAlias = Callable[[Study, Block, Monitor], Sequence[CellResult]]
+BlockSolver: TypeAlias = Callable[[Study, Block, Monitor], Sequence[CellResult]]
 
 _AHEAD = 4  # blocks under way for each thread
 _FETCHING = 20.0  # [s], to have a result
@@ -33,10 +34,10 @@ _RUNS = count()
 
 
 def compute(study: Study, store: MapStore, client: Client, left: Sequence[Block],
-            solve: Solver, *, report: Callable[[Tally], None] = lambda tally: None,
+            solve: BlockSolver, *, report: Callable[[Tally], None] = lambda tally: None,
             canceled: Callable[[], bool] = lambda: False) -> Tally:
     """
-    Solve blocks, and write each as soon as it is there.
+    Solve blocks, and write the results of each as soon as they arrive.
 
     Parameters
     ----------
@@ -49,7 +50,7 @@ def compute(study: Study, store: MapStore, client: Client, left: Sequence[Block]
     solve : callable
         ``solve_block``, or what takes its place; found by name on the workers.
     report : callable
-        Told where the run is, some times a second.
+        Receives the progress, several times per second.
     canceled : callable
         Says when to stop.
 
@@ -69,7 +70,7 @@ def compute(study: Study, store: MapStore, client: Client, left: Sequence[Block]
     tally, flight = Tally(store.codes), _Flight(client, study, left, solve)
     try:
         while not canceled() and flight.fill():
-            landed = flight.landed()
+            landed = flight.next_result()
             if landed is not None:
                 block, results = landed
                 before = store.codes[block].copy()
@@ -85,7 +86,7 @@ class _Flight:
     """The blocks that are under way: a bounded number, in the order of the grid."""
 
     def __init__(self, client: Client, study: Study, left: Sequence[Block],
-                 solve: Solver) -> None:
+                 solve: BlockSolver) -> None:
         self._client, self._study, self._solve = client, study, solve
         self._run, self._left = f'map-{time.time_ns()}-{next(_RUNS)}', iter(enumerate(left))
         self._flying: dict[str, tuple[Future, Block]] = {}
@@ -98,7 +99,7 @@ class _Flight:
         self._count()
         for number, block in islice(self._left, self._most - len(self._flying)):
             future = self._client.submit(
-                _solved, self._solve, self._study, block, key=f'{self._run}-{number}',
+                _solve_on_worker, self._solve, self._study, block, key=f'{self._run}-{number}',
                 pure=False, retries=ATTEMPTS - 1, priority=-number)
             self._flying[future.key] = future, block
             future.add_done_callback(self._arrived.put)
@@ -113,11 +114,11 @@ class _Flight:
         self._most, self._count_at = max(1, _AHEAD * there), now + _COUNTED
         self._seen = now if there else self._seen
         if now > self._seen + _DESERTED:
-            raise ClusterError(f'no worker has been there for {_DESERTED:g} s; finished blocks '
+            raise ClusterError(f'there has been no worker for {_DESERTED:g} s; finished blocks '
                                'are kept, and are not computed again')
 
-    def landed(self) -> tuple[Block, Sequence[CellResult]] | None:
-        """Return a block that is done with its cells, or None if there is none for a moment."""
+    def next_result(self) -> tuple[Block, Sequence[CellResult]] | None:
+        """Return a finished block with its results, or None if there is none for a moment."""
         try:
             future = self._arrived.get(timeout=_OFTEN)
         except Empty:
@@ -136,9 +137,9 @@ class _Flight:
         self._flying.clear()
 
 
-def _solved(solve: Solver, study: Study, block: Block) -> Sequence[CellResult]:
+def _solve_on_worker(solve: BlockSolver, study: Study, block: Block) -> Sequence[CellResult]:
     """Solve a block on a worker."""
-    results = solve(study, block, Monitor(canceled=_unwanted()))
+    results = solve(study, block, Monitor(canceled=_withdrawal_check()))
     there = {result.index for result in results if result.code != CellCode.PENDING}
     missing = [index for index in cells(block) if index not in there]
     if missing or len(results) != len(there):
@@ -146,25 +147,25 @@ def _solved(solve: Solver, study: Study, block: Block) -> Sequence[CellResult]:
     return results
 
 
-def _unwanted() -> Callable[[], bool]:
-    """Return what tells whether the client has given up the task that runs here."""
+def _withdrawal_check() -> Callable[[], bool]:
+    """Return a function that says whether the client has given up the task that runs here."""
     worker = get_worker()
     key = worker.get_current_task()
 
-    def unwanted() -> bool:
+    def is_withdrawn() -> bool:
         task = worker.state.tasks.get(key)
         return task is None or task.state == 'cancelled'
 
-    return unwanted
+    return is_withdrawn
 
 
 def _outcome(future: Future, block: Block) -> Sequence[CellResult] | None:
-    """Return what became of the cells of a block; None if it is lost and solved again."""
+    """Return the results of a block's cells; None if it was lost and is solved again."""
     status = future.status  # which may change at any time, as workers die
     if status == 'cancelled':
         raise ClusterError(LOST)
     if status == 'error':
-        return _failed(block, future.exception())
+        return _failed_results(block, future.exception())
     if status == 'finished':
         try:
             found: Sequence[CellResult] = future.result(timeout=_FETCHING)
@@ -173,18 +174,18 @@ def _outcome(future: Future, block: Block) -> Sequence[CellResult] | None:
             return None
         except Exception as error:
             if future.status == 'finished':  # it is there, but cannot be read
-                return _failed(block, error)
+                return _failed_results(block, error)
     return None
 
 
-def _failed(block: Block, error: BaseException | None) -> Sequence[CellResult]:
+def _failed_results(block: Block, error: BaseException | None) -> Sequence[CellResult]:
     """Return the cells of a block that could not be solved."""
     return [CellResult(index=index, code=CellCode.FAILED, message=_reason(error))
             for index in cells(block)]
 
 
 def _reason(error: BaseException | None) -> str:
-    """Return why a block failed."""
+    """Return the reason of a block's failure."""
     if isinstance(error, KilledWorker):
         return ('the processes that solved its block died, one after the other; perhaps out of '
                 'memory')

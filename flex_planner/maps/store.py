@@ -19,6 +19,7 @@ from types import TracebackType
 from typing import Any, NoReturn, TYPE_CHECKING
 
 from flex_planner.base.errors import FlexPlannerError
+from flex_planner.maps.axes import Block
 from flex_planner.maps.cell_results import CellCode, CellResult
 from flex_planner.maps.store_layout import BESIDE, differences, metadata, MOTIONS, write_empty
 import numpy as np
@@ -28,8 +29,6 @@ import zarr
 
 if TYPE_CHECKING:
     from flex_planner.maps.study import Study
-
-Block = tuple[slice, ...]
 
 
 class MapStoreError(FlexPlannerError):
@@ -54,9 +53,9 @@ class MapStore:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._group = opened_group(path, 'r+')
+        self._group = open_group(path, 'r+')
         self._key: str = self._group.attrs['quantity']
-        self._lock = _locked(path)
+        self._lock = _lock_store(path)
         self.codes = _readable_codes(self._group['code'])
 
     @classmethod
@@ -77,13 +76,13 @@ class MapStore:
                 write_empty(Path(scratch, 'new'), study)
                 os.rename(Path(scratch, 'new'), path)
         except (OSError, KeyError) as error:  # zarr makes a KeyError of some
-            _tell(error, path, 'no map is begun')
+            _tell(error, path, 'the map is not created')
         return cls(path)
 
     @classmethod
     def of(cls, path: Path, study: Study, *, reset: bool = False) -> MapStore:
         """
-        Return the store of a study: what is there already, or a new one.
+        Return the store of a study: the existing one, or a new one.
 
         Parameters
         ----------
@@ -92,12 +91,12 @@ class MapStore:
         study : Study
             What it is for.
         reset : bool
-            Whether to remove a map that is there, of whatever study.
+            Whether to remove an existing map, of any study.
 
         Raises
         ------
         MapStoreError
-            If something else is there.
+            If the path holds something else.
         OSError
             If it cannot be written.
 
@@ -105,7 +104,7 @@ class MapStore:
         if os.path.lexists(path):
             store = cls(path)
             if not reset:
-                return store.checked(study)
+                return store.check(study)
             try:
                 shutil.rmtree(path)
             except OSError as error:
@@ -114,7 +113,7 @@ class MapStore:
                 store.close()
         return cls.create(path, study)
 
-    def checked(self, study: Study) -> MapStore:
+    def check(self, study: Study) -> MapStore:
         """
         Return the store itself, if it is that of a study and of this version.
 
@@ -129,12 +128,12 @@ class MapStore:
             found = [f'shape: {study.shape}, there {self.codes.shape}']
         if found:
             self.close()
-            raise MapStoreError(f'{self.path} has a map of something else ('
+            raise MapStoreError(f'{self.path} holds the map of another study or version ('
                                 f'{"; ".join(found)}); choose another --output, or start '
-                                'it anew with --reset')
+                                'anew with --reset')
         return self
 
-    def complete(self, block: Block) -> bool:
+    def is_complete(self, block: Block) -> bool:
         """Return whether every cell of a block is done."""
         return bool((self.codes[block] != CellCode.PENDING).all())
 
@@ -176,14 +175,14 @@ class MapStore:
         motions = np.empty(len(ordered), dtype=object)
         for k, result in enumerate(ordered):
             motion = result.motion
-            motions[k] = np.zeros(0, np.float32) if motion is None else motion.packed()
+            motions[k] = np.zeros(0, np.float32) if motion is None else motion.pack()
             if motion is not None:
                 signatures[k] = motion.signature
         kept['signature'][block] = signatures.reshape(*shape, -1)
         kept['motion'][block] = motions.reshape(shape)
 
     def dataset(self) -> xr.Dataset:
-        """Return what is there, opened; read it before the next block is written."""
+        """Return the present contents, opened; read them before the next block is written."""
         return open_map(self.path)
 
     def close(self) -> None:
@@ -210,12 +209,12 @@ def open_map(path: Path) -> xr.Dataset:
         If there is none.
 
     """
-    opened_group(path, 'r')
+    open_group(path, 'r')
     opened: xr.Dataset = xr.open_zarr(str(path), chunks=None)
     return opened
 
 
-def opened_group(path: Path, mode: str) -> Any:
+def open_group(path: Path, mode: str) -> Any:
     """
     Return the Zarr group of a map.
 
@@ -233,7 +232,7 @@ def opened_group(path: Path, mode: str) -> Any:
             return group
     except (ValueError, KeyError, FileNotFoundError, NotADirectoryError):
         pass  # what zarr says of a folder that is none of its own
-    raise MapStoreError(f'{path} is there, but is no map')
+    raise MapStoreError(f'{path} exists, but is not a map')
 
 
 def cells(block: Block) -> list[tuple[int, ...]]:
@@ -241,7 +240,7 @@ def cells(block: Block) -> list[tuple[int, ...]]:
     return list(itertools.product(*(range(part.start, part.stop) for part in block)))
 
 
-def _locked(path: Path) -> int:
+def _lock_store(path: Path) -> int:
     """Return a descriptor that keeps other writers out while it is open."""
     descriptor = os.open(path, os.O_RDONLY)
     try:

@@ -86,7 +86,7 @@ def _add_motions(group: Any, study: Study) -> None:
 
 
 def _flags() -> dict[str, Any]:
-    """Return what the codes mean, as CF has it, and in words."""
+    """Return the meanings of the codes, as CF flags and in words."""
     return {'flag_values': [int(code) for code in CellCode],
             'flag_meanings': ' '.join(code.name.lower() for code in CellCode),
             'comment': '; '.join(f'{code.value}: {code.meaning}' for code in CellCode)}
@@ -103,7 +103,7 @@ def metadata(study: Study) -> dict[str, str]:
 
 
 def differences(there: dict[str, Any], wanted: dict[str, str]) -> list[str]:
-    """Return how the metadata of two maps differ, as far as the numbers depend on it."""
+    """Return the differences of two maps' metadata that change the numbers."""
     found = [f'{name.replace("_", " ")}: {wanted[name]}, there {there.get(name)}'
              for name in ('flex_planner_version', 'quantity') if wanted[name] != there.get(name)]
     for name in ('study', 'arm'):

@@ -17,20 +17,19 @@ from flex_planner.base.errors import (
     SingularError,
     UnreachableError,
 )
-from flex_planner.base.validation import Array, integer, number, vector
+from flex_planner.base.validation import Array, integer, number
 from flex_planner.base.yaml_files import read_yaml, YamlFileError, YamlSection
-from flex_planner.maps.axes import Axis, tiles
+from flex_planner.maps.axes import Axis, Block, tiles
 from flex_planner.maps.cell_results import CellCode, CellResult
-from flex_planner.maps.end_points import End, middle_posture
+from flex_planner.maps.end_points import middle_posture
 from flex_planner.maps.quantities import check_axes, check_motors, Quantity
+from flex_planner.maps.simulated_arm import SimulatedArm
 from flex_planner.maps.study_files import read_fields
-from flex_planner.optimal_control.task import MAX_PAYLOAD, Task
-from flex_planner.simulation.joint_control import Gains
+from flex_planner.maps.study_motion import StudyMotion
+from flex_planner.optimal_control.task import Task
 from flex_planner.simulation.mismatch import Mismatch
 import numpy as np
 
-__all__ = ['Block', 'load_study', 'Quantity', 'Study', 'StudyError']
-Block = tuple[slice, ...]
 MAX_CELL_TIME = 3600.0
 
 
@@ -52,27 +51,17 @@ class Study:
     quantity : Quantity
         What is computed.
     axes : tuple of Axis
-        1 to 4, at most 10^8 cells; a cell's index has one entry an axis.
-    start, goal : End
-        Of every motion; NaN in a point where an axis gives it.
-    duration, payload_mass, effort_weights, velocity_weights, tolerance
-        As of `Task`, where no axis gives them. The duration is a first guess for MIN_DURATION.
-    elbow : int
-        Of every posture, see `inverse_kinematics`.
+        1 to 4, at most 10^8 cells; a cell's index has one entry per axis.
+    motion : StudyMotion
+        Of every cell.
     accuracy : float
         Of the search, in the quantity's unit; NaN for a quantity that is not searched.
     cell_time_limit : float
         > 0 and at most 3600 [s].
     block_shape : tuple of int
         Cells of a block along each axis; empty for `tiles`.
-    mismatch : Mismatch
-        How the simulated arm differs, for RESIDUAL_VIBRATION.
-    plant_payload : float
-        What it carries, >= 0 [kg]; NaN for what is planned.
-    gains : Gains or None
-        Of its joint controller; None for the planned torques alone.
-    settling : float
-        How long it is watched after its arrival, > 0 and at most 1000 [s].
+    simulated : SimulatedArm
+        Carries out the plans, for RESIDUAL_VIBRATION.
     keep_motions : bool
         Whether the motions are kept with the numbers, as starts for others; those of
         MIN_DURATION never are.
@@ -90,21 +79,11 @@ class Study:
     arm: Arm
     quantity: Quantity
     axes: tuple[Axis, ...]
-    start: End
-    goal: End
-    duration: float = 1.0
-    payload_mass: float = 0.0
-    effort_weights: Array = field(default_factory=lambda: np.zeros(0))
-    velocity_weights: Array = field(default_factory=lambda: np.zeros(0))
-    tolerance: float = 1e-3
-    elbow: int = -1
+    motion: StudyMotion
     accuracy: float = math.nan
     cell_time_limit: float = 60.0
     block_shape: tuple[int, ...] = ()
-    mismatch: Mismatch = field(default_factory=Mismatch)
-    plant_payload: float = math.nan
-    gains: Gains | None = None
-    settling: float = 1.0
+    simulated: SimulatedArm = field(default_factory=SimulatedArm)
     keep_motions: bool = True
     text: str = ''
     _start: Array | None = field(init=False, default=None, repr=False)
@@ -113,12 +92,12 @@ class Study:
     def __post_init__(self) -> None:
         check_motors(self.quantity, self.arm)
         check_axes(self.quantity, self.arm, self.axes)
-        for end in (self.start, self.goal):
+        for end in self.motion.ends:
             end.check(self.arm, self.axes)
         self._check_numbers()
         sides = self.block_shape or tiles(self.shape)
         if len(sides) != len(self.axes):
-            raise InvalidValueError('block', list(sides), f'{len(self.axes)} sizes, one an axis')
+            raise InvalidValueError('block', list(sides), f'{len(self.axes)} sizes, one per axis')
         object.__setattr__(self, 'block_shape', tuple(
             integer(f'block.{axis.name}', side, at_least=1, at_most=axis.values.size)
             for axis, side in zip(self.axes, sides, strict=True)))
@@ -126,44 +105,38 @@ class Study:
 
     def _check_ends(self) -> None:
         """Refuse an end that no cell reaches, and keep the start if no axis moves it."""
-        moved = [{axis.name for axis in self.axes} & set(end.axes)
-                 for end in (self.start, self.goal)]
-        near = self.goal.angles if self.goal.angles.size else middle_posture(
-            self.arm, self.start, self.axes, self.elbow)
+        motion, names = self.motion, {axis.name for axis in self.axes}
+        near = motion.goal.angles if motion.goal.angles.size else middle_posture(
+            self.arm, motion.start, self.axes, motion.elbow)
         object.__setattr__(self, '_near', near)
-        if not moved[0]:
-            start = self.start.posture(self.arm, {}, self.elbow, near)
+        if not names & set(motion.start.axes):
+            start = motion.start.posture(self.arm, {}, motion.elbow, near)
             object.__setattr__(self, '_start', start)
-        if not moved[1]:
-            self.goal.posture(self.arm, {}, self.elbow, self._start)
+        if not names & set(motion.goal.axes):
+            motion.goal.posture(self.arm, {}, motion.elbow, self._start)
 
     def _check_numbers(self) -> None:
         """Check what does not depend on the cell."""
-        if self.elbow not in (-1, 1):
-            raise InvalidValueError('elbow', self.elbow, '+1 or -1')
+        if self.motion.elbow not in (-1, 1):
+            raise InvalidValueError('elbow', self.motion.elbow, '+1 or -1')
         posture = np.clip(np.zeros(self.arm.n_joints), *self.arm.angle_limits())
         self._task(self.values((0,) * len(self.axes)), posture, posture)
         self.quantity.check_accuracy(self.accuracy)
         number('cell_time_limit', self.cell_time_limit, above=0, at_most=MAX_CELL_TIME, unit='s')
-        number('settling', self.settling, above=0, at_most=1000, unit='s')
-        self._check_plant()
+        self.simulated.check(self.arm)
+        self._check_payload_scale()
 
-    def _check_plant(self) -> None:
-        """Check what is said about the simulated arm."""
-        self.mismatch.applied(self.arm)
+    def _check_payload_scale(self) -> None:
+        """Refuse an axis payload_scale that contradicts another field, or has no effect."""
         names = [axis.name for axis in self.axes]
-        if not math.isnan(self.plant_payload):
-            number('mismatch.payload_mass', self.plant_payload, at_least=0, at_most=MAX_PAYLOAD,
-                   unit='kg')
-            if 'payload_scale' in names:
-                raise InvalidValueError('mismatch.payload_mass', self.plant_payload,
-                                        'left out: the axis payload_scale gives it')
-        if 'payload_scale' in names and 'payload_mass' not in names and not self.payload_mass:
-            raise InvalidValueError('payload_mass', self.payload_mass,
+        if 'payload_scale' not in names:
+            return
+        if self.simulated.has_payload:
+            raise InvalidValueError('mismatch.payload_mass', self.simulated.payload_mass,
+                                    'left out: the axis payload_scale gives it')
+        if 'payload_mass' not in names and not self.motion.payload_mass:
+            raise InvalidValueError('payload_mass', self.motion.payload_mass,
                                     '> 0, or the axis payload_scale changes nothing')
-        if self.gains is not None:
-            for name in ('stiffness', 'damping'):
-                vector(f'gains.{name}', getattr(self.gains, name), self.arm.n_joints)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -172,7 +145,7 @@ class Study:
 
     @property
     def keeps_motions(self) -> bool:
-        """Return whether motions are kept: nothing is asked that a shortest one would start."""
+        """Return whether motions are kept: those of shortest duration start no requests."""
         return self.keep_motions and self.quantity is not Quantity.MIN_DURATION
 
     def values(self, index: tuple[int, ...]) -> dict[str, float]:
@@ -182,7 +155,7 @@ class Study:
 
     def task(self, index: tuple[int, ...]) -> Task:
         """
-        Return what is asked at a cell.
+        Return the task of a cell.
 
         The task's arm is `arm` itself unless an axis changes it, and then differs in nothing
         that is compiled: one `ArmModel` of `arm` does for all cells.
@@ -200,38 +173,30 @@ class Study:
 
     def _postures(self, values: Mapping[str, float]) -> tuple[Array, Array]:
         """Return the joint angles (n,) at start and goal [rad]."""
-        start = self._start
+        motion, start = self.motion, self._start
         if start is None:
-            start = self.start.posture(self.arm, values, self.elbow, self._near)
-        return start, self.goal.posture(self.arm, values, self.elbow, start)
+            start = motion.start.posture(self.arm, values, motion.elbow, self._near)
+        return start, motion.goal.posture(self.arm, values, motion.elbow, start)
 
     def _task(self, values: Mapping[str, float], start: Array, goal: Array) -> Task:
         """Return the task of given postures."""
-        weight = values.get('velocity_weight')
-        return Task(
-            arm=self._arm(values), start_positions=start, goal_positions=goal,
-            duration=values.get('duration', self.duration),
-            payload_mass=values.get('payload_mass', self.payload_mass),
-            effort_weights=self.effort_weights, tolerance=self.tolerance,
-            velocity_weights=(self.velocity_weights if weight is None
-                              else np.full(self.arm.n_joints, weight)))
+        return self.motion.task(self._arm(values), values, start, goal)
 
     def _arm(self, values: Mapping[str, float]) -> Arm:
         """Return the arm with its links and motors scaled."""
         arm = self.arm
         if 'stiffness_scale' in values:
-            arm = Mismatch(rigidity_scale=values['stiffness_scale']).applied(arm)
+            arm = Mismatch(rigidity_scale=values['stiffness_scale']).apply(arm)
         if 'motor_scale' in values:
-            stronger = partial(_stronger, factor=values['motor_scale'])
+            stronger = partial(_with_stronger_motor, factor=values['motor_scale'])
             arm = replace(arm, joints=tuple(map(stronger, arm.joints)))
         return arm
 
     def plant(self, index: tuple[int, ...]) -> tuple[Arm, float]:
         """Return the arm that is simulated at a cell, and what it carries [kg]."""
-        values = self.values(index)
-        planned = values.get('payload_mass', self.payload_mass)
-        carried = planned if math.isnan(self.plant_payload) else self.plant_payload
-        return (self.mismatch.applied(self._arm(values)),
+        values, simulated = self.values(index), self.simulated
+        carried = simulated.payload_mass if simulated.has_payload else self.motion.payload(values)
+        return (simulated.mismatch.apply(self._arm(values)),
                 values.get('payload_scale', 1.0) * carried)
 
     def known_failures(self, block: Block | None = None) -> list[CellResult]:
@@ -250,7 +215,8 @@ class Study:
         parts = block or (slice(None),) * len(self.axes)
         cells = [range(*part.indices(size)) for part, size in zip(parts, self.shape, strict=True)]
         # whether an end is reached does not depend on the other axes
-        moves = [axis.name in (*self.start.axes, *self.goal.axes) for axis in self.axes]
+        moving = {name for end in self.motion.ends for name in end.axes}
+        moves = [axis.name in moving for axis in self.axes]
         found: list[CellResult] = []
         for corner in product(*(along if moved else along[:1]
                                 for along, moved in zip(cells, moves, strict=True))):
@@ -262,10 +228,10 @@ class Study:
         return sorted(found, key=lambda result: result.index)
 
     def _failure(self, index: tuple[int, ...]) -> CellResult | None:
-        """Return why there is no motion at a cell."""
+        """Return the result of a cell that has no motion, None if it may have one."""
         values = self.values(index)
         quick = self.arm.n_joints <= 2 or any(end.is_too_far(self.arm, values)
-                                              for end in (self.start, self.goal))
+                                              for end in self.motion.ends)
         if not quick:
             return None
         try:
@@ -277,7 +243,7 @@ class Study:
         return None
 
 
-def _stronger(joint: Joint, factor: float) -> Joint:
+def _with_stronger_motor(joint: Joint, factor: float) -> Joint:
     """Return a joint with a stronger motor of the same no-load speed."""
     stall = factor * joint.motor.stall_torque
     return replace(joint, motor=replace(joint.motor, stall_torque=stall))

@@ -15,6 +15,8 @@ from flex_planner.base.yaml_files import YamlSection
 from flex_planner.maps.axes import Axis, read_axes
 from flex_planner.maps.end_points import End
 from flex_planner.maps.quantities import Quantity
+from flex_planner.maps.simulated_arm import SimulatedArm
+from flex_planner.maps.study_motion import StudyMotion
 from flex_planner.simulation.joint_control import Gains
 from flex_planner.simulation.mismatch import AS_GIVEN, Mismatch
 import numpy as np
@@ -39,17 +41,14 @@ def read_fields(top: YamlSection, folder: Path) -> dict[str, Any]:
     arm = _arm(top, folder)
     axes = read_axes(top.section('axes'))
     _refuse_given_twice(top, axes)
-    ends = {end: _end(top, end, axes) for end in ('start', 'goal')}
-    numbers = {key: top.take(key) for key in (
-        'duration', 'payload_mass', 'effort_weights', 'velocity_weights', 'tolerance', 'elbow',
-        'cell_time_limit') if top.has(key)}
-    if 'duration' not in {*numbers, *(axis.name for axis in axes)}:
-        raise InvalidValueError('duration', None, 'given')
-    return {'name': name, 'arm': arm, 'quantity': quantity, 'axes': axes, **ends, **numbers,
+    motion = _motion(top, axes)
+    limit = {key: top.take(key) for key in ('cell_time_limit',) if top.has(key)}
+    return {'name': name, 'arm': arm, 'quantity': quantity, 'axes': axes, 'motion': motion,
+            **limit,
             'accuracy': top.take('accuracy', _ACCURACIES.get(quantity, math.nan)),
             'block_shape': _block_shape(top, axes),
             'keep_motions': top.flag('keep_motions', True),
-            **_simulated(top, quantity, arm.n_joints)}
+            'simulated': _simulated_arm(top, quantity, arm.n_joints)}
 
 
 def _quantity(top: YamlSection) -> Quantity:
@@ -77,7 +76,7 @@ def _arm(top: YamlSection, folder: Path) -> Arm:
     modes = integer('modes', top.take('modes'), at_least=0, at_most=MAX_MODES)
     if modes and not arm.n_modes:
         raise InvalidValueError('modes', modes, 'left out: every link of the arm is rigid')
-    return Mismatch(modes=modes).applied(arm)
+    return Mismatch(modes=modes).apply(arm)
 
 
 def _refuse_given_twice(top: YamlSection, axes: tuple[Axis, ...]) -> None:
@@ -92,6 +91,17 @@ def _refuse_given_twice(top: YamlSection, axes: tuple[Axis, ...]) -> None:
                                     f'left out: the axes {key}_x and {key}_y give it')
 
 
+def _motion(top: YamlSection, axes: tuple[Axis, ...]) -> StudyMotion:
+    """Return the motion of all cells."""
+    start, goal = (_end(top, name, axes) for name in ('start', 'goal'))
+    given: dict[str, Any] = {key: top.take(key) for key in (
+        'duration', 'payload_mass', 'effort_weights', 'velocity_weights', 'tolerance', 'elbow')
+        if top.has(key)}
+    if 'duration' not in {*given, *(axis.name for axis in axes)}:
+        raise InvalidValueError('duration', None, 'given')
+    return StudyMotion(start=start, goal=goal, **given)
+
+
 def _end(top: YamlSection, name: str, axes: tuple[Axis, ...]) -> End:
     """Return the start or the goal, given as a point, as angles or by axes."""
     angles = f'{name}_angles'
@@ -102,7 +112,7 @@ def _end(top: YamlSection, name: str, axes: tuple[Axis, ...]) -> End:
     if {f'{name}_x', f'{name}_y'} <= {axis.name for axis in axes}:
         return End(name=name)
     if not top.has(name):
-        raise InvalidValueError(f'{name} or {angles}', None, 'given, one of them')
+        raise InvalidValueError(f'{name} or {angles}', None, 'given, exactly one of them')
     point = _numbers(name, top.take(name))
     if point.size != 2:
         raise InvalidValueError(name, point.tolist(), 'a point [x, y] in m')
@@ -128,14 +138,14 @@ def _block_shape(top: YamlSection, axes: tuple[Axis, ...]) -> tuple[int, ...]:
     return shape
 
 
-def _simulated(top: YamlSection, quantity: Quantity, joints: int) -> dict[str, Any]:
-    """Return what is said about the simulated arm."""
+def _simulated_arm(top: YamlSection, quantity: Quantity, joints: int) -> SimulatedArm:
+    """Return the simulated arm; only residual vibrations have one."""
     if quantity is not Quantity.RESIDUAL_VIBRATION:
         for key in ('mismatch', 'gains', 'settling'):
             if top.has(key):
                 raise InvalidValueError(key, top.take(key), 'left out: only residual_vibration '
                                                             'has a simulated arm')
-        return {}
+        return SimulatedArm()
     fields: dict[str, Any] = {}
     if top.has('mismatch'):
         fields = _mismatch(top.section('mismatch'), joints)
@@ -145,14 +155,14 @@ def _simulated(top: YamlSection, quantity: Quantity, joints: int) -> dict[str, A
         fields['gains'] = part.build(Gains, **gains)
     if top.has('settling'):
         fields['settling'] = top.take('settling')
-    return fields
+    return SimulatedArm(**fields)
 
 
 def _mismatch(part: YamlSection, joints: int) -> dict[str, Any]:
-    """Return how the simulated arm and its payload differ."""
+    """Return the differences of the simulated arm and of its payload."""
     fields: dict[str, Any] = {}
     if part.has('payload_mass'):
-        fields['plant_payload'] = part.number('payload_mass', at_least=0, unit='kg')
+        fields['payload_mass'] = part.number('payload_mass', at_least=0, unit='kg')
     friction = (_per_joint(part, 'added_friction', joints) if part.has('added_friction')
                 else np.zeros(0))
     fields['mismatch'] = part.build(
@@ -162,7 +172,7 @@ def _mismatch(part: YamlSection, joints: int) -> dict[str, Any]:
 
 
 def _per_joint(part: YamlSection, key: str, joints: int) -> Array:
-    """Return a list with an entry a joint; a number stands for all of them."""
+    """Return a list with one entry per joint; a number stands for all of them."""
     given, field = part.take(key), part.name(key)
     if not isinstance(given, list):
         return np.full(joints, number(field, given))

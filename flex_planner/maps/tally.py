@@ -1,4 +1,4 @@
-"""How far the computation of a map is."""
+"""Progress of the computation of a map."""
 
 from __future__ import annotations
 
@@ -67,14 +67,14 @@ class Tally:
 
     @property
     def rate(self) -> float:
-        """Return the cells of the last minute in a second; NaN before the first."""
+        """Return the cells per second over the last minute; NaN before the first cell."""
         since, done = self._history[0]
         span = time.monotonic() - since
         return (self.done - done) / span if self.computed and span > 0 else math.nan
 
     @property
     def time_left(self) -> float:
-        """Return how long the rest takes at that rate [s]; infinite if none gets done."""
+        """Return the time that the rest takes at that rate [s]; infinite at rate 0."""
         return (self.cells - self.done) / self.rate if self.rate else math.inf
 
     def of(self, code: CellCode) -> int:

@@ -74,7 +74,7 @@ def turn(arm: Arm, modal_weight: float = 0.0) -> Task:
                 duration=duration, velocity_weights=weights, tolerance=EPSILON)
 
 
-def largest(task: Task, accuracy: float = 1e-3) -> MaxPayload:
+def find_largest(task: Task, accuracy: float = 1e-3) -> MaxPayload:
     """
     Return the largest payload of a task, to an accuracy [kg].
 
@@ -84,17 +84,17 @@ def largest(task: Task, accuracy: float = 1e-3) -> MaxPayload:
         If it is not found.
 
     """
-    return enclosed(find_max_payload(task, accuracy=accuracy))
+    return require_solved(find_max_payload(task, accuracy=accuracy))
 
 
-def enclosed(found: MaxPayload) -> MaxPayload:
-    """Return a search that succeeded; NoPlanError for others."""
+def require_solved(found: MaxPayload) -> MaxPayload:
+    """Return a search that succeeded; raise NoPlanError for others."""
     if not found.solved:
         raise NoPlanError(f'{found.task.arm.name}, {found.task.duration:g} s: {found.message}')
     return found
 
 
-def certified(task: Task, start_from: Plan | None = None) -> Plan:
+def plan_certified(task: Task, start_from: Plan | None = None) -> Plan:
     """
     Return the plan of a task.
 

@@ -14,16 +14,16 @@ import numpy as np
 _DEGREE = 6
 
 
-def checked(plan: Plan, intervals: int = 30) -> DirectResult:
-    """Return what IPOPT makes of the task of a plan; it does not see the plan."""
+def solve_by_ipopt(plan: Plan, intervals: int = 30) -> DirectResult:
+    """Solve the task of a plan by IPOPT, which does not see the plan."""
     problem = plan.problem
     settings = DirectSettings(degree=_DEGREE, intervals=intervals)
     return DirectProblem(problem.model, settings).solve(
         problem.parameters, problem.start, problem.goal, problem.task.duration)
 
 
-def largest_payload(task: Task, plan: Plan, price: float, intervals: int = 30) -> DirectResult:
-    """Return what IPOPT makes of carrying as much as possible at a price, from a light load."""
+def maximize_payload(task: Task, plan: Plan, price: float, intervals: int = 30) -> DirectResult:
+    """Maximize the payload at a price by IPOPT, starting from a light load."""
     light = replace(task, payload_mass=1.0)
     problem = MotionProblem(plan.model, light, task_parameters(light))
     settings = DirectSettings(degree=_DEGREE, intervals=intervals, free_payload=True)
@@ -31,13 +31,13 @@ def largest_payload(task: Task, plan: Plan, price: float, intervals: int = 30) -
         problem.parameters, problem.start, problem.goal, task.duration, price=price)
 
 
-def shown(result: DirectResult, value: float, digits: int = 6) -> str:
+def format_value(result: DirectResult, value: float, digits: int = 6) -> str:
     """Return a value of IPOPT's as text, or that it failed."""
     return f'{value:.{digits}g}' if result.converged else 'did not converge'
 
 
 def swing_of(samples: Samples, joint: int) -> Array:
-    """Return how far a joint is from a straight line in time, as a share of its travel."""
+    """Return the distance of a joint from a straight line in time, as a share of its travel."""
     angle, times = samples.coordinates[:, joint], samples.times
     line = np.interp(times, times[[0, -1]], angle[[0, -1]])
     share: Array = np.abs(angle - line) / abs(angle[-1] - angle[0])

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 from flex_planner.base.validation import Array
-from flex_planner.paper.evidence import Curve, Panel
 from flex_planner.planning.plan import Samples
+from flex_planner.plotting.diagrams import Curve, Panel
 import numpy as np
 
 Cases = Mapping[str, Samples]
@@ -15,7 +15,7 @@ POINTS = 1001
 
 
 def joint_panels(cases: Cases, quantity: str) -> tuple[Panel, ...]:
-    """Return a diagram a joint: ``angles``, ``speeds`` or ``torques`` between their bounds."""
+    """Return one diagram per joint: ``angles``, ``speeds`` or ``torques`` with their bounds."""
     count = next(iter(cases.values())).torques.shape[1]
     return tuple(_joint_panel(cases, quantity, joint) for joint in range(count))
 
@@ -78,7 +78,7 @@ def modal_panels(cases: Cases, names: Sequence[str], scale: float = 1e3) -> tupl
 
 
 def runs_on_limit(samples: Samples, joint: int) -> list[tuple[float, float]]:
-    """Return when a motor is on its limit, as pairs of times [s]."""
+    """Return the intervals in which a motor is on its limit, as pairs of times [s]."""
     torque, limit = samples.torques[:, joint], samples.upper_bounds[:, joint]
     lower = samples.lower_bounds[:, joint]
     on = (torque > limit - 1e-9 * abs(limit)) | (torque < lower + 1e-9 * abs(lower))

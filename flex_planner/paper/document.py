@@ -45,14 +45,14 @@ def document(sections: Sequence[Section], pictures: str, remark: str) -> str:
 
 
 def summary(sections: Sequence[Section]) -> str:
-    """Return how many statements are confirmed."""
+    """Return the number of statements with each verdict."""
     counts = Counter(claim.verdict for section in sections for claim in section.claims)
     total = ', '.join(f'{counts[verdict]} {verdict.value}' for verdict in Verdict)
     return f'Of {sum(counts.values())} statements put to the test: {total}.'
 
 
 def _overview(sections: Sequence[Section]) -> str:
-    """Return all statements with what became of them."""
+    """Return all statements with their verdicts."""
     rows = tuple((section.key, claim.said, claim.verdict.value)
                  for section in sections for claim in section.claims)
     return f'\n## In short\n\n{summary(sections)}\n\n' + _grid(

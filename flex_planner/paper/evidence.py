@@ -1,4 +1,4 @@
-"""What a section of the paper led to: tables, statements that were put to the test, pictures."""
+"""The evidence on a section of the paper: tables, tested statements and pictures."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
-from flex_planner.base.validation import Array
+from flex_planner.plotting.diagrams import Picture
 
 
 class Verdict(Enum):
-    """What became of a statement of the paper; the value is shown to people."""
+    """Verdict on a statement of the paper; the value is shown to people."""
 
     CONFIRMED = 'confirmed'
     CORRECTED = 'corrected'
     NOT_REPRODUCIBLE = 'not reproducible'
 
 
-def confirmed_if(holds: bool) -> Verdict:
-    """Return what became of a statement that a number decides."""
+def judge(holds: bool) -> Verdict:
+    """Return the verdict on a statement, by whether it holds."""
     return Verdict.CONFIRMED if holds else Verdict.CORRECTED
 
 
@@ -34,7 +34,7 @@ class Claim:
     found : str
         The number that it turned into, and the reason for the verdict.
     verdict : Verdict
-        What became of it.
+        By that number.
 
     """
 
@@ -53,57 +53,9 @@ class Table:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Curve:
-    """
-    A line of a diagram.
-
-    Attributes
-    ----------
-    x, y : numpy.ndarray, shape (k,)
-        Its points.
-    label : str
-        In the legend; empty for none.
-    color, style : str
-        As Matplotlib takes them.
-    width : float
-        Of the line [pt].
-
-    """
-
-    x: Array
-    y: Array
-    label: str = ''
-    color: str = 'C0'
-    style: str = '-'
-    width: float = 1.3
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Panel:
-    """A diagram; `equal` gives both axes the same scale, `log` the vertical one decades."""
-
-    title: str
-    x_label: str
-    y_label: str
-    curves: tuple[Curve, ...]
-    equal: bool = False
-    log: bool = False
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Picture:
-    """Diagrams in rows of `columns`, saved as NAME.png."""
-
-    name: str
-    caption: str
-    panels: tuple[Panel, ...]
-    columns: int = 2
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Section:
     """
-    What a section of the paper led to.
+    The evidence on a section of the paper.
 
     Attributes
     ----------

@@ -35,16 +35,16 @@ class SectionStudy(Protocol):
 STUDIES: dict[str, SectionStudy] = {
     '5.1': hanging.study, '5.2': effort_speed.study, '5.3': max_payload.study,
     '5.4': minimum_effort.study, '5.5': minimum_vibration.study, '6.1': beyond.front,
-    '6.2': beyond.clamped, '6.3': beyond.feedforward, '6.4': beyond.modes, '7': slips.study}
+    '6.2': beyond.clamped_links, '6.3': beyond.feedforward, '6.4': beyond.modes, '7': slips.study}
 # begun first, as they take longest
 _LONGEST = ('6.2', '6.1', '6.4')
 _OFTEN, _PATIENCE = 0.1, 2.0  # [s], between two looks at Ctrl-C; until a process is killed
 Report = Callable[[str, int, int], None]
 
 
-def computed(keys: Sequence[str], *, reduced: bool, processes: int, report: Report,
-             pictures: Path | None = None,
-             canceled: Callable[[], bool] = lambda: False) -> dict[str, Section]:
+def compute_sections(keys: Sequence[str], *, reduced: bool, processes: int, report: Report,
+                     pictures: Path | None = None,
+                     canceled: Callable[[], bool] = lambda: False) -> dict[str, Section]:
     """
     Return sections by their key, in the order of `STUDIES`.
 
@@ -57,7 +57,7 @@ def computed(keys: Sequence[str], *, reduced: bool, processes: int, report: Repo
     processes : int
         How many at a time.
     report : callable
-        Told of every section that is done: its key, how many are, of how many.
+        Receives the key of each finished section, the number of finished ones, and of all.
     pictures : Path, optional
         Folder for the pictures; nothing is drawn without.
     canceled : callable
@@ -74,21 +74,21 @@ def computed(keys: Sequence[str], *, reduced: bool, processes: int, report: Repo
 
     """
     found: dict[str, Section] = {}
-    for key, section in _finished(keys, reduced, processes, pictures, canceled):
+    for key, section in _compute_each(keys, reduced, processes, pictures, canceled):
         found[key] = section
         report(key, len(found), len(keys))
     return {key: found[key] for key in STUDIES if key in found}
 
 
-def _finished(keys: Sequence[str], reduced: bool, processes: int, pictures: Path | None,
-              canceled: Callable[[], bool]) -> Iterator[tuple[str, Section]]:
+def _compute_each(keys: Sequence[str], reduced: bool, processes: int, pictures: Path | None,
+                  canceled: Callable[[], bool]) -> Iterator[tuple[str, Section]]:
     """Yield sections as they are done."""
     order = sorted(keys, key=lambda key: key not in _LONGEST)
     context = multiprocessing.get_context('spawn')
     # Ctrl-C in a terminal reaches all processes, and is for the first one alone
     pool = ProcessPoolExecutor(processes, context, signal.signal, (signal.SIGINT, signal.SIG_IGN))
     with one_thread_each(), pool:
-        jobs = {pool.submit(_one, key, reduced, pictures): key for key in order}
+        jobs = {pool.submit(_compute_section, key, reduced, pictures): key for key in order}
         try:
             left: set[Future[Section]] = set(jobs)
             while left:
@@ -114,7 +114,7 @@ def _end_children() -> None:
         process.kill()
 
 
-def _one(key: str, reduced: bool, pictures: Path | None) -> Section:
+def _compute_section(key: str, reduced: bool, pictures: Path | None) -> Section:
     section = STUDIES[key](reduced=reduced)
     if pictures is not None:
         from flex_planner.plotting.panels import draw_picture

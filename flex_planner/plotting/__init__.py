@@ -1,4 +1,4 @@
-"""Pictures of planned motions, of how they were carried out, of payloads and of modes."""
+"""Pictures of motions as planned and as carried out, of payloads and of modes."""
 
 from __future__ import annotations
 

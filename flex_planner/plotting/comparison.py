@@ -31,7 +31,7 @@ def draw_comparison(path: Path, comparison: Comparison) -> None:
     path : Path
         File to write.
     comparison : Comparison
-        With a line for each outcome. Above: the distance of the tip from the goal after its
+        One line per result. Above: the distance of the tip from the goal after its
         arrival, and its path there. Below: the torques.
 
     """
@@ -40,28 +40,28 @@ def draw_comparison(path: Path, comparison: Comparison) -> None:
     above, below = figure.subfigures(2, 1, height_ratios=[1.25, 1])
     distance, path_axes = above.subplots(1, 2, width_ratios=[1.3, 1])
     torques = np.atleast_1d(below.subplots(1, n, sharey=True))
-    outcomes = comparison.outcomes
+    results = comparison.results
     _draw_distance(distance, comparison)
     _draw_paths(path_axes, comparison)
     for joint, axes in enumerate(torques):
         _draw_torques(axes, comparison, joint)
-    if outcomes:
+    if results:
         handles, labels = distance.get_legend_handles_labels()
-        figure.legend(handles, labels, loc='outside lower center', ncols=len(outcomes))
+        figure.legend(handles, labels, loc='outside lower center', ncols=len(results))
     figure.suptitle(f'{comparison.flexible.arm.name}: one task, planned and carried out in '
-                    f'{len(outcomes)} ways')
+                    f'{len(results)} modes')
     save(figure, path)
 
 
 def _draw_distance(axes: Axes, comparison: Comparison) -> None:
     """Draw the distance of the tip from the goal, from the arrival on."""
-    for outcome in comparison.outcomes:
-        color, style = _STYLES[outcome.way]
-        times, tip = _after_arrival(outcome)
+    for result in comparison.results:
+        color, style = _STYLES[result.mode]
+        times, tip = _after_arrival(result)
         distance = np.linalg.norm(tip - comparison.goal, axis=1) * _MILLI
         axes.semilogy(times, np.maximum(distance, _FLOOR), style, color=color, linewidth=1.2,
-                      label=outcome.way.value)
-    if not comparison.outcomes:
+                      label=result.mode.value)
+    if not comparison.results:
         say(axes, 'neither plan was solved')
     axes.set(title='distance of the tip from the goal', xlabel='time after arrival [s]',
              ylabel='distance [mm]')
@@ -70,14 +70,14 @@ def _draw_distance(axes: Axes, comparison: Comparison) -> None:
 
 def _draw_paths(axes: Axes, comparison: Comparison) -> None:
     """Draw the path of the tip near the goal, from the arrival on."""
-    near = [outcome for outcome in comparison.outcomes if outcome.way is not ExecutionMode.PD_ONLY]
+    near = [result for result in comparison.results if result.mode is not ExecutionMode.PD_ONLY]
     reach = 0.0
-    for outcome in comparison.outcomes:
-        color, style = _STYLES[outcome.way]
-        path = (_after_arrival(outcome)[1] - comparison.goal) * _MILLI
+    for result in comparison.results:
+        color, style = _STYLES[result.mode]
+        path = (_after_arrival(result)[1] - comparison.goal) * _MILLI
         axes.plot(*path.T, style, color=color, linewidth=1)
         axes.plot(*path[0], 'o', color=color, markersize=5)
-        if outcome in near:
+        if result in near:
             reach = max(reach, float(np.abs(path).max()))
     axes.plot(0, 0, '+', color='black', markersize=14, label='goal')
     axes.plot([], [], 'o', color='gray', markersize=5, label='on arrival')
@@ -89,13 +89,13 @@ def _draw_paths(axes: Axes, comparison: Comparison) -> None:
 
 
 def _draw_torques(axes: Axes, comparison: Comparison, joint: int) -> None:
-    """Draw what the motor of a joint did, and what it may do at the speeds of the plan."""
-    outcomes = comparison.outcomes
-    for outcome in outcomes:
-        color, style = _STYLES[outcome.way]
-        execution = outcome.execution
+    """Draw the torques of a joint's motor, and its bounds at the speeds of the plan."""
+    results = comparison.results
+    for result in results:
+        color, style = _STYLES[result.mode]
+        execution = result.execution
         axes.plot(execution.times, execution.torques[:, joint], style, color=color, linewidth=1)
-    for arrival in sorted({outcome.arrival for outcome in outcomes}):
+    for arrival in sorted({result.arrival for result in results}):
         axes.axvline(arrival, color='gray', linestyle=':', label='planned arrival')
     if comparison.flexible.solved:
         planned = comparison.flexible.uniform_samples(_POINTS)
@@ -107,8 +107,8 @@ def _draw_torques(axes: Axes, comparison: Comparison, joint: int) -> None:
     finish(axes, f'torque of joint {joint + 1}', 'torque [N m]')
 
 
-def _after_arrival(outcome: ExecutionResult) -> tuple[Array, Array]:
+def _after_arrival(result: ExecutionResult) -> tuple[Array, Array]:
     """Return times since the arrival, and the tip."""
-    times = outcome.execution.times - outcome.arrival
+    times = result.execution.times - result.arrival
     after = times >= -1e-9
-    return times[after], outcome.execution.tip[after]
+    return times[after], result.execution.tip[after]

@@ -1,4 +1,4 @@
-"""What all pictures share."""
+"""Labels and files of all pictures."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _DPI = 110
 
 def finish(axes: Axes, title: str, y_label: str, x_label: str = 'time [s]', *,
            legend: str = 'best', columns: int = 1) -> None:
-    """Label a diagram; a legend goes where it is told, in so many columns."""
+    """Label a diagram, and add a legend at a place in a number of columns."""
     axes.set(title=title, xlabel=x_label, ylabel=y_label)
     axes.grid(alpha=0.3)
     if axes.get_legend_handles_labels()[0]:

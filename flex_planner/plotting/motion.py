@@ -54,7 +54,7 @@ class Motion:
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Execution:
     """
-    What the arm did.
+    The motion of the arm as carried out.
 
     Attributes
     ----------
@@ -115,7 +115,7 @@ def draw_motion(path: Path, arm: Arm, joint_names: Sequence[str], motion: Motion
 
 def _draw_joints(axes: Axes, title: str, label: str, names: Sequence[str], times: Array,
                  values: Array, done: tuple[Array, Array] | None) -> None:
-    """Draw one line a joint, and what was carried out."""
+    """Draw one line per joint, and the simulated motion."""
     for i, name in enumerate(names):
         axes.plot(times, values[:, i], color=f'C{i}', label=name)
         if done is not None:
@@ -147,7 +147,7 @@ def _draw_bounds(axes: Axes, arm: Arm, motion: Motion) -> None:
 
 def draw_tip(axes: Axes, arm: Arm, motion: Motion,
              execution: Execution | None = None) -> None:
-    """Draw the tip's path with the arm on its way."""
+    """Draw the tip's path, with the arm at some instants."""
     for k in np.linspace(0, motion.times.size - 1, _POSTURES).astype(int):
         points = link_points(arm, motion.coordinates[k], 15).reshape(-1, 2)
         axes.plot(*points.T, color='silver', linewidth=2 if k in (0, motion.times.size - 1) else 1)
@@ -171,7 +171,7 @@ def _draw_modes(axes: Axes, arm: Arm, motion: Motion) -> None:
 
 
 def _draw_distance(axes: Axes, motion: Motion, execution: Execution | None) -> None:
-    """Draw the distance of the tip from the goal: what remains of it after arrival, if known."""
+    """Draw the distance of the tip from the goal; also after the arrival, if known."""
     tip = motion.tip if execution is None else execution.tip
     distance = np.linalg.norm(tip - motion.tip[-1], axis=1) * _MILLI
     if execution is None:

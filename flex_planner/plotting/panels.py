@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from flex_planner.paper.evidence import Panel, Picture
+from flex_planner.plotting.diagrams import Panel, Picture
 from flex_planner.plotting.figures import save
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes

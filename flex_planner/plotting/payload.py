@@ -53,7 +53,7 @@ def draw_max_payload(path: Path, found: MaxPayload, joint_names: Sequence[str],
 
 
 def _result(found: MaxPayload) -> str:
-    """Return the outcome in a line."""
+    """Return the result in a line."""
     if not found.solved:
         return found.status.value
     return f'largest payload {found.payload:.6g} kg, too much {found.upper:.6g} kg'
@@ -63,18 +63,18 @@ def _draw_front(axes: Sequence[Axes], found: MaxPayload) -> None:
     """Draw effort and price against payload, up to what is too much."""
     front = found.front
     if not front.payloads.size:
-        _leave_out(axes, 'no motion was found on the way')
+        _leave_out(axes, 'the search solved no motion')
         return
     axes[1].set_yscale('log')
     for each, values in zip(axes, (front.efforts, front.prices), strict=True):
         each.plot(front.payloads, values, 'o-', color='C0', linewidth=1,
-                  label='motions on the way')
+                  label='motions of the search')
         if found.payload:
             each.axvline(found.payload, color='C2', linestyle='--', label='largest payload')
         if np.isfinite(found.upper):
             _shade(each, found.upper)
-    finish(axes[0], 'least effort that carries a payload', 'J [N² m² s]', 'payload [kg]')
-    finish(axes[1], 'what more payload costs', '$dJ/dm_p$ [N² m² s/kg]', 'payload [kg]')
+    finish(axes[0], 'least effort for each payload', 'J [N² m² s]', 'payload [kg]')
+    finish(axes[1], 'price of more payload', '$dJ/dm_p$ [N² m² s/kg]', 'payload [kg]')
 
 
 def _leave_out(axes: Sequence[Axes], reason: str) -> None:
@@ -108,7 +108,7 @@ def _draw_trials(axes: Sequence[Axes], found: MaxPayload) -> None:
         each.xaxis.set_major_locator(MaxNLocator(_FEW, integer=True, min_n_ticks=1))
         each.set_xlim(0.5, payloads.size + 0.5)
     finish(axes[0], 'payloads tried', 'payload [kg]', 'trial')
-    finish(axes[1], 'where their torques lead', 'boundary error, eq. (17)', 'trial',
+    finish(axes[1], 'error at the goal under their torques', 'boundary error, eq. (17)', 'trial',
            legend='upper left', columns=2)
 
 
@@ -132,7 +132,7 @@ def _numbers(values: Array) -> Array:
 
 
 def _mark(axes: Axes, found: MaxPayload, values: Array) -> None:
-    """Mark a value of each trial, by its outcome."""
+    """Mark a value of each trial, by its result."""
     solved = np.array([trial.solved for trial in found.trials], dtype=bool)
     for chosen, style, label in ((solved, 'oC2', 'carried'), (~solved, 'XC3', 'not carried')):
         if chosen.any():

@@ -67,7 +67,7 @@ def _attribute(message: object, name: str, path: str) -> object:
     if name == PLACEHOLDER:
         return 0
     if not hasattr(message, name):
-        raise InvalidValueError(path, _shown(message), f'a message with the field {name!r}')
+        raise InvalidValueError(path, _excerpt(message), f'a message with the field {name!r}')
     return getattr(message, name)
 
 
@@ -88,7 +88,7 @@ def _field(store: Typestore, description: FieldDesc, value: object, path: str) -
 def _items(value: object, path: str) -> list[object]:
     """Return the entries of a sequence; a string is not one."""
     if isinstance(value, str | bytes) or not isinstance(value, Iterable):
-        raise InvalidValueError(path, _shown(value), 'a sequence')
+        raise InvalidValueError(path, _excerpt(value), 'a sequence')
     return list(value)
 
 
@@ -118,7 +118,7 @@ def _scalar(base: str, limit: int, value: object, path: str) -> object:
 def _string(value: object, limit: int, path: str) -> str:
     """Return a string that can be encoded and keeps the bound of its definition."""
     if not isinstance(value, str):
-        raise InvalidValueError(path, _shown(value), 'a string')
+        raise InvalidValueError(path, _excerpt(value), 'a string')
     try:
         size = len(value.encode())
     except UnicodeEncodeError:
@@ -135,7 +135,7 @@ def _numbers(base: str, value: object, path: str) -> NDArray[Any]:
     dtype = DTYPES[base]
     numbers = _vector(value, path)
     if numbers.size and numbers.dtype.kind not in ACCEPTED_KINDS[dtype.kind]:
-        raise InvalidValueError(path, _shown(value), f'of type {base}')
+        raise InvalidValueError(path, _excerpt(value), f'of type {base}')
     if numbers.size and dtype.kind in 'iu':
         bounds = np.iinfo(dtype)
         low, high = int(numbers.min()), int(numbers.max())
@@ -146,7 +146,7 @@ def _numbers(base: str, value: object, path: str) -> NDArray[Any]:
         with np.errstate(over='raise'):
             return np.ascontiguousarray(numbers, dtype)
     except FloatingPointError:
-        raise InvalidValueError(path, _shown(value), f'within the range of {base}') from None
+        raise InvalidValueError(path, _excerpt(value), f'within the range of {base}') from None
 
 
 def _vector(value: object, path: str) -> NDArray[Any]:
@@ -158,14 +158,14 @@ def _vector(value: object, path: str) -> NDArray[Any]:
             value = np.frombuffer(value, np.uint8)
         numbers = np.asarray(value)
     except (TypeError, ValueError):
-        raise InvalidValueError(path, _shown(value), 'a sequence of numbers') from None
+        raise InvalidValueError(path, _excerpt(value), 'a sequence of numbers') from None
     if numbers.ndim != 1:
-        raise InvalidValueError(path, _shown(value), 'a sequence of numbers')
+        raise InvalidValueError(path, _excerpt(value), 'a sequence of numbers')
     return numbers
 
 
-def _shown(value: object) -> object:
-    """Return what an error shows: a short value itself, else its type."""
+def _excerpt(value: object) -> object:
+    """Return a short value itself, of a long one its type, for errors."""
     if isinstance(value, list) and len(value) == 1:
         return value[0]
     return value if len(repr(value)) < LONGEST_SHOWN else type(value)

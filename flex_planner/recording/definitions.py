@@ -53,7 +53,8 @@ def definition_folder(package: str, environment: Mapping[str, str] | None = None
     for place in places:
         if (place / 'msg').is_dir():
             return place
-    raise RecordingError(f'no definitions of {package} in {", ".join(map(str, places))}')
+    raise RecordingError(f'no message definitions of {package} in '
+                         f'{", ".join(map(str, places))}: source the workspace that has them')
 
 
 class MessageTypes:

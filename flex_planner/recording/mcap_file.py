@@ -31,7 +31,7 @@ class _Channel:
         self.count = 0
 
     def summary(self) -> TopicSummary:
-        """Return what the metadata say of the topic."""
+        """Return the topic's entry in the metadata."""
         return TopicSummary(topic=self.topic, type_hash=self.type_hash, message_count=self.count)
 
 

@@ -97,7 +97,7 @@ class RecordingMetadata:
 
     def __post_init__(self) -> None:
         """Check and copy the custom data."""
-        object.__setattr__(self, 'custom_data', checked_custom_data(self.custom_data))
+        object.__setattr__(self, 'custom_data', check_custom_data(self.custom_data))
 
     @property
     def start_ns(self) -> int:
@@ -143,7 +143,7 @@ class RecordingMetadata:
         return _dump({'rosbag2_bagfile_information': self.to_dict()})
 
     @classmethod
-    def joined(cls, parts: Iterable[RecordingMetadata]) -> RecordingMetadata:
+    def join(cls, parts: Iterable[RecordingMetadata]) -> RecordingMetadata:
         """Return the metadata of a recording from those of its files, at least one."""
         parts = tuple(parts)
         topics: dict[str, TopicSummary] = {}
@@ -164,11 +164,12 @@ def _extent(start_ns: int, end_ns: int, message_count: int) -> dict[str, object]
     }
 
 
-def checked_custom_data(custom_data: Mapping[str, str]) -> Mapping[str, str]:
+def check_custom_data(custom_data: Mapping[str, str]) -> Mapping[str, str]:
     """Return a read-only copy of custom data, which rosbag2 reads as strings only."""
     for key, value in custom_data.items():
         if not _is_text(key) or not _is_text(value):
-            raise InvalidValueError(f'custom_data[{key!r}]', value, 'a string under a string')
+            raise InvalidValueError(f'custom_data[{key!r}]', value,
+                                    'a string with a string as its key')
     return MappingProxyType(dict(custom_data))
 
 

@@ -1,4 +1,4 @@
-"""Which messages a playback sends that does not begin with the first."""
+"""The messages of a playback that starts in the middle of a recording."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ def from_time(messages: Iterable[SerializedMessage], start_ns: int) -> Iterator[
     held: dict[str, deque[SerializedMessage]] = {}
     for message in messages:
         if message.log_time_ns >= start_ns:
-            yield from _released(held, start_ns)
+            yield from _release(held, start_ns)
             yield message
         elif message.topic.qos.durability is Durability.TRANSIENT_LOCAL:
             kept = deque[SerializedMessage](maxlen=message.topic.qos.depth)
             held.setdefault(message.topic.name, kept).append(message)
-    yield from _released(held, start_ns)
+    yield from _release(held, start_ns)
 
 
-def _released(held: dict[str, deque[SerializedMessage]],
-              time_ns: int) -> Iterator[SerializedMessage]:
-    """Yield what was held, once, as of a time."""
+def _release(held: dict[str, deque[SerializedMessage]],
+             time_ns: int) -> Iterator[SerializedMessage]:
+    """Yield the held messages once, stamped with a time."""
     for messages in held.values():
         yield from (message._replace(log_time_ns=time_ns) for message in messages)
     held.clear()

@@ -96,7 +96,7 @@ def read_serialized(
         If the file is missing or damaged, or holds something else than messages of ROS 2.
 
     """
-    for file in _verified_files(path):
+    for file in _verify_files(path):
         with _open(file) as reader:
             channels: dict[int, Topic] = {}
             for schema, channel, record in reader.iter_messages(topics):
@@ -110,7 +110,7 @@ def read_serialized(
 def read_attachments(path: Path | str) -> dict[str, bytes]:
     """Return the attachments of a recording by name; RecordingError if it cannot be read."""
     found: dict[str, bytes] = {}
-    for file in _verified_files(path):
+    for file in _verify_files(path):
         with _open(file) as reader:
             found.update((entry.name, entry.data) for entry in reader.iter_attachments())
     return found
@@ -118,7 +118,7 @@ def read_attachments(path: Path | str) -> dict[str, bytes]:
 
 def read_metadata(path: Path | str) -> RecordingMetadata:
     """Return the summary of a recording; RecordingError if it cannot be read."""
-    return RecordingMetadata.joined(_file_metadata(file) for file in _verified_files(path))
+    return RecordingMetadata.join(_file_metadata(file) for file in _verify_files(path))
 
 
 def _file_metadata(file: Path) -> RecordingMetadata:
@@ -126,7 +126,8 @@ def _file_metadata(file: Path) -> RecordingMetadata:
     with _open(file) as reader:
         summary = reader.get_summary()
         if summary is None or summary.statistics is None:
-            raise RecordingError(f'{file} has no summary: its writer did not finish')
+            raise RecordingError(f'{file} has no summary: its writer did not finish; '
+                                 'try flex-planner recover')
         extent = FileSummary(
             name=file.name, start_ns=summary.statistics.message_start_time,
             end_ns=summary.statistics.message_end_time,
@@ -136,13 +137,13 @@ def _file_metadata(file: Path) -> RecordingMetadata:
             topics=tuple(_summarize(summary, number) for number in sorted(summary.channels)))
 
 
-def _verified_files(path: Path | str) -> list[Path]:
+def _verify_files(path: Path | str) -> list[Path]:
     """Return the files of a recording, all of them there and whole."""
     files = recording_files(path)
     for file in files:
         with _reading(file), file.open('rb') as stream:
             _verify(stream)
-    missing = _listed(Path(path) / 'metadata.yaml') - {file.name for file in files}
+    missing = _listed_files(Path(path) / 'metadata.yaml') - {file.name for file in files}
     if missing:
         raise RecordingError(f'{path} lacks {", ".join(sorted(missing))}, which its '
                              'metadata.yaml lists')
@@ -164,7 +165,7 @@ def _reading(path: Path) -> Iterator[None]:
     except OSError as error:
         raise RecordingError(f'cannot read {path}: {error.strerror or error}') from error
     except DAMAGE as error:
-        raise RecordingError(f'{path} is damaged or no MCAP file: {error}') from error
+        raise RecordingError(f'{path} is damaged or not an MCAP file: {error}') from error
 
 
 def _verify(stream: BinaryIO) -> None:
@@ -200,7 +201,7 @@ def recording_files(path: Path | str) -> list[Path]:
     return [files[name] for name in order]
 
 
-def _listed(file: Path) -> set[str]:
+def _listed_files(file: Path) -> set[str]:
     """Return the names of the files that a metadata.yaml lists, none without one."""
     if not file.exists():
         return set()

@@ -62,7 +62,7 @@ def recover_recording(path: Path | str, types: MessageTypes) -> Path:
     records = [record for file in files for record in _complete_records(file)]
     messages = [record for record in records if isinstance(record, SerializedMessage)]
     if not records:
-        raise RecordingError(f'{path} holds nothing that is complete')
+        raise RecordingError(f'{path} holds no complete message or attachment')
     for topic, type_hash in {(message.topic, message.type_hash) for message in messages}:
         check_definition(path, topic, type_hash, types)
     with Recording.create(target.parent, target.name, types,
@@ -89,7 +89,7 @@ def _complete_records(file: Path) -> Iterator[Attachment | SerializedMessage]:
     """Yield attachments and messages up to the first damage, chunk by chunk."""
     schemas: dict[int, Schema] = {}
     channels: dict[int, tuple[Topic, str]] = {}
-    for record in _undamaged(file):
+    for record in _undamaged_records(file):
         if isinstance(record, Schema):
             schemas[record.id] = record
         elif isinstance(record, Channel) and record.id not in channels:
@@ -103,7 +103,7 @@ def _complete_records(file: Path) -> Iterator[Attachment | SerializedMessage]:
             yield SerializedMessage(*channels[record.channel_id], record.log_time, record.data)
 
 
-def _undamaged(file: Path) -> Iterator[McapRecord]:
+def _undamaged_records(file: Path) -> Iterator[McapRecord]:
     """Yield the records up to the first damage; the parts of a chunk only if all of it is."""
     try:
         with file.open('rb') as stream, suppress(*DAMAGE):

@@ -102,7 +102,7 @@ def _commit(stage: Path, target: Path) -> None:
 def _refuse_existing(target: Path) -> None:
     """Raise if the target exists, also as a dangling link."""
     if os.path.lexists(target):
-        raise RecordingError(f'{target} exists and is not overwritten')
+        raise RecordingError(f'{target} exists and is never overwritten: choose another name')
 
 
 def _sync_folder(folder: Path) -> None:

@@ -12,7 +12,7 @@ from typing import Final
 from flex_planner.base.errors import InvalidValueError, RecordingError
 from flex_planner.recording.definitions import MessageTypes
 from flex_planner.recording.mcap_file import RecordingFile
-from flex_planner.recording.metadata import checked_custom_data, RecordingMetadata
+from flex_planner.recording.metadata import check_custom_data, RecordingMetadata
 from flex_planner.recording.staging import os_errors, output_file, staged_folder
 from flex_planner.recording.topics import Topic
 
@@ -97,11 +97,12 @@ class Recording:
 
         """
         if not NAME.fullmatch(name):
-            raise InvalidValueError('name', name, 'letters, digits, _ and, not in front, - and .')
+            raise InvalidValueError('name', name, 'letters, digits and _, and after the first '
+                                    'character - and .')
         if max_bytes is not None and max_bytes < 1:
             raise InvalidValueError('max_bytes', max_bytes, 'at least 1')
         path = Path(folder) / name
-        custom_data = checked_custom_data(custom_data or {})
+        custom_data = check_custom_data(custom_data or {})
         with staged_folder(path) as stage:
             recording = cls(stage, path, types, custom_data, max_bytes)
             with recording._open_file:
@@ -132,7 +133,7 @@ class Recording:
             If the type is unknown or the system refuses to write.
 
         """
-        time = self._checked_time(log_time_ns)
+        time = self._check_time(log_time_ns)
         known = self._topics.get(topic.name, topic)
         if known != topic:
             raise InvalidValueError('topic', topic, f'the same as before, {known}')
@@ -168,13 +169,13 @@ class Recording:
 
         """
         if not name or not name.isprintable() or name in self._attachments:
-            raise InvalidValueError('name of an attachment', name, 'printable and not taken')
+            raise InvalidValueError('name of an attachment', name, 'printable and used only once')
         time = _integer_time('time_ns', time_ns)
         with self._writing():
             self._file.attach(name, data, media_type, time)
         self._attachments.add(name)
 
-    def _checked_time(self, log_time_ns: int) -> int:
+    def _check_time(self, log_time_ns: int) -> int:
         """Return a log time that does not run backwards."""
         time = _integer_time('log_time_ns', log_time_ns)
         if self._last is not None and time < self._last:
@@ -198,7 +199,7 @@ class Recording:
         with self._writing():
             self._end_file()
         self._writable = False
-        return RecordingMetadata.joined(self._parts)
+        return RecordingMetadata.join(self._parts)
 
     @contextmanager
     def _writing(self) -> Iterator[None]:

@@ -1,4 +1,4 @@
-"""What an arm is like: masses, limits, frequencies and deflections, as text."""
+"""Properties of an arm as text: masses, limits, frequencies and deflections."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def describe_arm(model: ArmModel, postures: Sequence[Array], payload_mass: float
     """
     arm = model.arm
     parameters = Parameters.of(arm, payload_mass=payload_mass)
-    lines = [arm.name, *_wrapped(arm.source), '', *_overview(arm, payload_mass), '']
+    lines = [arm.name, *_source_lines(arm.source), '', *_overview(arm, payload_mass), '']
     lines += [f'link {i}: {_describe_link(link)}' for i, link in enumerate(arm.links, 1)]
     lines += [f'joint {i}: {_describe_joint(joint)}' for i, joint in enumerate(arm.joints, 1)]
     for posture in postures:
@@ -49,7 +49,7 @@ def standard_postures(arm: Arm) -> list[Array]:
     return [stretched, bent] if arm.n_joints > 1 else [stretched]
 
 
-def _wrapped(source: str) -> list[str]:
+def _source_lines(source: str) -> list[str]:
     return [f'source: {" ".join(source.split())}'] if source else []
 
 

@@ -1,4 +1,4 @@
-"""What planning for flexible links is worth, as a table of text."""
+"""The benefit of planning with flexible links, as a table of text."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _MILLI = 1e3
 
 
 def comparison_rows(comparison: Comparison) -> list[Row]:
-    """Return what was compared."""
+    """Return both plans, the simulated arm and the goal."""
     simulated = comparison.arm
     rigidity = ', '.join(f'{link.flexural_rigidity:g}' for link in simulated.links)
     x, y = comparison.goal
@@ -26,30 +26,30 @@ def comparison_rows(comparison: Comparison) -> list[Row]:
 
 def comparison_table(comparison: Comparison) -> str:
     """
-    Return a line for each way, as text; empty if no plan was solved.
+    Return one line per mode of execution, as text; empty if no plan was solved.
 
     Errors are distances of the tip from the goal, on arrival and when it has settled. The tip's
     motion after the arrival is peak to peak; bending is the largest deflection of the links if
-    the joints were locked on arrival. Tracking is the largest error of a joint on the way.
+    the joints were locked on arrival. Tracking is the largest error of a joint before it.
 
     """
-    if not comparison.outcomes:
+    if not comparison.results:
         return ''
     return columns(
         ['', 'error on arrival [mm]', 'settled [mm]', 'tip motion after [mm]',
          'bending left [mm]', 'tracking [mrad]'],
-        [_cells(outcome) for outcome in comparison.outcomes])
+        [_cells(result) for result in comparison.results])
 
 
 def _planning(plan: Plan) -> str:
-    """Return how planning went."""
+    """Return time and strategy of planning, or the reason of its failure."""
     if plan.solved:
         return planning_row(plan.planning_time, plan.strategy,
                             f'{plan.iterations} iterations')[1]
     return ': '.join(dict.fromkeys([plan.status.value, plan.message]))
 
 
-def _cells(outcome: ExecutionResult) -> list[str]:
-    values = (outcome.arrival_error, outcome.final_error, outcome.residual.tip, outcome.bending,
-              outcome.tracking_error)
-    return [outcome.way.value, *(f'{value * _MILLI:.3g}' for value in values)]
+def _cells(result: ExecutionResult) -> list[str]:
+    values = (result.arrival_error, result.final_error, result.residual.tip, result.bending,
+              result.tracking_error)
+    return [result.mode.value, *(f'{value * _MILLI:.3g}' for value in values)]

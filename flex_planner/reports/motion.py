@@ -1,4 +1,4 @@
-"""What came of planning, as tables of text."""
+"""Results of planning as tables of text."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def columns(names: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def planning_row(seconds: float, *details: str) -> Row:
-    """Return how long planning took, and how it went."""
+    """Return the time that planning took, with details."""
     return 'planned in', f'{seconds:.2f} s ({", ".join(detail for detail in details if detail)})'
 
 
@@ -48,7 +48,7 @@ def _share(before: str, share: float, whole: str) -> str:
 def certificate_rows(certificate: Certificate) -> list[Row]:
     """Return the residuals of a plan; the message of a report has the same entries."""
     return [
-        ('certificate', 'every plan is checked by means that did not make it'),
+        ('certificate', 'every plan is checked by independent means'),
         ('  collocation residual', f'{certificate.collocation_residual:.1e}'),
         ('  boundary error (eq. 17)', f'{certificate.boundary_error:.1e}'),
         ('  Hamiltonian drift', f'{certificate.hamiltonian_drift:.1e}'),
@@ -57,7 +57,7 @@ def certificate_rows(certificate: Certificate) -> list[Row]:
 
 
 def plan_rows(plan: Plan, peaks: Peaks | None) -> list[Row]:
-    """Return what came of a task; `peaks` only with a solution."""
+    """Return the result of a task; `peaks` only with a solution."""
     intervals = f'{plan.mesh_intervals} intervals' if plan.mesh_intervals else ''
     rows = [('status', plan.status.value),
             planning_row(plan.planning_time, plan.strategy, f'{plan.iterations} iterations',
@@ -67,7 +67,7 @@ def plan_rows(plan: Plan, peaks: Peaks | None) -> list[Row]:
 
 
 def motion_rows(plan: Plan, peaks: Peaks) -> list[Row]:
-    """Return what a motion is like, and its certificate."""
+    """Return cost, peaks and certificate of a motion."""
     return [
         ('cost J', f'{plan.cost:.6g}'),
         ('effort', f'{plan.effort:.6g} N^2 m^2 s, the integral of the squared torques'),
@@ -79,7 +79,7 @@ def motion_rows(plan: Plan, peaks: Peaks) -> list[Row]:
 
 
 def _saturation(plan: Plan) -> str:
-    """Return for how long the motors are on their limits."""
+    """Return the shares of the time that the motors spend on their limits."""
     if not plan.saturation.any():
         return 'never'
     shares = ', '.join(f'joint {i} {share:.1%}' for i, share in enumerate(plan.saturation, 1))
@@ -111,7 +111,7 @@ def weights_table(plan: Plan) -> str:
 
 
 def payload_rows(found: MaxPayload, peaks: Peaks | None) -> list[Row]:
-    """Return what came of a search for the maximum payload; `peaks` only with a motion."""
+    """Return the result of a search for the maximum payload; `peaks` only with a motion."""
     rows = [('status', found.status.value), ('method', found.method.value),
             planning_row(found.planning_time, f'{found.iterations} iterations'),
             ('largest payload', _bracket(found))]
@@ -128,12 +128,13 @@ def _bracket(found: MaxPayload) -> str:
     below = f'{found.payload:.6g} kg' if found.payload else 'none found'
     if not np.isfinite(found.upper):
         return below
-    status = 'is too much' if found.status is PlanStatus.SOLVED else 'was tried in vain'
-    return f'{below}; {found.upper:.6g} kg {status}'
+    if found.status is PlanStatus.SOLVED:
+        return f'{below}; {found.upper:.6g} kg is too much'
+    return f'{below}; no solution at {found.upper:.6g} kg'
 
 
 def _limit(found: MaxPayload) -> str:
-    """Return which motor allows no more."""
+    """Return the motor that limits the payload."""
     assert found.limiting_joint is not None
     if found.held or found.plan is None:
         reason = 'which can hold no more at the goal'
@@ -143,7 +144,7 @@ def _limit(found: MaxPayload) -> str:
 
 
 def search_table(found: MaxPayload) -> str:
-    """Return the payloads met on the way, as lines of text; empty if there are none."""
+    """Return the payloads solved or tried, as lines of text; empty if there are none."""
     front = found.front
     if front.payloads.size:
         priced = zip(front.payloads, front.efforts, front.prices, strict=True)

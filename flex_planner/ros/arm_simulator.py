@@ -61,7 +61,7 @@ class ArmSimulator(Node):  # type: ignore[misc]
         super().__init__('arm_simulator')
         arm = declare_arm(self)
         self._settings = declare(self, SimulatorSettings.for_arm(arm))
-        self._arm = self._settings.mismatch.applied(arm)
+        self._arm = self._settings.mismatch.apply(arm)
         self._plant = self._new_plant()
         self._watch = ArrivalWatch(self._arm, self._settings.vibration_window)
         self._joints = self.create_publisher(JointState, 'joint_states', 10)
@@ -94,7 +94,7 @@ class ArmSimulator(Node):  # type: ignore[misc]
         self.get_logger().info(f'following a trajectory of {len(trajectory.points)} points')
 
     def _refusal(self, trajectory: JointTrajectory) -> str:
-        """Return why a trajectory cannot be followed, empty if it can."""
+        """Return the reason why a trajectory cannot be followed, empty if it can."""
         broken = trajectory_violations(trajectory, self._settings.joint_names)
         if broken:
             return '; '.join(broken[:3])
@@ -132,7 +132,8 @@ class ArmSimulator(Node):  # type: ignore[misc]
             self.get_logger().warning(
                 f'the simulation is {late:.2f} s late: this machine is too slow for '
                 f'control_rate = {self._settings.control_rate:g} Hz with '
-                f'{self._arm.n_modes} modes', throttle_duration_sec=_WARNING_PERIOD)
+                f'{self._arm.n_modes} modes: lower one of them',
+                throttle_duration_sec=_WARNING_PERIOD)
 
     def _now(self) -> float:
         """Return the time since the start [s]."""
@@ -176,7 +177,7 @@ def _state_message(stamp: Time, names: Sequence[str], positions: Array, velociti
 
 
 def main(args: list[str] | None = None) -> None:
-    """Run the simulator until it is told to stop."""
+    """Run the simulator until a signal ends it."""
     run_node(ArmSimulator, 'arm_simulator', args)
 
 

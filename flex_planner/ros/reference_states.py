@@ -22,6 +22,7 @@ import sys
 import threading
 import time
 
+from flex_planner.base.validation import Array
 import numpy as np
 from numpy.typing import NDArray
 import rclpy
@@ -29,7 +30,6 @@ from rclpy.signals import SignalHandlerOptions
 from scipy.interpolate import CubicHermiteSpline
 from sensor_msgs.msg import JointState
 
-Array = NDArray[np.float64]
 _BLOCK = 100  # states are interpolated that many at a time
 _DEPTH = 10
 _AFTER_YOU, _LAST_RESORT = 0.3, 1.5  # [s], for the planner to leave first; to leave by force
@@ -46,7 +46,7 @@ class StreamedPlan:
     names : list of str
         Of the joints, then of the modal coordinates.
     rate : float
-        States a second, above 0 [Hz].
+        States per second, above 0 [Hz].
     stamp_ns, began_ns : int
         When the motion starts, since 1970 and by the monotonic clock [ns].
     times_ns : numpy.ndarray of int64, shape (k,)
@@ -149,14 +149,14 @@ class Stream:
             self._changed.notify()
         self._thread.join(timeout)
 
-    def _interrupted(self) -> bool:
+    def _is_interrupted(self) -> bool:
         return self._closed or self._next is not None
 
     def _run(self) -> None:
         _hurry()
         while True:
             with self._changed:
-                self._changed.wait_for(self._interrupted)
+                self._changed.wait_for(self._is_interrupted)
                 if self._closed or self._next is None:
                     return
                 plan, self._next = self._next, None
@@ -185,7 +185,7 @@ class Stream:
     def _wait(self, due_ns: int) -> bool:
         """Wait until a time of the monotonic clock [ns]; return whether to stop instead."""
         with self._changed:
-            while not self._interrupted():
+            while not self._is_interrupted():
                 left = due_ns - time.monotonic_ns()
                 if left <= 0:
                     return False

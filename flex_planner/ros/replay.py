@@ -23,7 +23,7 @@ from flex_planner.recording import (
     Reliability,
     TopicSummary,
 )
-from flex_planner.ros.runtime.parameters import declare, described
+from flex_planner.ros.runtime.parameters import declare, parameter_field
 from flex_planner.ros.runtime.running import CannotGoOnError, run_node
 import rclpy
 from rclpy.clock import Clock, ClockType
@@ -40,17 +40,18 @@ _SHORTEST_WAIT_NS = 1000
 class ReplaySettings:
     """Parameters of the replay; all read-only."""
 
-    recording: str = described('', 'Folder of the recording, or its .mcap file.', read_only=True)
-    rate: float = described(
+    recording: str = parameter_field(
+        '', 'Folder of the recording, or its .mcap file.', read_only=True)
+    rate: float = parameter_field(
         1.0, 'Speed of the playback, 2 is twice as fast.', lowest=1e-3, highest=1e3,
         read_only=True)
-    start: float = described(
-        0.0, 'What to leave out at the beginning of the recording [s].', lowest=0.0, highest=1e9,
+    start: float = parameter_field(
+        0.0, 'Time to leave out at the beginning of the recording [s].', lowest=0.0, highest=1e9,
         read_only=True)
-    delay: float = described(
+    delay: float = parameter_field(
         1.0, 'Time before the first message, in which subscribers find the publishers [s].',
         lowest=0.01, highest=60.0, read_only=True)
-    loop: bool = described(False, 'Whether to begin again at the end.', read_only=True)
+    loop: bool = parameter_field(False, 'Whether to begin again at the end.', read_only=True)
 
 
 class Replay(Node):  # type: ignore[misc]
@@ -110,7 +111,7 @@ class Replay(Node):  # type: ignore[misc]
         return outlets
 
     def _passes(self) -> Iterator[tuple[float, partial[None]]]:
-        """Yield when to send each message, in seconds since the beginning, and what sends it."""
+        """Yield the time of each message from the beginning [s], and a call that sends it."""
         began = 0.0
         while True:
             due = began
@@ -170,7 +171,7 @@ def _profile(qos: QosProfile) -> QoSProfile:
 
 
 def replay(settings: ReplaySettings, args: list[str] | None = None) -> None:
-    """Publish a recording and end the process, with code 0 unless it cannot be read to its end."""
+    """Publish a recording and end the process; the code is 0 if all of it could be read."""
     run_node(lambda: Replay(settings), 'replay', args)
 
 

@@ -1,5 +1,5 @@
 """
-What planning for flexible links is worth: one task planned in several ways, and carried out.
+The benefit of planning with flexible links: one task, planned and carried out in several modes.
 
 Every plan is followed by the same flexible arm, which may differ from the planned one. The
 controller samples and holds, as one with hardware would.
@@ -39,7 +39,7 @@ _STEP, _TORQUE_TOLERANCE = 2.5e-4, 1e-5
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Comparison:
     """
-    A task carried out in several ways.
+    A task carried out in several modes.
 
     Attributes
     ----------
@@ -50,10 +50,10 @@ class Comparison:
     payload_mass : float
         As simulated [kg].
     goal : numpy.ndarray, shape (2,)
-        Where the tip is to go [m].
+        Goal of the tip [m].
     settling : float
         How long the arm is watched after its arrival [s].
-    outcomes : tuple of ExecutionResult
+    results : tuple of ExecutionResult
         In the order of `ExecutionMode`; without those of a plan that failed.
 
     """
@@ -64,16 +64,16 @@ class Comparison:
     payload_mass: float
     goal: Array
     settling: float
-    outcomes: tuple[ExecutionResult, ...]
+    results: tuple[ExecutionResult, ...]
 
     @property
     def solved(self) -> bool:
-        """Return whether there is a plan for every way."""
+        """Return whether there is a plan for every mode."""
         return self.flexible.solved and self.rigid.solved
 
-    def of(self, way: ExecutionMode) -> ExecutionResult:
-        """Return one outcome; KeyError if its plan failed."""
-        return {outcome.way: outcome for outcome in self.outcomes}[way]
+    def of(self, mode: ExecutionMode) -> ExecutionResult:
+        """Return the result of a mode; KeyError if its plan failed."""
+        return {result.mode: result for result in self.results}[mode]
 
 
 def compare(task: Task, *, model: ArmModel | None = None, mismatch: Mismatch | None = None,
@@ -117,7 +117,7 @@ def compare(task: Task, *, model: ArmModel | None = None, mismatch: Mismatch | N
 
     """
     watch = monitor or Monitor()
-    simulated = (mismatch or Mismatch()).applied(task.arm)
+    simulated = (mismatch or Mismatch()).apply(task.arm)
     chosen = gains or Gains.of(task.arm.n_joints, _STIFFNESS, _DAMPING)
     Control(gains=chosen, rate=rate).check(task.arm.n_joints)
     number('settling', settling, above=0, at_most=1000, unit='s')
@@ -132,24 +132,24 @@ def compare(task: Task, *, model: ArmModel | None = None, mismatch: Mismatch | N
                       payload_mass=carried, goal=goal, monitor=watch)
     return Comparison(flexible=flexible, rigid=rigid, arm=simulated, payload_mass=carried,
                       goal=goal, settling=settling,
-                      outcomes=_outcomes(flexible, rigid, setting))
+                      results=_execute_all(flexible, rigid, setting))
 
 
-def _outcomes(flexible: Plan, rigid: Plan, setting: Setting) -> tuple[ExecutionResult, ...]:
-    """Carry out every way whose plan is solved."""
-    references = {plan is rigid: finely_sampled(plan, setting.monitor)
+def _execute_all(flexible: Plan, rigid: Plan, setting: Setting) -> tuple[ExecutionResult, ...]:
+    """Carry out every mode whose plan is solved."""
+    references = {plan is rigid: sample_finely(plan, setting.monitor)
                   for plan in (flexible, rigid) if plan.solved}
     plans = {False: flexible, True: rigid}
     found = []
-    for way in ExecutionMode:
-        if way.rigid in references:
-            setting.monitor.phase = way.value
-            found.append(execute_plan(way, plans[way.rigid], references[way.rigid], setting))
+    for mode in ExecutionMode:
+        if mode.rigid in references:
+            setting.monitor.phase = mode.value
+            found.append(execute_plan(mode, plans[mode.rigid], references[mode.rigid], setting))
     return tuple(found)
 
 
-def finely_sampled(plan: Plan, monitor: Monitor) -> SampledPlan:
-    """Return samples as close as they may be."""
+def sample_finely(plan: Plan, monitor: Monitor) -> SampledPlan:
+    """Return samples as close as the sampling allows."""
     step = max(_STEP, plan.task.duration / (MAX_SAMPLES - 1))
     settings = SamplingSettings(longest_step=step, torque_tolerance=_TORQUE_TOLERANCE)
     return sample_plan(plan, settings, monitor)

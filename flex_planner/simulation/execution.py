@@ -1,4 +1,4 @@
-"""One way to carry out a plan on a simulated flexible arm, and what came of it."""
+"""A plan carried out on a simulated flexible arm in one of several modes, and the result."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _SETTLED = 0.1  # of the time after arrival
 
 
 class ExecutionMode(Enum):
-    """How a task is planned and carried out; the value is shown to people."""
+    """Modes of planning and carrying out a task; the value is shown to people."""
 
     FLEXIBLE_OPEN = 'flexible plan, torque only'
     RIGID_OPEN = 'rigid plan, torque only'
@@ -43,7 +43,7 @@ class ExecutionMode(Enum):
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SimulatedMotion:
     """
-    What the arm did, at every period of the controller from 0.
+    The motion of the arm, at every period of the controller from 0.
 
     Attributes
     ----------
@@ -67,13 +67,12 @@ class SimulatedMotion:
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ExecutionResult:
     """
-    What came of one way.
+    The result of carrying out a plan.
 
     Attributes
     ----------
-    way : ExecutionMode
-        Which.
-    arrival : float
+    mode : ExecutionMode
+        Of execution.    arrival : float
         Planned duration [s].
     arrival_error : float
         Distance of the tip from the goal at that time [m].
@@ -91,7 +90,7 @@ class ExecutionResult:
 
     """
 
-    way: ExecutionMode
+    mode: ExecutionMode
     arrival: float
     arrival_error: float
     final_error: float
@@ -104,7 +103,7 @@ class ExecutionResult:
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Setting:
     """
-    What all ways have in common.
+    The conditions that all modes share.
 
     Attributes
     ----------
@@ -134,10 +133,10 @@ class Setting:
     monitor: Monitor
 
 
-def execute_plan(way: ExecutionMode, plan: Plan, sampled: SampledPlan,
+def execute_plan(mode: ExecutionMode, plan: Plan, sampled: SampledPlan,
                  setting: Setting) -> ExecutionResult:
     """
-    Follow a sampled plan in one way.
+    Carry out a sampled plan in one mode.
 
     Raises
     ------
@@ -148,29 +147,29 @@ def execute_plan(way: ExecutionMode, plan: Plan, sampled: SampledPlan,
 
     """
     reference, n = JointReference.of(sampled), plan.arm.n_joints
-    gains = setting.gains if way.feedback else Gains.of(n, 0.0, 0.0)
+    gains = setting.gains if mode.feedback else Gains.of(n, 0.0, 0.0)
     plant = Plant(
         setting.model, Control(gains=gains, rate=setting.rate,
-                               feedforward=way is not ExecutionMode.PD_ONLY),
+                               feedforward=mode is not ExecutionMode.PD_ONLY),
         payload_mass=setting.payload_mass, payload_inertia=plan.task.payload_inertia,
         positions=plan.task.start_positions)
     plant.follow(reference)
     arrival = plan.task.duration
-    execution, bending = _watched(plant, arrival, setting)
+    execution, bending = _watch(plant, arrival, setting)
     error = np.linalg.norm(execution.tip - setting.goal, axis=1)
     after = int(np.ceil(arrival * setting.rate - 1e-6))
     end = execution.times[-1] - _SETTLED * setting.settling
     demanded = np.array([reference.motion(time)[0] for time in execution.times[:after + 1]])
     tracking = np.abs(execution.coordinates[:after + 1, :n] - demanded).max()
     return ExecutionResult(
-        way=way, arrival=arrival, arrival_error=float(error[after]),
+        mode=mode, arrival=arrival, arrival_error=float(error[after]),
         final_error=float(error[execution.times >= end].max()), bending=bending,
         residual=ResidualVibration.of(plant.model.arm, execution.coordinates[after:]),
         tracking_error=float(tracking), execution=execution)
 
 
-def _watched(plant: Plant, arrival: float, setting: Setting) -> tuple[SimulatedMotion, float]:
-    """Let an arm go; return what it did, and its bending with the joints locked on arrival."""
+def _watch(plant: Plant, arrival: float, setting: Setting) -> tuple[SimulatedMotion, float]:
+    """Run a motion; return it, and the bending with the joints locked on arrival."""
     n_t = plant.model.arm.n_coordinates
     times, states, torques = [0.0], [plant.state], [plant.torque]
 
@@ -191,7 +190,7 @@ def _watched(plant: Plant, arrival: float, setting: Setting) -> tuple[SimulatedM
 
 
 def _bending(plant: Plant) -> float:
-    """Return how far the links would bend if the joints were locked now."""
+    """Return the largest deflection of the links if the joints were locked now."""
     rest, _ = equilibrium(plant.model, plant.joint_state[0], plant.parameters)
     locked = plant.state.copy()
     n, n_t = plant.model.arm.n_joints, plant.model.arm.n_coordinates

@@ -1,4 +1,4 @@
-"""What surrounds a simulated arm: its reference, gains, encoders and disturbances."""
+"""The reference, gains, encoders and disturbances of a simulated arm."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Gains:
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JointReference:
     """
-    What a joint trajectory demands, interpolated as joint_trajectory_controller does.
+    A joint trajectory, interpolated as by joint_trajectory_controller.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ class JointReference:
                    velocities=samples.rates[:, :n], torques=samples.torques)
 
     def after(self, positions: Array, velocities: Array, torques: Array) -> JointReference:
-        """Return the reference with a way to its first sample, unless that is at time 0."""
+        """Return the reference with a start at time 0, unless it has one."""
         if self.times[0] == 0:
             return self
         return JointReference(
@@ -113,7 +113,7 @@ class JointReference:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Encoder:
     """
-    How the joints are measured; by default exactly, at every period of the controller.
+    Measurement of the joints; by default exact, at every period of the controller.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ class JointSensor:
 
     def __init__(self, encoder: Encoder, positions: Array) -> None:
         self._encoder = encoder
-        self.positions, self.speeds = self._rounded(positions), np.zeros_like(positions)
+        self.positions, self.speeds = self._round(positions), np.zeros_like(positions)
         self._count, self._sampled = 0, 0.0
 
     def look(self, time: float, positions: Array, speeds: Array) -> None:
@@ -170,12 +170,12 @@ class JointSensor:
         if self._encoder.rate and count == self._count:
             return
         before, since = self.positions, time - self._sampled
-        self.positions = self._rounded(positions)
+        self.positions = self._round(positions)
         differences: Array = (self.positions - before) / since
         self.speeds = differences if self._encoder.differentiates else speeds.copy()
         self._count, self._sampled = count, time
 
-    def _rounded(self, positions: Array) -> Array:
+    def _round(self, positions: Array) -> Array:
         resolution = self._encoder.resolution
         if not resolution:
             return positions.copy()

@@ -1,4 +1,4 @@
-"""How a simulated arm differs from the one that a motion was planned for."""
+"""Differences of a simulated arm from the one that a motion was planned for."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ AS_GIVEN = -1
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Mismatch:
     """
-    What is different; by default nothing.
+    The differences; by default none.
 
     Parameters
     ----------
@@ -43,21 +43,21 @@ class Mismatch:
         object.__setattr__(self, 'added_friction', vector(
             'added_friction', given, given.size, at_least=0, at_most=1e3, unit='N m s/rad'))
 
-    def applied(self, arm: Arm) -> Arm:
+    def apply(self, arm: Arm) -> Arm:
         """
         Return the arm that is simulated instead.
 
         Raises
         ------
         InvalidSizeError
-            If the friction has neither one entry a joint nor none.
+            If the friction has neither one entry per joint nor none.
 
         """
         friction = vector('added_friction', self.added_friction, (0, arm.n_joints))
         added = friction if friction.size else np.zeros(arm.n_joints)
         return replace(
             arm, links=tuple(self._link(link) for link in arm.links),
-            joints=tuple(_rubbing(joint, float(more))
+            joints=tuple(_with_friction(joint, float(more))
                          for joint, more in zip(arm.joints, added, strict=True)))
 
     def _link(self, link: Link) -> Link:
@@ -69,6 +69,6 @@ class Mismatch:
                        flexural_rigidity=link.flexural_rigidity * self.rigidity_scale)
 
 
-def _rubbing(joint: Joint, more: float) -> Joint:
+def _with_friction(joint: Joint, more: float) -> Joint:
     """Return a joint with more friction."""
     return replace(joint, viscous_friction=joint.viscous_friction + more)

@@ -39,7 +39,7 @@ class RunawayError(FlexPlannerError):
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Control:
     """
-    How the joints are driven.
+    The control of the joints.
 
     Parameters
     ----------
@@ -168,21 +168,21 @@ class Plant:
     def _go_on(self) -> None:
         """Compute a torque, hold it for one period."""
         begin = self.elapsed
-        self.torque = self._commanded(begin)
+        self.torque = self._command(begin)
         total = self.torque
         if self._moves:
             total = total + self.control.disturbance.mean(begin, begin + self.period, total.size)
         state = self._integrator.advance(self.state, total)
         if state is None:
-            raise RunawayError(f'the simulated arm has run away after {self.time:.3f} s: gains '
-                               'that are too high for the rate of the controller, or too much '
-                               'torque')
+            raise RunawayError(f'the simulated arm has run away after {self.time:.3f} s: the '
+                               'gains are too high for the rate of the controller, or the '
+                               'torques too large')
         self.state = state
         self._ticks += 1
         self.sensor.look(self.time, *self.joint_state)
 
-    def _commanded(self, elapsed: float) -> Array:
-        """Return what the motors do for the coming period."""
+    def _command(self, elapsed: float) -> Array:
+        """Return the torques of the motors for the coming period."""
         gains, sensor = self.control.gains, self.sensor
         position, velocity = self._reference.motion(elapsed)
         torque: Array = (gains.stiffness * (position - sensor.positions)

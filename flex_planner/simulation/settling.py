@@ -1,4 +1,4 @@
-"""How much of an arm's motion is left after its arrival, from what it did."""
+"""The motion of an arm that remains after its arrival."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def bending_peak_to_peak(arm: Arm, coordinates: Array) -> float:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ResidualVibration:
     """
-    What is left after an arrival.
+    The motion that remains after an arrival.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class ResidualVibration:
 
 class ArrivalWatch:
     """
-    Collects what an arm does for a time after it should have arrived.
+    Collects the states of an arm for a time after it should have arrived.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ class ArrivalWatch:
             self._seen.append(state[:self._arm.n_coordinates])
 
     def result(self, time: float) -> ResidualVibration | None:
-        """Return what was left, once for each arrival, when the window is over."""
+        """Return the residual vibration, once per arrival, when the window is over."""
         if time < self._arrival + self._window or not self._seen:
             return None
         residual = ResidualVibration.of(self._arm, np.stack(self._seen))

@@ -169,8 +169,8 @@ def test_speed_limit_needs_a_torque_limit() -> None:
 @pytest.mark.parametrize(('values', 'field', 'bound'), [
     ({'links': ()}, 'number of links', 'an integer from 1 to 8'),
     ({'links': (Link(**LINK),) * (MAX_LINKS + 1)}, 'number of links', 'an integer from 1 to 8'),
-    ({'joints': (Joint(),)}, 'number of joints', '2, one a link'),
-    ({'nodes': (Node(),) * 2}, 'number of nodes', '0 or 3, one a joint and one for the tip'),
+    ({'joints': (Joint(),)}, 'number of joints', '2, one per link'),
+    ({'nodes': (Node(),) * 2}, 'number of nodes', '0 or 3, one per joint and one for the tip'),
     ({'gravity': [0.0]}, 'gravity', 'a list of 2 numbers'),
     ({'gravity': [0.0, math.nan]}, 'gravity[1]', 'a finite number m/s^2'),
     ({'gravity': 'down'}, 'gravity', 'a list of 2 numbers')])

@@ -16,7 +16,7 @@ from typing import Any
 
 from flex_planner.arms.arm import Arm
 from flex_planner.cli import main
-from flex_planner.cli.options import with_joined_lists
+from flex_planner.cli.options import join_lists
 from flex_planner.optimal_control.task import postures_from_points, Task
 from flex_planner.planning.plan_path import plan_path
 from flex_planner.recording import definition_folder, MessageTypes, read_recording
@@ -286,7 +286,7 @@ def test_folder_that_cannot_be_written_is_told_before_anything_is_solved(tmp_pat
 
 
 def test_lists_may_begin_with_a_minus_sign() -> None:
-    assert with_joined_lists(['plan', 'arm', '--to', '-0.5,0', '--elbow', '-1', '--from=-1,0']) \
+    assert join_lists(['plan', 'arm', '--to', '-0.5,0', '--elbow', '-1', '--from=-1,0']) \
         == ['plan', 'arm', '--to=-0.5,0', '--elbow', '-1', '--from=-1,0']
     assert run('plan', 'korayem_rigid', '--from', '-.5,0', '--to', '-0.5,-0.5', '--duration',
                '1.5', *DRY).code == 0
@@ -319,7 +319,7 @@ def test_interrupt_ends_the_search_and_leaves_nothing(long_search: subprocess.Po
     out, err = long_search.communicate(timeout=20)
     assert (long_search.returncode, out) == (130, '')
     assert re.fullmatch(r'flex-planner: canceled after [\d.]+ s, in the phase '
-                        r"'payload raised'; nothing is written\n", err)
+                        r"'payload raised'; nothing was written\n", err)
     assert not list(tmp_path.iterdir())
 
 
@@ -331,7 +331,8 @@ def test_plan_is_drawn_also_without_ros(tmp_path: Path) -> None:
          f'from flex_planner.cli import main; sys.exit(main({arguments}))'],
         text=True, capture_output=True, timeout=60, env=dict(os.environ))
     assert result.returncode == 0
-    assert result.stderr.startswith('flex-planner: nothing will be recorded, which takes ROS 2: ')
+    assert result.stderr.startswith(
+        'flex-planner: no recording is written, because that needs ROS 2: ')
     (picture,) = tmp_path.iterdir()
     assert picture.name == 'korayem_rigid_motion.png'
     assert is_picture(str(picture))

@@ -238,7 +238,7 @@ def test_map_of_a_study_that_is_not_understood_is_drawn_without_arm(
     zarr.consolidate_metadata(str(store))
     figure = figures(store, monkeypatch)['max_payload_map']
     assert entries(figure) == ['unreachable: 37']
-    assert 'the arm of this map is not drawn' in caplog.text
+    assert 'the arm is not drawn, because the study of the map cannot be read' in caplog.text
 
 
 def test_arm_of_every_quantity_is_drawn(tmp_path: Path,

@@ -116,8 +116,8 @@ def test_motion_is_packed_and_unpacked_to_single_precision(
     plan = plan_path(task, model=ei5_model)
     assert plan.solution is not None
     kept = KeptMotion.of(plan.problem, plan.solution, 2.5)
-    again = KeptMotion.unpacked(kept.signature, kept.packed())
-    assert kept.packed().dtype == np.float32
+    again = KeptMotion.unpack(kept.signature, kept.pack())
+    assert kept.pack().dtype == np.float32
     assert (again.payload, again.price) == (1.0, 2.5)
     assert again.mesh == pytest.approx(plan.solution.mesh, rel=1e-6)
     scale = np.abs(plan.solution.nodes).max(axis=0)
@@ -132,7 +132,7 @@ def test_nodes_too_close_for_single_precision_become_one(ei5_model: ArmModel,
     mesh = np.array([0.0, 0.5, 0.5 + 1e-10, 1.0])
     kept = KeptMotion(signature=signature(problem.task), payload=1.0, price=0.0, mesh=mesh,
                       nodes=np.zeros((4, problem.size)))
-    assert KeptMotion.unpacked(kept.signature, kept.packed()).mesh.tolist() == [0.0, 0.5, 1.0]
+    assert KeptMotion.unpack(kept.signature, kept.pack()).mesh.tolist() == [0.0, 0.5, 1.0]
 
 
 def test_signature_has_a_name_for_every_entry(ei50_arm: Arm, paper_task: TaskFactory) -> None:

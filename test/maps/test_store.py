@@ -66,7 +66,7 @@ def test_complete_blocks_are_known_when_the_map_is_opened_again(path: Path) -> N
     with MapStore.of(path, study) as store:
         fill(store, 2)
     with MapStore.of(path, study) as store:
-        assert [store.complete(block) for block in blocks(study)] == [True] * 2 + [False] * 4
+        assert [store.is_complete(block) for block in blocks(study)] == [True] * 2 + [False] * 4
 
 
 @pytest.mark.parametrize('room', [0, 1, 5, 10])
@@ -87,10 +87,10 @@ def test_a_full_disk_costs_only_the_block_that_it_cuts_off(
         with pytest.raises(OSError, match='No space left on device; finished') as caught:
             fill(store)
         assert (caught.value.errno, caught.value.filename) == (errno.ENOSPC, str(path))
-        assert not store.complete(blocks(study)[1])
+        assert not store.is_complete(blocks(study)[1])
     monkeypatch.undo()
     with MapStore.of(path, study) as store:
-        assert [store.complete(block) for block in blocks(study)] == [True] + [False] * 5
+        assert [store.is_complete(block) for block in blocks(study)] == [True] + [False] * 5
         fill(store)
         assert store.dataset().max_payload[5, 3] == value_of((5, 3))
 
@@ -101,7 +101,7 @@ def test_a_damaged_block_is_not_complete(path: Path) -> None:
         fill(store)
     (path / 'code' / '1.1').write_bytes(b'')
     with MapStore.of(path, study) as store:
-        assert [store.complete(block) for block in blocks(study)].count(False) == 1
+        assert [store.is_complete(block) for block in blocks(study)].count(False) == 1
 
 
 def test_results_of_other_cells_are_refused(path: Path) -> None:
@@ -141,9 +141,9 @@ def test_comments_and_order_of_the_study_file_do_not_matter(path: Path) -> None:
 
 def test_reset_removes_a_map_and_nothing_else(tmp_path: Path) -> None:
     (tmp_path / 'precious').touch()
-    with pytest.raises(MapStoreError, match='is there, but is no map'):
+    with pytest.raises(MapStoreError, match='exists, but is not a map'):
         MapStore.of(tmp_path, small_study(), reset=True)
-    with pytest.raises(MapStoreError, match='is there, but is no map'):
+    with pytest.raises(MapStoreError, match='exists, but is not a map'):
         MapStore.of(tmp_path / 'precious', small_study(), reset=True)
     assert (tmp_path / 'precious').exists()
 
@@ -158,7 +158,7 @@ def test_a_map_is_written_by_one_process_at_a_time(path: Path) -> None:
 
 def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     (tmp_path / 'file').touch()
-    with pytest.raises(OSError, match='no map is begun') as caught:
+    with pytest.raises(OSError, match='the map is not created') as caught:
         MapStore.of(tmp_path / 'file' / 'small.zarr', small_study())
     assert caught.value.filename == str(tmp_path / 'file' / 'small.zarr')
 
@@ -169,7 +169,7 @@ def test_a_disk_that_is_full_from_the_beginning_leaves_nothing(
         raise OSError(errno.ENOSPC, 'No space left on device')
 
     monkeypatch.setattr(zarr.DirectoryStore, '_tofile', staticmethod(to_file))
-    with pytest.raises(OSError, match='No space left on device; no map is begun'):
+    with pytest.raises(OSError, match='No space left on device; the map is not created'):
         MapStore.of(path, small_study())
     assert list(path.parent.iterdir()) == []
 

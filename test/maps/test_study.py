@@ -22,8 +22,10 @@ from flex_planner.base.errors import (
 from flex_planner.base.validation import Array
 from flex_planner.maps.axes import AXES, Axis, tiles
 from flex_planner.maps.cell_results import CellCode
-from flex_planner.maps.end_points import close, End
-from flex_planner.maps.study import load_study, Quantity, Study, StudyError
+from flex_planner.maps.end_points import are_close, End
+from flex_planner.maps.quantities import Quantity
+from flex_planner.maps.study import load_study, Study, StudyError
+from flex_planner.maps.study_motion import StudyMotion
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.task import postures_from_points, Task
 from flex_planner.planning.plan_path import plan_path
@@ -59,7 +61,7 @@ MISTAKES: list[tuple[str, object, str]] = [
     ('modes', 9, 'modes is 9, but must be an integer from 0 to 8'),
     ('quantity', 'payload', "quantity is 'payload', but must be one of ['max_payload', "),
     ('quantity', 'min_effort', "mismatch is {'payload_mass': 1.5, "),
-    ('start', REMOVE, 'start or start_angles is None, but must be given, one of them'),
+    ('start', REMOVE, 'start or start_angles is None, but must be given, exactly one of them'),
     ('start', [0.5], 'start is [0.5], but must be a point [x, y] in m'),
     ('start', 'there', "start is 'there', but must be a list of numbers"),
     ('start', [0.5, math.nan], 'start is nan, but must be a finite number'),
@@ -122,8 +124,9 @@ SENSELESS: list[tuple[dict[str, Any], str]] = [
     ({'arm': 'korayem_rigid', 'modes': 1}, 'modes is 1, .* every link of the arm is rigid'),
     ({'arm': 'korayem_hanging', 'quantity': 'min_effort', 'axes': {'motor_scale': [1]}},
      'no motor of the arm has a limit'),
-    ({'arm': 'korayem_hanging'}, 'no payload is the largest'),
-    ({'arm': 'korayem_hanging', 'quantity': 'min_duration'}, 'no duration is the shortest'),
+    ({'arm': 'korayem_hanging'}, 'otherwise there is no largest payload'),
+    ({'arm': 'korayem_hanging', 'quantity': 'min_duration'},
+     'otherwise there is no shortest duration'),
     ({'accuracy': 0.0}, r'accuracy is 0.0, but must be a number >= 1e-06 and <= 1000 kg'),
     ({'gains': {}}, 'gains is {}, but must be left out: only residual_vibration'),
     ({'goal': REMOVE, 'goal_angles': [0.0, 1.0]}, 'axes.goal_y is .* goal_angles gives the goal'),
@@ -152,11 +155,13 @@ def study_of(folder: Path, content: object) -> Study:
     return load_study(path)
 
 
-def over(arm: str, axes: dict[str, list[float]], **fields: Any) -> Study:
+def over(arm: str, axes: dict[str, list[float]], block_shape: tuple[int, ...] = (),
+         **fields: Any) -> Study:
     """Return a study of effort over some axes."""
     ends = {name: End(name=name, point=point) for name, point in
             (('start', (0.5, 0.0)), ('goal', (0.5, 0.5)))}
-    return Study(name='', arm=load_arm(arm), quantity=Quantity.MIN_EFFORT, **{**ends, **fields},
+    return Study(name='', arm=load_arm(arm), quantity=Quantity.MIN_EFFORT,
+                 block_shape=block_shape, motion=StudyMotion(**{**ends, **fields}),
                  axes=tuple(Axis(name=name, values=np.array(values, dtype=np.float64))
                             for name, values in axes.items()))
 
@@ -176,10 +181,11 @@ def test_study_is_read_as_written(tmp_path: Path) -> None:
                                                                ('payload_mass', 'kg')]
     assert study.axes[0].values.tolist() == [-0.5, -0.25, 0.0, 0.25, 0.5]
     assert [link.modes for link in study.arm.links] == [1, 1]
-    assert (study.block_shape, study.cell_time_limit, study.settling) == ((2, 1), 30.0, 2.0)
-    assert study.mismatch.added_friction.tolist() == [0.1, 0.1]
-    assert study.gains is not None
-    assert study.gains.stiffness.tolist() == [100.0, 100.0]
+    assert (study.block_shape, study.cell_time_limit) == ((2, 1), 30.0)
+    assert study.simulated.settling == 2.0
+    assert study.simulated.mismatch.added_friction.tolist() == [0.1, 0.1]
+    assert study.simulated.gains is not None
+    assert study.simulated.gains.stiffness.tolist() == [100.0, 100.0]
     assert math.isnan(study.accuracy)
     assert study.text == (tmp_path / 'study.yaml').read_text()
 
@@ -308,7 +314,7 @@ def test_postures_change_steadily_but_for_the_line_half_a_turn_away() -> None:
             jump = float(np.abs(task.goal_positions - other.goal_positions).max())
             # of 4 cm; most near the folded arm, where a step turns it by a radian or so
             assert jump < 1.6 or abs(jump - 2 * np.pi) < 1.6
-            assert close(task, other) == (jump < np.pi)
+            assert are_close(task, other) == (jump < np.pi)
             cut += [task] if jump > np.pi else []
     turns = [abs(task.goal_positions[0] - task.start_positions[0]) for task in cut]
     assert 0 < len(cut) < 50
@@ -324,8 +330,8 @@ def test_half_turn_is_no_border_inside_a_grid_of_starts(y: float) -> None:
     angles = np.array([task.start_positions[0] for task in found.values()])
     assert angles.min() < -np.pi < angles.max()
     for (i, j), task in found.items():
-        assert close(task, found.get((i + 1, j), task))
-        assert close(task, found.get((i, j + 1), task))
+        assert are_close(task, found.get((i + 1, j), task))
+        assert are_close(task, found.get((i, j + 1), task))
 
 
 def test_angles_may_be_given_instead_of_points(tmp_path: Path) -> None:

@@ -16,27 +16,19 @@ from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import task_parameters
 from flex_planner.optimal_control.torque_limits import TorqueLimits
 from flex_planner.paper.cases import (
-    certified,
     NoPlanError,
     paper_arm,
+    plan_certified,
     point_to_point,
     turn,
     turning_arm,
 )
 from flex_planner.paper.diagrams import joint_panels, runs_on_limit
 from flex_planner.paper.document import document
-from flex_planner.paper.evidence import (
-    Claim,
-    confirmed_if,
-    Curve,
-    Panel,
-    Picture,
-    Section,
-    Table,
-    Verdict,
-)
-from flex_planner.paper.run import computed, STUDIES
+from flex_planner.paper.evidence import Claim, judge, Section, Table, Verdict
+from flex_planner.paper.run import compute_sections, STUDIES
 from flex_planner.paper.sections.slips import PrintedProblem
+from flex_planner.plotting.diagrams import Curve, Panel, Picture
 from flex_planner.plotting.panels import draw_picture
 import numpy as np
 import pytest
@@ -57,8 +49,8 @@ class Run(NamedTuple):
 @pytest.fixture(scope='module')
 def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     folder, reports = tmp_path_factory.mktemp('paper'), []
-    sections = computed(list(STUDIES), reduced=True, processes=2, pictures=folder,
-                        report=lambda *report: reports.append(report))
+    sections = compute_sections(list(STUDIES), reduced=True, processes=2, pictures=folder,
+                                report=lambda *report: reports.append(report))
     return Run(folder, sections, reports)
 
 
@@ -152,8 +144,8 @@ def test_grid_keeps_its_columns_whatever_is_in_a_cell() -> None:
 
 
 def test_verdict_follows_the_number() -> None:
-    assert confirmed_if(holds=True) is Verdict.CONFIRMED
-    assert confirmed_if(holds=False) is Verdict.CORRECTED
+    assert judge(holds=True) is Verdict.CONFIRMED
+    assert judge(holds=False) is Verdict.CORRECTED
     claim = Claim(said='s', found='f', verdict=Verdict.CORRECTED)
     page = document([Section(key='1', title='s', text='', claims=(claim,))], '.', '')
     assert 'Of 1 statements put to the test: 0 confirmed, 1 corrected, 0 not reproducible' in page
@@ -161,12 +153,12 @@ def test_verdict_follows_the_number() -> None:
 
 @pytest.fixture
 def heavy() -> Iterator[PrintedProblem]:
-    plan = certified(point_to_point(paper_arm(math.inf), 5.5))
+    plan = plan_certified(point_to_point(paper_arm(math.inf), 5.5))
     yield PrintedProblem(plan.model, plan.task, task_parameters(plan.task))
 
 
 def test_printed_problem_has_the_jacobian_of_its_rate(heavy: PrintedProblem) -> None:
-    plan = certified(heavy.task)
+    plan = plan_certified(heavy.task)
     assert plan.solution is not None
     t = np.array([0.05, 0.3, 0.7, 0.95])
     z = plan.solution(t)
@@ -181,7 +173,7 @@ def test_printed_problem_has_the_jacobian_of_its_rate(heavy: PrintedProblem) -> 
 
 
 def test_term_that_the_paper_omits_is_there_on_the_limit_only(heavy: PrintedProblem) -> None:
-    plan = certified(heavy.task)
+    plan = plan_certified(heavy.task)
     assert plan.solution is not None
     samples = plan.uniform_samples(201)
     ours = plan.problem.rate(samples.times, plan.solution(samples.times))
@@ -194,7 +186,7 @@ def test_term_that_the_paper_omits_is_there_on_the_limit_only(heavy: PrintedProb
 
 
 def test_runs_on_the_limit_are_those_of_the_samples() -> None:
-    plan = certified(turn(turning_arm()))
+    plan = plan_certified(turn(turning_arm()))
     samples = plan.uniform_samples(2001)
     (first, last), = [runs for runs in [runs_on_limit(samples, 0)] if len(runs) == 2]
     assert first == pytest.approx((0.0, plan.switching_times[0]), abs=1e-3)
@@ -214,7 +206,7 @@ def test_turning_arm_takes_its_inertias_and_motors() -> None:
 
 def test_motion_that_cannot_be_planned_ends_the_run() -> None:
     with pytest.raises(NoPlanError, match=r'rigid, 7 kg: .*5\.85'):
-        certified(point_to_point(paper_arm(math.inf), 7.0))
+        plan_certified(point_to_point(paper_arm(math.inf), 7.0))
 
 
 def test_model_of_the_paper_arm_is_that_of_the_preset(run: Run) -> None:

@@ -253,7 +253,7 @@ def killed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_recording_of_a_killed_process_is_refused_but_recovered(
         killed: Path, types: MessageTypes, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(RecordingError, match='is damaged or no MCAP file'):
+    with pytest.raises(RecordingError, match='is damaged or not an MCAP file'):
         read_metadata(killed)
     assert main(['recover', str(killed)]) == 0
     recovered = killed.with_name('plan')
@@ -267,7 +267,7 @@ def test_recording_of_a_killed_process_is_refused_but_recovered(
     assert read_attachments(recovered) == {'scenario.yaml': b'payload: 1\n'}
     assert dict(read_metadata(recovered).custom_data) == {'recovered_from': killed.name}
     assert main(['recover', str(killed)]) == 1
-    assert 'exists and is not overwritten' in capsys.readouterr().err
+    assert 'exists and is never overwritten' in capsys.readouterr().err
 
 
 def test_complete_part_of_any_truncated_file_is_recovered(tmp_path: Path,
@@ -281,7 +281,7 @@ def test_complete_part_of_any_truncated_file_is_recovered(tmp_path: Path,
         try:
             path = recover_recording(recording.path, types)
         except RecordingError as error:
-            assert 'holds nothing that is complete' in str(error)
+            assert 'holds no complete message or attachment' in str(error)
             counts.append(0)
             continue
         assert path.name == 'plan_recovered'
@@ -295,7 +295,7 @@ def test_complete_part_of_any_truncated_file_is_recovered(tmp_path: Path,
 def test_nothing_is_recovered_where_there_is_nothing(tmp_path: Path, types: MessageTypes,
                                                      content: bytes) -> None:
     (tmp_path / 'a.mcap').write_bytes(content)
-    with pytest.raises(RecordingError, match=r'a\.mcap holds nothing that is complete'):
+    with pytest.raises(RecordingError, match=r'a\.mcap holds no complete message or attachment'):
         recover_recording(tmp_path / 'a.mcap', types)
     with pytest.raises(RecordingError, match='cannot read .*: No such file'):
         recover_recording(tmp_path / 'b.mcap', types)

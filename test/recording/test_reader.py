@@ -70,7 +70,7 @@ def test_file_of_another_kind_is_refused(tmp_path: Path, types: MessageTypes) ->
     with pytest.raises(RecordingError, match='has no summary'):
         read_metadata(tmp_path)
     (tmp_path / 'a.mcap').write_text('no recording')
-    with pytest.raises(RecordingError, match='is damaged or no MCAP file'):
+    with pytest.raises(RecordingError, match='is damaged or not an MCAP file'):
         read_metadata(tmp_path)
 
 

@@ -69,7 +69,7 @@ def test_existing_name_is_not_overwritten(
     if taken == 'link':
         target.symlink_to('nowhere')
     before = sorted(tmp_path.rglob('*'))
-    with pytest.raises(RecordingError, match='exists and is not overwritten'):
+    with pytest.raises(RecordingError, match='exists and is never overwritten'):
         record(tmp_path, types)
     assert sorted(tmp_path.rglob('*')) == before
 
@@ -79,7 +79,7 @@ def test_name_taken_meanwhile_is_not_overwritten(
     tmp_path: Path, types: MessageTypes, content: bool
 ) -> None:
     with (
-        pytest.raises(RecordingError, match='exists and is not overwritten'),
+        pytest.raises(RecordingError, match='exists and is never overwritten'),
         Recording.create(tmp_path, 'plan', types),
     ):
         (tmp_path / 'plan').mkdir()

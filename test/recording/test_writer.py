@@ -184,6 +184,6 @@ def test_depth_and_custom_data_are_checked(tmp_path: Path, types: MessageTypes) 
         QosProfile(depth=0)
     wrong: Any
     for wrong in ({'payload': 3.0}, {3: 'payload'}, {'payload': '\ud800'}):
-        with pytest.raises(InvalidValueError, match=r'custom_data\[.* a string under a string'):
+        with pytest.raises(InvalidValueError, match=r'custom_data\[.* with a string as its key'):
             Recording.create(tmp_path, 'plan', types, custom_data=wrong).__enter__()
     assert list(tmp_path.iterdir()) == []

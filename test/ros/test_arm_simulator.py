@@ -221,7 +221,7 @@ def test_bad_settings_are_refused(ei50_arm: Arm, changes: dict[str, Any], text: 
 
 def test_every_parameter_is_described(ei50_arm: Arm) -> None:
     settings = SimulatorSettings.for_arm(ei50_arm)
-    assert settings.mismatch.applied(ei50_arm).links == ei50_arm.links
+    assert settings.mismatch.apply(ei50_arm).links == ei50_arm.links
     for entry in fields(settings):
         assert entry.metadata['description'].text.endswith('.'), entry.name
 

@@ -1,4 +1,4 @@
-"""SampledPlan states along a published plan: their values, and when they come."""
+"""Reference states along a published plan: their values, and when they come."""
 
 from __future__ import annotations
 
@@ -302,7 +302,7 @@ def test_process_that_died_is_an_error_until_a_plan_starts_it_again(
     planner.wait('recovery', lambda: stream_status(statuses) == (DiagnosticStatus.OK, 'ready'))
 
 
-AGAIN = 'the process that streams ~/reference_states is gone: it is started again'
+AGAIN = 'the process that streams ~/reference_states has ended: starting it again'
 
 
 def streamer_of(monkeypatch: pytest.MonkeyPatch, node: FakeNode,

@@ -121,7 +121,7 @@ def test_command_replays_and_ends_well(recording: Path) -> None:
 
 @pytest.mark.parametrize(('parameters', 'complaint'), [
     ({'path': '/nowhere.mcap'}, 'cannot read /nowhere.mcap: No such file'),
-    ({'path': __file__}, 'is damaged or no MCAP file'),
+    ({'path': __file__}, 'is damaged or not an MCAP file'),
     ({'start': 0.9}, 'start is 0.9, but must be at most the duration of the recording, 0.8 s'),
     ({'rate': 0.0}, 'rate')])
 def test_node_that_cannot_replay_says_why(recording: Path, tmp_path: Path,
@@ -135,7 +135,7 @@ def test_node_that_cannot_replay_says_why(recording: Path, tmp_path: Path,
 
 @pytest.mark.parametrize(('arguments', 'complaint'), [
     (['/nowhere'], 'cannot read /nowhere: No such file or directory'),
-    ([__file__], 'is damaged or no MCAP file'),
+    ([__file__], 'is damaged or not an MCAP file'),
     (['{}', '--rate', '0'], '--rate is 0.0, but must be a number >= 0.001'),
     (['{}', '--start', '5'], '--start is 5.0, but must be a number >= 0 and <= 0.8 s'),
     (['{}', '--delay', 'nan'], '--delay is nan')])

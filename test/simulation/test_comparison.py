@@ -54,25 +54,25 @@ def test_rigid_plan_is_as_wrong_by_another_integrator(compared: Comparison) -> N
     torque = PlannedTorque.of(rigid.problem, rigid.solution)
     start = compared.flexible.problem.start
     state = integrate(model, compared.flexible.problem.parameters.physical, start, torque)[-1]
-    outcome = compared.of(ExecutionMode.RIGID_OPEN)
-    index = np.searchsorted(outcome.execution.times, 1.0 - 1e-9)
-    found = outcome.execution.coordinates[index]
+    result = compared.of(ExecutionMode.RIGID_OPEN)
+    index = np.searchsorted(result.execution.times, 1.0 - 1e-9)
+    found = result.execution.coordinates[index]
     np.testing.assert_allclose(found, state[:6], atol=2e-6)  # of 1e-3: the torque is held
     locked = np.concatenate([state[:8] * [*[1] * 6, 0, 0], state[8:]])
     rest = np.concatenate([state[:2], np.zeros(4)])
     bending = residual_vibration(model, locked, rest, compared.flexible.problem.parameters)
-    assert outcome.bending == pytest.approx(bending, rel=1e-3)
+    assert result.bending == pytest.approx(bending, rel=1e-3)
 
 
 def test_errors_are_those_of_the_recorded_motion(compared: Comparison) -> None:
-    for outcome in compared.outcomes:
-        times, tip = outcome.execution.times, outcome.execution.tip
+    for result in compared.results:
+        times, tip = result.execution.times, result.execution.tip
         assert times[0] == 0
         assert times[-1] == pytest.approx(1.3)
         error = np.hypot(*(tip - [0.5, 0.5]).T)
-        assert outcome.arrival_error == pytest.approx(error[4000], rel=1e-6, abs=1e-12)
-        assert outcome.final_error == pytest.approx(error[times >= 1.27 - 1e-9].max(), abs=1e-12)
-        assert outcome.residual.tip <= 2 * np.abs(tip[4000:] - tip[4000]).max() * np.sqrt(2)
+        assert result.arrival_error == pytest.approx(error[4000], rel=1e-6, abs=1e-12)
+        assert result.final_error == pytest.approx(error[times >= 1.27 - 1e-9].max(), abs=1e-12)
+        assert result.residual.tip <= 2 * np.abs(tip[4000:] - tip[4000]).max() * np.sqrt(2)
 
 
 def test_feedback_does_not_replace_the_feedforward(compared: Comparison) -> None:
@@ -113,7 +113,7 @@ def test_plan_that_fails_leaves_its_ways_out(ei5_arm: Arm, ei5_model: ArmModel,
     late = Monitor(time_limit=0.0)
     found = compare(paper_task(ei5_arm), model=ei5_model, monitor=late)
     assert not found.solved
-    assert found.outcomes == ()
+    assert found.results == ()
     assert found.flexible.status is PlanStatus.TIMEOUT
     assert comparison_table(found) == ''
     assert dict(comparison_rows(found))['planned rigid'].startswith('time limit reached')
@@ -155,7 +155,7 @@ def test_table_says_what_was_compared(compared: Comparison) -> None:
     assert rows['planned flexible'].endswith('iterations)')
     lines = [re.split(' {2,}', line.strip()) for line in comparison_table(compared).splitlines()]
     assert lines[0][0] == 'error on arrival [mm]'
-    assert [line[0] for line in lines[1:]] == [way.value for way in ExecutionMode]
+    assert [line[0] for line in lines[1:]] == [mode.value for mode in ExecutionMode]
     assert [lines[2][1], lines[2][4]] == ['0.912', '1.07']
 
 

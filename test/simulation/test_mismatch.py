@@ -29,7 +29,7 @@ def rod() -> Arm:
 def turned(seconds: float, mismatch: Mismatch | None = None, payload_mass: float = PAYLOAD,
            torque: float = TORQUE, disturbance: Disturbance | None = None) -> Plant:
     """Return the rod after a torque has turned it."""
-    plant = Plant(ArmDynamics((mismatch or Mismatch()).applied(rod())),
+    plant = Plant(ArmDynamics((mismatch or Mismatch()).apply(rod())),
                   Control(gains=Gains.of(1, 0, 0), disturbance=disturbance or Disturbance()),
                   payload_mass=payload_mass, positions=np.zeros(1))
     plant.advance(0.05)  # at rest before it is told to move
@@ -67,7 +67,7 @@ def test_disturbance_is_no_torque_of_the_motor() -> None:
 
 
 def test_sag_and_frequencies_follow_the_stiffness(workshop_arm: Arm) -> None:
-    soft = Mismatch(rigidity_scale=0.81).applied(workshop_arm)
+    soft = Mismatch(rigidity_scale=0.81).apply(workshop_arm)
     posture, found = np.array([-1.3, 0.3]), []
     for arm in (workshop_arm, soft):
         model, parameters = ArmDynamics(arm), Parameters.of(arm, payload_mass=0.3)
@@ -79,17 +79,17 @@ def test_sag_and_frequencies_follow_the_stiffness(workshop_arm: Arm) -> None:
 
 
 def test_more_modes_are_those_of_the_beam(ei5_arm: Arm) -> None:
-    arm = Mismatch(modes=3).applied(ei5_arm)
+    arm = Mismatch(modes=3).apply(ei5_arm)
     model, parameters = ArmDynamics(arm), Parameters.of(arm)
     rates, _ = natural_modes(model, np.zeros(8), parameters, locked=True)
     # (j pi / L)^2 sqrt(E I / rho) of a supported beam, once for each link
     expected = (np.array([1, 1, 2, 2, 3, 3]) * np.pi / 0.5)**2 * np.sqrt(5 / 6)
     np.testing.assert_allclose(rates, expected, rtol=1e-10)
-    assert Mismatch(modes=0).applied(ei5_arm).n_modes == 0
+    assert Mismatch(modes=0).apply(ei5_arm).n_modes == 0
 
 
 def test_nothing_is_changed_by_default(workshop_arm: Arm) -> None:
-    same = Mismatch().applied(workshop_arm)
+    same = Mismatch().apply(workshop_arm)
     assert same.links == workshop_arm.links
     assert same.joints == workshop_arm.joints
 
@@ -97,7 +97,7 @@ def test_nothing_is_changed_by_default(workshop_arm: Arm) -> None:
 def test_rigid_link_stays_rigid(ei5_arm: Arm) -> None:
     stiff = Link(length=0.5, linear_density=6.0)
     arm = replace(ei5_arm, links=(stiff, ei5_arm.links[1]))
-    changed = Mismatch(modes=4, rigidity_scale=0.5).applied(arm)
+    changed = Mismatch(modes=4, rigidity_scale=0.5).apply(arm)
     assert changed.links[0] == stiff
     assert changed.links[1].modes == 4
     assert changed.links[1].flexural_rigidity == 2.5
@@ -113,4 +113,4 @@ def test_rigid_link_stays_rigid(ei5_arm: Arm) -> None:
 def test_bad_mismatch_is_refused(ei5_arm: Arm, values: dict[str, Any],
                                  error: type[Exception], text: str) -> None:
     with pytest.raises(error, match=text):
-        Mismatch(**values).applied(ei5_arm)
+        Mismatch(**values).apply(ei5_arm)

@@ -9,12 +9,14 @@ import time
 
 from flex_planner.arms.arm_files import load_arm
 from flex_planner.base.progress import Monitor
-from flex_planner.maps.axes import Axis
+from flex_planner.maps.axes import Axis, Block
 from flex_planner.maps.block_solver import blocks, solve_block
 from flex_planner.maps.cell_results import CellCode, CellResult
 from flex_planner.maps.end_points import End
-from flex_planner.maps.store import Block, cells, MapStore
-from flex_planner.maps.study import load_study, Quantity, Study
+from flex_planner.maps.quantities import Quantity
+from flex_planner.maps.store import cells, MapStore
+from flex_planner.maps.study import load_study, Study
+from flex_planner.maps.study_motion import StudyMotion
 import numpy as np
 
 SUPPORT = Path(__file__).parent
@@ -39,9 +41,9 @@ def small_study(columns: int = 6, rows: int = 4, text: str = TEXT,
     axes = (Axis(name='goal_x', values=np.linspace(0.3, 0.6, columns)),
             Axis(name='goal_y', values=np.linspace(0.3, 0.5, rows)))
     return Study(name='small', arm=load_arm('korayem_rigid'), quantity=Quantity.MAX_PAYLOAD,
-                 axes=axes, start=End(name='start', point=np.array([0.5, 0.0])),
-                 goal=End(name='goal'), accuracy=0.01, block_shape=block_shape,
-                 text=text)
+                 axes=axes, motion=StudyMotion(start=End(name='start', point=np.array([0.5, 0.0])),
+                                               goal=End(name='goal')),
+                 accuracy=0.01, block_shape=block_shape, text=text)
 
 
 def value_of(index: tuple[int, ...]) -> float:

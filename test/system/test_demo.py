@@ -65,7 +65,7 @@ def test_picture_and_recording_are_in_the_folder(table: dict[str, str], folder: 
 def test_demonstration_waits_for_nodes_with_a_limit(ros: None) -> None:
     client = demo.DemoClient()
     try:
-        with pytest.raises(demo.DemoError, match='planner: nothing within 0.1 s'):
+        with pytest.raises(demo.DemoError, match='no planner within 0.1 s'):
             client.wait('planner', client.create_client(PlanPath, '/absent').service_is_ready, 0.1)
     finally:
         client.destroy_node()

@@ -102,7 +102,7 @@ def begun(notes: Path) -> Counter[str]:
 
 
 def left(store: MapStore) -> list[tuple[slice, ...]]:
-    return [block for block in blocks(small_study()) if not store.complete(block)]
+    return [block for block in blocks(small_study()) if not store.is_complete(block)]
 
 
 def assert_right(store: MapStore, failed: int = 0) -> None:
@@ -277,8 +277,8 @@ def test_command_stops_on_interrupt_and_goes_on_later(tmp_path: Path) -> None:
     assert process.returncode == 130
     done = int((open_map(path).code != 0).sum())
     assert 0 < done < 900
-    assert said.splitlines()[-1] == (f'flex-planner: canceled; {done} of 900 cells are kept in '
-                                     f'{path}, the same command goes on from there')
+    assert said.splitlines()[-1] == (f'flex-planner: canceled: {done} of 900 cells are kept in '
+                                     f'{path}; run the same command to go on')
     assert 'Traceback' not in said
 
 
@@ -294,7 +294,7 @@ def test_command_draws_what_is_there(client: Client, tmp_path: Path,
     assert '3, start or goal cannot be reached' in said
     assert 'minimum effort             0.0326' in said
     assert main(command) == 0
-    assert 'small.zarr: 12 of 12 cells are there already' in capsys.readouterr().out
+    assert 'small.zarr: 12 of 12 cells are computed already' in capsys.readouterr().out
     assert main(['map', str(tmp_path / 'small.zarr'), '--draw']) == 0
     assert all(picture.stat().st_size > 10_000 for picture in (tmp_path / 'small').iterdir())
 
@@ -330,8 +330,8 @@ def test_progress_tells_cells_rate_and_time_left(monkeypatch: pytest.MonkeyPatch
 @pytest.mark.parametrize(('options', 'text'), [
     (['--workers', '0'], '--workers is 0, but must be'),
     (['--workers', '2', '--scheduler', 'tcp://a:1'], '--workers is 2, but must be left out'),
-    (['--output', 'small.yaml/below'], 'Not a directory; no map is begun'),
-    (['--output', 'folder.zarr'], 'folder.zarr is there, but is no map'),
+    (['--output', 'small.yaml/below'], 'Not a directory; the map is not created'),
+    (['--output', 'folder.zarr'], 'folder.zarr exists, but is not a map'),
     (['--draw'], 'there is no map')])
 def test_command_that_cannot_be_carried_out_says_why(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],

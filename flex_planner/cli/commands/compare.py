@@ -1,4 +1,4 @@
-"""The command that carries out a task planned in several ways."""
+"""The command that plans a task with flexible and with rigid links, and compares."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import sys
 from flex_planner.base.progress import Monitor
 from flex_planner.cli.options import Commands, numbers
 from flex_planner.cli.outputs import check_folder
-from flex_planner.cli.progress_line import watched
-from flex_planner.cli.request import add_task, named_as_options, Request
+from flex_planner.cli.progress_line import run_with_progress
+from flex_planner.cli.request import add_task, Request, translate_errors
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.reports.comparison import comparison_rows, comparison_table
 from flex_planner.reports.motion import table
@@ -25,7 +25,7 @@ _STIFFNESS, _DAMPING = 100.0, 10.0
 def add_command(commands: Commands) -> None:
     """Add ``flex-planner compare``."""
     parser = commands.add_parser(
-        'compare', help='show what planning for flexible links is worth',
+        'compare', help='compare planning with flexible and with rigid links',
         description='Plan a motion with flexible and with rigid links, and carry out both on a '
         'simulated flexible arm, with and without a joint controller.')
     add_task(parser, payload='mass at the tip (default: 0)')
@@ -33,18 +33,19 @@ def add_command(commands: Commands) -> None:
     add('--plant-payload', type=float, metavar='KG', help='mass at the tip of the simulated arm '
         '(default: that of the task)')
     add('--plant-modes', type=int, default=-1, metavar='N',
-        help='modes of each of its links (default: as planned)')
+        help='modes of each link of the simulated arm (default: as planned)')
     add('--rigidity-scale', type=float, default=1.0, metavar='FACTOR',
-        help='of its links (default: 1)')
-    add('--added-friction', metavar='D,D,...', help='of its joints [N m s/rad] (default: none)')
+        help='factor on the rigidity of its links (default: 1)')
+    add('--added-friction', metavar='D,D,...',
+        help='viscous friction added to its joints [N m s/rad] (default: none)')
     add('--stiffness', type=float, default=_STIFFNESS, metavar='P',
-        help='of the joint controller [N m/rad] (default: %(default)g)')
+        help='proportional gain of the joint controller [N m/rad] (default: %(default)g)')
     add('--damping', type=float, default=_DAMPING, metavar='D',
-        help='of the joint controller [N m s/rad] (default: %(default)g)')
+        help='derivative gain of the joint controller [N m s/rad] (default: %(default)g)')
     add('--rate', type=float, default=1000.0, metavar='HZ',
-        help='of the joint controller (default: %(default)g)')
+        help='rate of the joint controller (default: %(default)g)')
     add('--settling', type=float, default=1.0, metavar='S',
-        help='how long to watch the arm after its arrival (default: %(default)g)')
+        help='time to watch the arm after its arrival (default: %(default)g)')
     add('--output', type=Path, default=Path('output'), metavar='DIR',
         help='folder for the picture (default: output)')
     add('--no-plot', action='store_true', help='draw nothing')
@@ -52,24 +53,24 @@ def add_command(commands: Commands) -> None:
 
 
 def _compare(options: argparse.Namespace) -> int:
-    """Compare the ways, tell of them and draw them."""
+    """Compare the modes of execution; print and draw the results."""
     request = Request.of(options)
     if not options.no_plot:
         check_folder(options.output)
 
     def work(model: ArmModel, monitor: Monitor) -> Comparison:
-        with named_as_options():
+        with translate_errors():
             return compare(
                 request.task, model=model, monitor=monitor, mismatch=_mismatch(options),
                 payload_mass=options.plant_payload, rate=options.rate,
                 settling=options.settling,
                 gains=Gains.of(request.task.arm.n_joints, options.stiffness, options.damping))
 
-    found = watched(request.task.arm, request.time_limit, work)
+    found = run_with_progress(request.task.arm, request.time_limit, work)
     print(table([('motion', f'{request} with {request.task.payload_mass:g} kg'),
                  *comparison_rows(found)]))
     print(f'\n{comparison_table(found)}\n')
-    if not options.no_plot and found.outcomes:
+    if not options.no_plot and found.results:
         from flex_planner.plotting import draw_comparison
 
         path = options.output / f'{Path(options.arm).stem}_comparison.png'
@@ -82,7 +83,7 @@ def _compare(options: argparse.Namespace) -> int:
 
 
 def _mismatch(options: argparse.Namespace) -> Mismatch:
-    """Return how the simulated arm differs."""
+    """Return the differences of the simulated arm."""
     given = options.added_friction
     friction = np.zeros(0) if given is None else numbers('--added-friction', given, finite=False)
     return Mismatch(modes=options.plant_modes, rigidity_scale=options.rigidity_scale,

@@ -29,16 +29,16 @@ def add_command(commands: Commands) -> None:
     parser = commands.add_parser(
         'map', help='compute a quantity over a grid of motions',
         description='Compute the maximum payload, or another quantity, for every cell of a grid, '
-        'and draw it. What is there already is not computed again.')
+        'and draw it. Cells that are computed already are kept.')
     add = parser.add_argument
     add('study', type=Path, metavar='STUDY', help='study file; with --draw also a store')
     add('--output', type=Path, default=Path('output/maps'), metavar='PATH',
         help='folder for store and pictures, or a store that ends in .zarr (default: %(default)s)')
-    add('--workers', type=int, metavar='N', help='processes (default: one a processor)')
+    add('--workers', type=int, metavar='N', help='worker processes (default: one per processor)')
     add('--scheduler', default='', metavar='ADDRESS',
         help='compute on the Dask cluster with this scheduler, such as tcp://host:8786')
-    add('--draw', action='store_true', help='compute nothing, draw what is there')
-    add('--reset', action='store_true', help='remove the map that is there, and start anew')
+    add('--draw', action='store_true', help='draw the stored cells, compute nothing')
+    add('--reset', action='store_true', help='remove the existing map, and start anew')
     add('--no-plot', action='store_true', help='draw nothing')
     parser.set_defaults(run=_map)
 
@@ -46,7 +46,7 @@ def add_command(commands: Commands) -> None:
 def _map(options: argparse.Namespace) -> int:
     """Compute and draw a map, or say what is missing to do so."""
     try:
-        return _drawn(_place(options)) if options.draw else _computed(options)
+        return _draw(_place(options)) if options.draw else _compute(options)
     except ImportError as error:
         if (error.name or '').split('.')[0] not in _NEEDED:
             raise
@@ -63,7 +63,7 @@ def _place(options: argparse.Namespace) -> Path:
     return Path(output if output.suffix == _SUFFIX else output / f'{study.stem}{_SUFFIX}')
 
 
-def _drawn(path: Path) -> int:
+def _draw(path: Path) -> int:
     """Draw a map in a folder beside its store."""
     from flex_planner.maps.draw_map import draw_map
 
@@ -71,8 +71,8 @@ def _drawn(path: Path) -> int:
     return 0
 
 
-def _computed(options: argparse.Namespace) -> int:
-    """Compute what is not there, say what came of it and draw it."""
+def _compute(options: argparse.Namespace) -> int:
+    """Compute the missing cells, print a summary and draw the map."""
     from flex_planner.maps.store import MapStore
     from flex_planner.maps.study import load_study
 
@@ -82,7 +82,7 @@ def _computed(options: argparse.Namespace) -> int:
         tally = _run(options, study, store)
         print(table([*outcome_rows(tally, store.dataset()), ('store', str(path))]))
     if not options.no_plot:
-        _drawn(path)
+        _draw(path)
     failed = tally.of(CellCode.FAILED)
     if failed:
         print(f'flex-planner: {failed} cells failed by an error of the program; the variable '
@@ -91,7 +91,7 @@ def _computed(options: argparse.Namespace) -> int:
 
 
 def _check(options: argparse.Namespace) -> None:
-    """Refuse options that make no sense."""
+    """Refuse options that contradict each other."""
     if options.workers is not None:
         integer('--workers', options.workers, at_least=1, at_most=1024)
         if options.scheduler:
@@ -100,13 +100,13 @@ def _check(options: argparse.Namespace) -> None:
 
 
 def _run(options: argparse.Namespace, study: Study, store: MapStore) -> Tally:
-    """Compute what is left, showing it; CanceledError after Ctrl-C."""
+    """Compute the missing cells, showing progress; CanceledError after Ctrl-C."""
     from flex_planner.maps.run_map import run_map
 
     done = int((store.codes != CellCode.PENDING).sum())
     display = MapDisplay(sys.stderr)
     if done:
-        print(f'{store.path}: {done} of {store.codes.size} cells are there already')
+        print(f'{store.path}: {done} of {store.codes.size} cells are computed already')
     try:
         with interruptible() as canceled:
             tally = run_map(study, store, workers=options.workers or 0,
@@ -116,6 +116,6 @@ def _run(options: argparse.Namespace, study: Study, store: MapStore) -> Tally:
         display.close()
     if canceled() and tally.done < tally.cells:
         again = ' without --reset' if options.reset else ''
-        raise CanceledError(f'canceled; {tally.done} of {tally.cells} cells are kept in '
-                            f'{store.path}, the same command{again} goes on from there')
+        raise CanceledError(f'canceled: {tally.done} of {tally.cells} cells are kept in '
+                            f'{store.path}; run the same command{again} to go on')
     return tally

@@ -28,17 +28,17 @@ def add_command(commands: Commands) -> None:
         help=f'folder for {_PAGE} and {_PICTURES} (default: %(default)s)')
     add('--section', action='append', metavar='N.N', help='compute this section only; may be '
         'repeated')
-    add('--reduced', action='store_true', help='leave out what takes long')
+    add('--reduced', action='store_true', help='leave out the parts that take long')
     add('--processes', type=int, default=os.cpu_count() or 1, metavar='N',
-        help='how many at a time (default: one a processor, %(default)s)')
+        help='sections computed at a time (default: one per processor, %(default)s)')
     add('--no-plot', action='store_true', help='draw nothing')
     parser.set_defaults(run=_paper)
 
 
 def _paper(options: argparse.Namespace) -> int:
-    """Compute, write, and say what came of it."""
+    """Compute the sections, write the page, print a summary."""
     from flex_planner.paper.document import document, summary
-    from flex_planner.paper.run import computed, STUDIES
+    from flex_planner.paper.run import compute_sections, STUDIES
 
     processes = integer('--processes', options.processes, at_least=1, at_most=256)
     keys = options.section or list(STUDIES)
@@ -53,7 +53,7 @@ def _paper(options: argparse.Namespace) -> int:
     page, pictures = options.output / _PAGE, options.output / _PICTURES
     try:
         with interruptible() as canceled:
-            sections = list(computed(
+            sections = list(compute_sections(
                 keys, reduced=options.reduced, processes=processes, canceled=canceled,
                 pictures=None if options.no_plot else pictures,
                 report=lambda key, done, count: display.begin(

@@ -11,8 +11,8 @@ from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.capacity.results import MaxPayload, PayloadMethod
 from flex_planner.cli.options import Commands
 from flex_planner.cli.outputs import add_outputs, Outputs
-from flex_planner.cli.progress_line import watched
-from flex_planner.cli.request import add_objectives, add_task, named_as_options, Request
+from flex_planner.cli.progress_line import run_with_progress
+from flex_planner.cli.request import add_objectives, add_task, Request, translate_errors
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.planning.plan import Peaks, peaks, Plan, PlanStatus
 from flex_planner.planning.plan_path import plan_path
@@ -32,7 +32,7 @@ _STEP = 1.0
 def add_commands(commands: Commands) -> None:
     """Add ``flex-planner plan`` and ``flex-planner payload``."""
     plan = commands.add_parser(
-        'plan', help='plan a motion', description='Plan the motion that costs least.')
+        'plan', help='plan a motion', description='Plan the motion of least cost.')
     add_task(plan, payload='mass at the tip (default: 0)')
     add_objectives(plan)
     add_outputs(plan)
@@ -40,7 +40,7 @@ def add_commands(commands: Commands) -> None:
     payload = commands.add_parser(
         'payload', help='find the largest payload',
         description='Find the largest payload that the arm can carry, and plan the motion.')
-    add_task(payload, payload='least payload that is of interest (default: 0)')
+    add_task(payload, payload='smallest payload of interest (default: 0)')
     _add_search(payload)
     add_outputs(payload)
     payload.set_defaults(run=_payload)
@@ -49,16 +49,17 @@ def add_commands(commands: Commands) -> None:
 def _add_search(parser: argparse.ArgumentParser) -> None:
     """Add the options of the search."""
     parser.add_argument('--method', choices=[method.name.lower() for method in PayloadMethod],
-                        default='direct', help='with the payload as an unknown (default), or '
-                        'raised step by step as in the paper, which takes longer')
+                        default='direct', help='direct: the payload is an unknown (default); '
+                        'incremental: it is raised step by step as in the paper, which takes '
+                        'longer')
     parser.add_argument('--accuracy', type=float, default=1e-3, metavar='KG',
-                        help='of the largest payload (default: 0.001)')
+                        help='accuracy of the largest payload (default: 0.001)')
     parser.add_argument('--step', type=float, metavar='KG',
                         help='first step of the incremental method (default: 1)')
 
 
 def _plan(options: argparse.Namespace) -> int:
-    """Plan a motion; tell of it, draw it and record it."""
+    """Plan a motion; print, draw and record it."""
     request = Request.of(options)
     outputs = Outputs.of(options, request)
 
@@ -66,8 +67,8 @@ def _plan(options: argparse.Namespace) -> int:
         return plan_path(request.task, model=model, monitor=monitor,
                          objectives=request.objectives)
 
-    plan = watched(request.task.arm, request.time_limit, work)
-    reference, most = _sampled(request, plan)
+    plan = run_with_progress(request.task.arm, request.time_limit, work)
+    reference, most = _sample(request, plan)
     _tell(request, f'with {request.task.payload_mass:g} kg', plan_rows(plan, most))
     if text := weights_table(plan):
         print(f'\n{text}\n')
@@ -76,20 +77,20 @@ def _plan(options: argparse.Namespace) -> int:
 
 
 def _payload(options: argparse.Namespace) -> int:
-    """Find the largest payload; tell of it and of its motion, draw and record both."""
+    """Find the largest payload and its motion; print, draw and record both."""
     request = Request.of(options)
     outputs = Outputs.of(options, request)
     accuracy = options.accuracy
     step = max(_STEP, accuracy) if options.step is None else options.step
 
     def work(model: ArmModel, monitor: Monitor) -> MaxPayload:
-        with named_as_options():
+        with translate_errors():
             return find_max_payload(
                 request.task, model=model, monitor=monitor, accuracy=accuracy, step=step,
                 method=PayloadMethod[options.method.upper()])
 
-    found = watched(request.task.arm, request.time_limit, work)
-    reference, most = _sampled(request, found.plan)
+    found = run_with_progress(request.task.arm, request.time_limit, work)
+    reference, most = _sample(request, found.plan)
     _tell(request, '', payload_rows(found, most))
     if text := search_table(found):
         print(f'\n{text}\n')
@@ -97,7 +98,7 @@ def _payload(options: argparse.Namespace) -> int:
     return _exit_code(request, found)
 
 
-def _sampled(request: Request, plan: Plan | None) -> tuple[SampledPlan | None, Peaks | None]:
+def _sample(request: Request, plan: Plan | None) -> tuple[SampledPlan | None, Peaks | None]:
     """Return samples of a plan and its peaks, if it has a solution."""
     if plan is None or plan.solution is None:
         return None, None
@@ -106,19 +107,19 @@ def _sampled(request: Request, plan: Plan | None) -> tuple[SampledPlan | None, P
 
 
 def _tell(request: Request, payload: str, rows: list[Row]) -> None:
-    """Print what was asked and what came of it."""
+    """Print the request and its result."""
     print(table([('arm', request.task.arm.name), ('motion', f'{request} {payload}'.rstrip()),
                  *rows]), flush=True)
 
 
 def _tell_files(files: Iterator[Row]) -> None:
-    """Write the files, and print each when it is there."""
+    """Write the files, and print the name of each as it is written."""
     for row in files:
         print(table([row]), flush=True)
 
 
 def _exit_code(request: Request, outcome: Plan | MaxPayload) -> int:
-    """Return the exit code of an outcome; say why if it is a failure."""
+    """Return the exit code of a result; print the reason of a failure."""
     if outcome.solved:
         return 0
     reasons = [outcome.status.value, outcome.message]

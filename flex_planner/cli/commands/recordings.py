@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
 import sys
 
@@ -10,7 +11,7 @@ from flex_planner.base.errors import RecordingError
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import number
 from flex_planner.cli.options import Commands
-from flex_planner.cli.progress_line import watched
+from flex_planner.cli.progress_line import run_with_progress
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.recording import (
     definition_folder,
@@ -38,50 +39,49 @@ def add_commands(commands: Commands) -> None:
 
 
 def _add_replay(commands: Commands) -> None:
-    parser = commands.add_parser(
-        'replay', help='publish a recording again (needs ROS 2)',
-        description='Publish a recording on its topics, at its times and with its quality of '
-        'service, then end; Ctrl-C ends it earlier.')
-    _add_recording(parser)
+    parser = _add_command(
+        commands, 'replay', _replay, 'publish a recording again (needs ROS 2)',
+        'Publish a recording on its topics, at its times and with its quality of service, then '
+        'end; Ctrl-C ends it earlier.')
     parser.add_argument('--rate', type=float, default=1.0, metavar='FACTOR',
                         help='speed of the playback, 2 is twice as fast (default: 1)')
     parser.add_argument('--start', type=float, default=0.0, metavar='S',
-                        help='what to leave out at the beginning (default: 0); what latched '
-                        'topics hold by then is sent all the same')
+                        help='time to leave out at the beginning (default: 0); latched messages '
+                        'from before it are sent all the same')
     parser.add_argument('--delay', type=float, default=1.0, metavar='S',
                         help='time before the first message, in which subscribers find the '
                         'publishers (default: 1)')
     parser.add_argument('--loop', action='store_true', help='begin again at the end')
-    parser.set_defaults(run=_replay)
 
 
 def _add_report(commands: Commands) -> None:
-    parser = commands.add_parser(
-        'report', help='make an HTML page of a recorded plan, check it against the model',
-        description='Make one HTML file of a recorded request: task, outcome, certificate, and '
-        'plots to zoom into. It needs neither ROS nor a network.')
-    _add_recording(parser)
+    parser = _add_command(
+        commands, 'report', _report,
+        'make an HTML page of a recorded plan, check it against the model',
+        'Make one HTML file of a recorded request: task, outcome, certificate, and plots to zoom '
+        'into. It needs neither ROS nor a network.')
     parser.add_argument('--output', type=Path, metavar='HTML',
                         help='the file (default: <recording>.html)')
     parser.add_argument('--check', action='store_true',
                         help='apply the recorded torques to the recorded arm, compare with the '
                         'recorded plan, and fail where they differ')
-    parser.set_defaults(run=_report)
 
 
 def _add_recover(commands: Commands) -> None:
-    parser = commands.add_parser(
-        'recover', help='save what is complete of a recording that broke off',
-        description='Make a recording of what is complete of one whose writer was killed (the '
-        'hidden folder .<name>.<hex>) or that is damaged. The original stays as it is.')
-    _add_recording(parser)
-    parser.set_defaults(run=_recover)
+    _add_command(
+        commands, 'recover', _recover, 'save the complete part of a recording that broke off',
+        'Make a recording of the complete part of one that is damaged, or whose writer was killed '
+        '(the hidden folder .<name>.<hex>). The original stays as it is.')
 
 
-def _add_recording(parser: argparse.ArgumentParser) -> None:
-    """Add the recording that a command is about."""
+def _add_command(commands: Commands, name: str, run: Callable[[argparse.Namespace], int],
+                 summary: str, description: str) -> argparse.ArgumentParser:
+    """Add a command that is about one recording."""
+    parser = commands.add_parser(name, help=summary, description=description)
     parser.add_argument('recording', type=Path, metavar='RECORDING',
                         help='folder of a recording, or its .mcap file')
+    parser.set_defaults(run=run)
+    return parser
 
 
 def _replay(options: argparse.Namespace) -> int:
@@ -93,7 +93,7 @@ def _replay(options: argparse.Namespace) -> int:
     try:
         from flex_planner.ros.replay import replay, ReplaySettings
     except ImportError as error:
-        print(f'flex-planner: a replay takes ROS 2: {error}', file=sys.stderr)
+        print(f'flex-planner: a replay needs ROS 2: {error}', file=sys.stderr)
         return 1
     replay(ReplaySettings(recording=str(options.recording), rate=rate, start=start, delay=delay,
                           loop=options.loop), [])
@@ -103,7 +103,7 @@ def _replay(options: argparse.Namespace) -> int:
 def _report(options: argparse.Namespace) -> int:
     """Make a page of a recording; check its plan if that is wanted."""
     request = RecordedRequest.read(options.recording)
-    check = _checked(request) if options.check else None
+    check = _check(request) if options.check else None
     output = options.output or Path(
         f'{options.recording.resolve().name.removesuffix(".mcap")}.html')
     write_report(output, request, check)
@@ -113,20 +113,20 @@ def _report(options: argparse.Namespace) -> int:
     return 0 if check is None or check.passed else 1
 
 
-def _checked(request: RecordedRequest) -> MotionCheck:
+def _check(request: RecordedRequest) -> MotionCheck:
     """Check the motion of a recording."""
     if request.motion is None:
-        raise RecordingError(f'{request.path} holds no motion to check: '
+        raise RecordingError(f'{request.path} has no motion to check: '
                              f'{request.report.error_msg or "the request failed"}')
 
     def work(model: ArmModel, monitor: Monitor) -> MotionCheck:
         return check_motion(request, model, monitor)
 
-    return watched(request.arm, _MOST_SECONDS, work)
+    return run_with_progress(request.arm, _MOST_SECONDS, work)
 
 
 def _recover(options: argparse.Namespace) -> int:
-    """Save what is complete of a recording."""
+    """Save the complete part of a recording."""
     types = MessageTypes.load([definition_folder('flex_planner_interfaces')])
     path = recover_recording(options.recording, types)
     print(table([('recovered', f'{read_metadata(path).message_count} messages'),

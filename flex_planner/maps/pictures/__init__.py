@@ -1,1 +1,1 @@
-"""."""
+"""The pictures of a map: what they need of its store, and their parts."""

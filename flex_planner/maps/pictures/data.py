@@ -38,7 +38,7 @@ class MapAxis:
 
     @property
     def label(self) -> str:
-        """Return what it is, with its unit."""
+        """Return the title with the unit."""
         return f'{self.title} [{self.unit}]' if self.unit else self.title
 
     def at(self, *places: int) -> str:
@@ -96,7 +96,7 @@ class MapData:
 
     @property
     def progress(self) -> str:
-        """Return how far it is if it is not finished, otherwise nothing."""
+        """Return the progress of a map that is not finished, otherwise an empty text."""
         done, total = int((self.codes != CellCode.PENDING).sum()), self.codes.size
         if done == total:
             return ''
@@ -114,7 +114,7 @@ class MapData:
         found = {axis.name: place for place, axis in enumerate(self.axes)}
         return tuple(found[name] for name in names if name in found)
 
-    def varied(self) -> list[int]:
+    def varied_axes(self) -> list[int]:
         """Return the numbers of the axes with more than one value."""
         return [place for place, axis in enumerate(self.axes) if axis.values.size > 1]
 
@@ -178,7 +178,7 @@ def _axis(dataset: xr.Dataset, name: str) -> MapAxis:
 
 
 def _kinds(code: xr.DataArray) -> dict[int, str]:
-    """Return what the codes mean."""
+    """Return the meanings of the codes."""
     own = {int(kind): kind.name.lower() for kind in CellCode}
     names = str(code.attrs.get('flag_meanings', '')).split()
     stored = dict(zip(np.atleast_1d(code.attrs.get('flag_values', [])).tolist(), names,

@@ -60,7 +60,7 @@ def scale(values: Array) -> Normalize:
 
 
 def edges(values: Array) -> Array:
-    """Return where cells begin and end, half-way between their values."""
+    """Return the borders of cells, half-way between their values."""
     if values.size == 1:
         half = 0.5 * (abs(float(values[0])) or 1.0)
         lone: Array = values[0] + np.array([-half, half])
@@ -117,11 +117,11 @@ def draw_contours(axes: Axes, x: MapAxis, y: MapAxis, values: Array, norm: Norma
 
 
 def _label_places(lines: list[Array], size: Array, arm: list[Array]) -> list[Array]:
-    """Return a point of each line that is long enough, away from the arm and one another."""
-    taken = np.concatenate([np.full((1, 2), np.inf), *(_dense(part) / size for part in arm)])
+    """Return a point on each line that is long enough, away from the arm and one another."""
+    taken = np.concatenate([np.full((1, 2), np.inf), *(_densify(part) / size for part in arm)])
     places: list[Array] = []
     for line in lines:
-        points = _dense(line) / size
+        points = _densify(line) / size
         if np.linalg.norm(np.diff(points, axis=0), axis=1).sum() < _LONG:
             continue
         # a label at an end would be cut off
@@ -134,7 +134,7 @@ def _label_places(lines: list[Array], size: Array, arm: list[Array]) -> list[Arr
     return places
 
 
-def _dense(line: Array) -> Array:
+def _densify(line: Array) -> Array:
     """Return more points along a line."""
     shares = np.linspace(0, 1, _BETWEEN, endpoint=False, dtype=np.float64)[:, None]
     between = [a + shares * (b - a) for a, b in zip(line[:-1], line[1:], strict=True)]
@@ -142,7 +142,7 @@ def _dense(line: Array) -> Array:
 
 
 def locator(norm: Normalize) -> Locator:
-    """Return where a scale has its ticks."""
+    """Return the locator of a scale's ticks."""
     if isinstance(norm, LogNorm):
         return LogLocator(subs=(1, 2, 5), numticks=_MANY)
     return MaxNLocator(_LEVELS)
@@ -161,8 +161,8 @@ def _plain(value: float, place: float = 0) -> str:
     return f'{value:.4g}'
 
 
-def kinds_shown(codes: NDArray[np.int8], names: Mapping[int, str],
-                marked: bool = False) -> list[Artist]:
+def legend_entries(codes: NDArray[np.int8], names: Mapping[int, str],
+                   marked: bool = False) -> list[Artist]:
     """Return entries of a legend for what was not solved, as areas or as marks, with counts."""
     counts = Counter(codes.ravel().tolist())
     entries: list[Artist] = []
@@ -176,7 +176,7 @@ def kinds_shown(codes: NDArray[np.int8], names: Mapping[int, str],
     return entries
 
 
-def arranged(count: int) -> tuple[int, int]:
+def grid_shape(count: int) -> tuple[int, int]:
     """Return the number of columns and rows of so many diagrams."""
     columns = 2 if count == 4 else min(count, 3)
     return columns, -(-count // columns)

@@ -20,6 +20,7 @@ from flex_planner.maps.pictures.data import MapAxis, MapData
 from flex_planner.maps.pictures.panels import edges
 from flex_planner.maps.quantities import Quantity
 from flex_planner.maps.study import Study
+from flex_planner.maps.study_motion import StudyMotion
 from flex_planner.optimal_control.task import Task
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -62,7 +63,7 @@ class Scene:
     best: Array | None
     given_name: str
 
-    def drawn(self, posture: Array) -> Array:
+    def joint_points(self, posture: Array) -> Array:
         """Return the ends of the unbent links in a posture, shape (n + 1, 2) [m]."""
         bent = np.concatenate([posture, np.zeros(self.arm.n_modes)])
         points = link_points(self.arm, bent)
@@ -71,7 +72,7 @@ class Scene:
     @property
     def lines(self) -> list[Array]:
         """Return the arm in all postures that are drawn."""
-        return [self.drawn(posture) for posture in (self.given, self.best)
+        return [self.joint_points(posture) for posture in (self.given, self.best)
                 if posture is not None]
 
 
@@ -90,12 +91,13 @@ def study_of(dataset: xr.Dataset) -> Study | None:
             arm=_arm(yaml.safe_load(dataset.attrs['arm'])),
             axes=tuple(Axis(name=str(name), values=dataset[name].values)
                        for name in dataset['code'].dims),
-            start=_end('start', content), goal=_end('goal', content),
-            elbow=content.get('elbow', -1), payload_mass=_PAYLOAD,
+            motion=StudyMotion(start=_end('start', content), goal=_end('goal', content),
+                               elbow=content.get('elbow', -1), payload_mass=_PAYLOAD),
             accuracy=_ACCURACY if quantity.is_searched else math.nan)
     except (FlexPlannerError, KeyError, TypeError, ValueError, AttributeError,
             yaml.YAMLError) as error:
-        _log.warning('the arm of this map is not drawn, its study is not understood: %s', error)
+        _log.warning('the arm is not drawn, because the study of the map cannot be read: %s',
+                     error)
         return None
 
 
@@ -108,7 +110,7 @@ def _arm(fields: dict[str, Any]) -> Arm:
 
 
 def _end(name: str, content: Mapping[str, Any]) -> End:
-    """Return where all motions of a study start or end."""
+    """Return the common start or goal of the motions of a study."""
     angles = np.array(content.get(f'{name}_angles', []), dtype=float)
     point = np.array(content.get(name, [np.nan, np.nan]), dtype=float)
     return End(name=name, point=point, angles=angles)
@@ -174,7 +176,8 @@ def frame(axes: Axes, x: MapAxis, y: MapAxis, scene: Scene | None) -> None:
 def _posture(axes: Axes, scene: Scene, posture: Array, marker: str, label: str,
              alpha: float) -> Artist:
     """Draw the arm in a posture, its tip marked; return an entry of a legend."""
-    points, halo = scene.drawn(posture), [withStroke(linewidth=6, foreground='white', alpha=alpha)]
+    points = scene.joint_points(posture)
+    halo = [withStroke(linewidth=6, foreground='white', alpha=alpha)]
     color = (*to_rgb(_ARM), alpha)
     axes.plot(*points.T, color=color, linewidth=3, path_effects=halo, zorder=4,
               solid_joinstyle='round')

@@ -6,9 +6,9 @@ from flex_planner.base.validation import Array
 from flex_planner.maps.cell_results import CellCode
 from flex_planner.maps.pictures.data import combinations, MapAxis, MapData, spread
 from flex_planner.maps.pictures.panels import (
-    arranged,
     finish_map,
-    kinds_shown,
+    grid_shape,
+    legend_entries,
     MARKERS,
     MOST_PANELS,
     scale,
@@ -37,8 +37,8 @@ def draw_slices(data: MapData, x: int, lines: list[dict[int, int]], labels: list
     panels, more = combinations(data, others, MOST_PANELS)
     cuts = [[data.cut([x], {**fixed, **line}) for line in lines] for fixed in panels]
     codes = np.array([[codes for _, codes in cut] for cut in cuts])
-    failed = _failed(codes).any(axis=(0, 2))
-    figure, pairs = _paired(len(panels), int(failed.sum()))
+    failed = _is_failure(codes).any(axis=(0, 2))
+    figure, pairs = _create_diagrams(len(panels), int(failed.sum()))
     colors = _colors(len(lines))
     norm = scale(np.array([[values for values, _ in cut] for cut in cuts]))
     for (axes, below), fixed, cut in zip(pairs, panels, cuts, strict=True):
@@ -54,13 +54,13 @@ def draw_slices(data: MapData, x: int, lines: list[dict[int, int]], labels: list
     if len(lines) > 1:
         figure.legend(*pairs[0][0].get_legend_handles_labels(), loc='outside right center',
                       fontsize='small')
-    finish_map(figure, data, omitted + more, kinds_shown(codes, data.kinds, marked=True))
+    finish_map(figure, data, omitted + more, legend_entries(codes, data.kinds, marked=True))
     return figure
 
 
-def _paired(count: int, failed: int) -> tuple[Figure, list[tuple[Axes, Axes | None]]]:
+def _create_diagrams(count: int, failed: int) -> tuple[Figure, list[tuple[Axes, Axes | None]]]:
     """Return a figure with diagrams in rows, each with a strip for so many failed lines."""
-    (columns, rows), strip = arranged(count), 0.1 + 0.14 * failed
+    (columns, rows), strip = grid_shape(count), 0.1 + 0.14 * failed
     heights = [_HIGH, strip] if failed else [_HIGH]
     figure = Figure(figsize=(_WIDE * columns + 1.8, (sum(heights) + 0.5) * rows + 0.8),
                     layout='constrained')
@@ -92,14 +92,15 @@ def _label(axes: Axes, below: Axes | None, data: MapData, x: int, norm: Normaliz
     lowest.set_xlabel(data.axes[x].label)
 
 
-def along(data: MapData, place: list[int]) -> tuple[list[dict[int, int]], list[str], list[str]]:
+def lines_along(data: MapData, place: list[int]
+                ) -> tuple[list[dict[int, int]], list[str], list[str]]:
     """Return a line for each value of an axis, its label, and what was left out."""
     lines, omitted = combinations(data, place, _MOST_LINES)
     return lines, [data.at(line) for line in lines], omitted
 
 
-def through_points(data: MapData, plane: tuple[int, int]
-                   ) -> tuple[list[dict[int, int]], list[str], list[str]]:
+def lines_through_points(data: MapData, plane: tuple[int, int]
+                         ) -> tuple[list[dict[int, int]], list[str], list[str]]:
     """Return a line for some points of the workspace, from the best to the worst."""
     values = np.moveaxis(data.values, plane, (0, 1))
     values = values.reshape(*values.shape[:2], -1)
@@ -123,8 +124,8 @@ def _colors(count: int) -> list[str]:
     return [to_hex(shade) for shade in shades]
 
 
-def _failed(codes: NDArray[np.int8]) -> NDArray[np.bool_]:
-    """Return which cells are to be marked."""
+def _is_failure(codes: NDArray[np.int8]) -> NDArray[np.bool_]:
+    """Return the mask of cells that failed."""
     return ~np.isin(codes, (CellCode.PENDING, CellCode.SOLVED))
 
 
@@ -134,7 +135,7 @@ def _draw_line(axes: Axes, x: MapAxis, values: Array, color: str, label: str) ->
 
 
 def _draw_failures(axes: Axes, x: MapAxis, lines: list[tuple[NDArray[np.int8], str]]) -> None:
-    """Mark what was not solved, a row a line from above, below a diagram with the same x axis."""
+    """Mark failed cells below a diagram with the same x axis, one row per line, from above."""
     for row, (codes, color) in enumerate(lines):
         for kind, marker in MARKERS.items():
             places = x.values[codes == kind]

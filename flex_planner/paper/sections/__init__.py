@@ -1,1 +1,1 @@
-"""."""
+"""One module per section of the paper: computes it, and returns the evidence."""

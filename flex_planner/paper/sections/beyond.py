@@ -8,23 +8,16 @@ from flex_planner.base.validation import Array
 from flex_planner.capacity.min_duration import payload_against_duration
 from flex_planner.optimal_control.task import Task
 from flex_planner.paper.cases import (
-    certified,
-    enclosed,
-    largest,
+    find_largest,
     NoPlanError,
     paper_arm,
+    plan_certified,
     point_to_point,
+    require_solved,
     STIFFNESS_LIMITS,
 )
-from flex_planner.paper.evidence import (
-    Claim,
-    confirmed_if,
-    Curve,
-    Panel,
-    Picture,
-    Section,
-    Table,
-)
+from flex_planner.paper.evidence import Claim, judge, Section, Table
+from flex_planner.plotting.diagrams import Curve, Panel, Picture
 from flex_planner.simulation.comparison import compare
 from flex_planner.simulation.execution import ExecutionMode, ExecutionResult
 import numpy as np
@@ -35,12 +28,12 @@ _SOFT = 5.0  # [N m^2]
 # dozens of switches at the limit: the last grams of the bracket take longest
 _CLAMPED_ACCURACY = 5e-3  # [kg]
 _HARDLY, _FEW = 0.98, 1e-3
-_WAYS = (ExecutionMode.FLEXIBLE_OPEN, ExecutionMode.RIGID_OPEN, ExecutionMode.FLEXIBLE,
-         ExecutionMode.RIGID, ExecutionMode.PD_ONLY)
+_MODES = (ExecutionMode.FLEXIBLE_OPEN, ExecutionMode.RIGID_OPEN, ExecutionMode.FLEXIBLE,
+          ExecutionMode.RIGID, ExecutionMode.PD_ONLY)
 
 
 def front(*, reduced: bool = False) -> Section:
-    """Return what each payload costs, and how much goes in what time."""
+    """Return the least effort of each payload, and the largest payload for each duration."""
     arms = {'rigid': paper_arm(math.inf), f'EI = {_SOFT:g} N m^2': paper_arm(_SOFT, 1)}
     fronts = [_front(point_to_point(arm, 1.0), name, f'C{k}')
               for k, (name, arm) in enumerate(arms.items())]
@@ -68,8 +61,9 @@ def front(*, reduced: bool = False) -> Section:
 
 def _front(task: Task, name: str, color: str) -> Curve:
     """Return the least effort of light payloads and of those that the search met."""
-    found = largest(task).front
-    light = [(payload, certified(point_to_point(task.arm, payload)).cost) for payload in _GRID]
+    found = find_largest(task).front
+    light = [(payload, plan_certified(point_to_point(task.arm, payload)).cost)
+             for payload in _GRID]
     heavy = [(float(payload), float(effort))
              for payload, effort in zip(found.payloads, found.efforts, strict=True)
              if payload > _GRID[-1]]
@@ -78,20 +72,20 @@ def _front(task: Task, name: str, color: str) -> Curve:
 
 
 def _against_duration(task: Task, durations: Array, name: str, color: str) -> Curve:
-    found = [enclosed(one) for one in payload_against_duration(task, durations)]
+    found = [require_solved(one) for one in payload_against_duration(task, durations)]
     return Curve(x=np.array([one.task.duration for one in found]),
                  y=np.array([one.payload for one in found]), label=name, color=color, style='.-')
 
 
-def clamped(*, reduced: bool = False) -> Section:
-    """Return what links carry that are clamped to their hubs, as real ones are."""
+def clamped_links(*, reduced: bool = False) -> Section:
+    """Return the largest payloads of links that are clamped to their hubs, as real ones are."""
     rigidities = () if reduced else tuple(
         rigidity for rigidity in STIFFNESS_LIMITS if not math.isinf(rigidity))
-    pinned = {rigidity: largest(point_to_point(paper_arm(rigidity, 1), 1.0))
+    pinned = {rigidity: find_largest(point_to_point(paper_arm(rigidity, 1), 1.0))
               for rigidity in rigidities}
-    built_in = {rigidity: largest(point_to_point(paper_arm(rigidity, 1, 'clamped_free'), 1.0),
-                                  _CLAMPED_ACCURACY) for rigidity in rigidities}
-    light = certified(point_to_point(paper_arm(50.0, 1, 'clamped_free'), 1.0))
+    built_in = {rigidity: find_largest(point_to_point(paper_arm(rigidity, 1, 'clamped_free'), 1.0),
+                                       _CLAMPED_ACCURACY) for rigidity in rigidities}
+    light = plan_certified(point_to_point(paper_arm(50.0, 1, 'clamped_free'), 1.0))
     rows = tuple((f'{rigidity:g}', f'{STIFFNESS_LIMITS[rigidity]:g}',
                   f'{pinned[rigidity].payload:.4f}', f'{found.payload:.4f} - {found.upper:.4f}')
                  for rigidity, found in built_in.items())
@@ -100,7 +94,7 @@ def clamped(*, reduced: bool = False) -> Section:
     return Section(
         key='6.2', title='Beyond the paper: clamped links',
         text='Pinned-pinned shapes keep the tip on the chord, and leave out the work of the '
-        'torque on the slope at the hub. Clamped-free shapes do neither. One mode a link; two '
+        'torque on the slope at the hub. Clamped-free shapes do neither. One mode per link; two '
         'modes are not solved at the limit.',
         tables=(Table(title='Table V with both kinds of shapes', rows=rows, header=(
             'EI [N m^2]', 'paper [kg]', 'pinned-pinned [kg]', 'clamped-free [kg]')),)
@@ -109,45 +103,45 @@ def clamped(*, reduced: bool = False) -> Section:
             said='Flexibility hardly changes what the arm carries (Table V).',
             found='With links of 5 N m^2 clamped to their hubs the arm carries '
             f'{built_in[_SOFT].payload:.2f} kg, not {pinned[_SOFT].payload:.2f} kg. What Table V '
-            'shows is a property of the shapes.', verdict=confirmed_if(
+            'shows is a property of the shapes.', verdict=judge(
                 built_in[_SOFT].payload > _HARDLY * pinned[_SOFT].payload)),) if rows else (),
         values=values)
 
 
 def feedforward(*, reduced: bool = False) -> Section:
-    """Return what planning with flexible links is worth on a flexible arm."""
-    result = compare(point_to_point(paper_arm(_SOFT), 1.0))
-    if not result.solved:
-        raise NoPlanError(f'{result.flexible.message}; {result.rigid.message}')
-    outcomes = {way: result.of(way) for way in _WAYS}
-    rows = tuple((way.value, f'{one.arrival_error * 1e3:.3g}', f'{one.final_error * 1e3:.3g}',
-                  f'{one.residual.tip * 1e3:.3g}') for way, one in outcomes.items())
-    flexible, rigid = outcomes[ExecutionMode.FLEXIBLE_OPEN], outcomes[ExecutionMode.RIGID_OPEN]
+    """Return the benefit of planning with flexible links on a flexible arm."""
+    comparison = compare(point_to_point(paper_arm(_SOFT), 1.0))
+    if not comparison.solved:
+        raise NoPlanError(f'{comparison.flexible.message}; {comparison.rigid.message}')
+    results = {mode: comparison.of(mode) for mode in _MODES}
+    rows = tuple((mode.value, f'{one.arrival_error * 1e3:.3g}', f'{one.final_error * 1e3:.3g}',
+                  f'{one.residual.tip * 1e3:.3g}') for mode, one in results.items())
+    flexible, rigid = results[ExecutionMode.FLEXIBLE_OPEN], results[ExecutionMode.RIGID_OPEN]
     return Section(
         key='6.3', title='Beyond the paper: rigid and flexible feedforward',
         text='The motion of section 5.2 with 1 kg, planned with rigid and with flexible links '
         f'(EI = {_SOFT:g} N m^2, two modes), carried out on the flexible arm; controller at '
         '1 kHz, 1 s after the arrival is watched.',
         tables=(Table(title='The tip on the flexible arm', rows=rows, header=(
-            'way', 'error on arrival [mm]', 'error after 1 s [mm]',
+            'mode', 'error on arrival [mm]', 'error after 1 s [mm]',
             'motion after arrival, peak to peak [mm]')),),
         claims=(Claim(
             said='The torques of a plan may be used as feedforward of flexible arms.',
             found=f'Open loop the tip arrives {flexible.arrival_error * 1e3:.2g} mm from the '
             f'goal; planned with rigid links {rigid.arrival_error * 1e3:.2g} mm.',
-            verdict=confirmed_if(flexible.arrival_error < rigid.arrival_error / 100)),),
-        pictures=(_distances(outcomes, result.goal),),
+            verdict=judge(flexible.arrival_error < rigid.arrival_error / 100)),),
+        pictures=(_distances(results, comparison.goal),),
         values={'flexible_error': flexible.arrival_error, 'rigid_error': rigid.arrival_error})
 
 
-def _distances(outcomes: dict[ExecutionMode, ExecutionResult], goal: Array) -> Picture:
+def _distances(results: dict[ExecutionMode, ExecutionResult], goal: Array) -> Picture:
     curves = []
-    for k, (way, one) in enumerate(outcomes.items()):
+    for k, (mode, one) in enumerate(results.items()):
         execution = one.execution
         after = execution.times >= one.arrival
         distance = np.linalg.norm(execution.tip[after] - goal, axis=1) * 1e3
         curves.append(Curve(x=execution.times[after] - one.arrival,
-                            y=np.maximum(distance, 1e-6), label=way.value, color=f'C{k}'))
+                            y=np.maximum(distance, 1e-6), label=mode.value, color=f'C{k}'))
     return Picture(name='feedforward', columns=1, caption='Distance of the tip from the goal '
                    'after its arrival', panels=(Panel(
                        title='distance of the tip from the goal', x_label='time after arrival [s]',
@@ -155,24 +149,25 @@ def _distances(outcomes: dict[ExecutionMode, ExecutionResult], goal: Array) -> P
 
 
 def modes(*, reduced: bool = False) -> Section:
-    """Return how results settle as links get more modes."""
+    """Return the results for growing numbers of modes."""
     counts = (1, 2) if reduced else (1, 2, 3, 4)
-    costs = {count: certified(point_to_point(paper_arm(_SOFT, count), 1.0)).cost
+    costs = {count: plan_certified(point_to_point(paper_arm(_SOFT, count), 1.0)).cost
              for count in counts}
-    limits = {count: largest(point_to_point(paper_arm(_SOFT, count), 1.0)) for count in counts}
+    limits = {count: find_largest(point_to_point(paper_arm(_SOFT, count), 1.0))
+              for count in counts}
     rows = tuple((str(count), f'{costs[count]:.9f}', f'{one.payload:.5f} - {one.upper:.5f}')
                  for count, one in limits.items())
     return Section(
         key='6.4', title='Beyond the paper: how many modes',
         text=f'Pinned-pinned links of {_SOFT:g} N m^2.',
         tables=(Table(title='Least effort with 1 kg, and largest payload', rows=rows, header=(
-            'modes a link', 'J', 'largest payload [kg]')),),
+            'modes per link', 'J', 'largest payload [kg]')),),
         claims=(Claim(
-            said='Two modes a link are enough.',
+            said='Two modes per link are enough.',
             found=f'From one to two modes J with 1 kg changes by '
             f'{costs[2] / costs[1] - 1:.1e} of itself, the payload by '
             f'{(limits[2].payload - limits[1].payload) * 1e3:.1f} g'
             + ('.' if reduced else f'; from two to four by {costs[4] / costs[2] - 1:.1e} and '
                f'{(limits[4].payload - limits[2].payload) * 1e3:.1f} g.'),
-            verdict=confirmed_if(abs(costs[counts[-1]] / costs[2] - 1) < _FEW)),),
+            verdict=judge(abs(costs[counts[-1]] / costs[2] - 1) < _FEW)),),
         values={f'soft_cost_{count}_modes': cost for count, cost in costs.items()})

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 
 from flex_planner.base.validation import Array
-from flex_planner.paper.cases import certified, paper_arm, point_to_point, W_2
-from flex_planner.paper.checks import checked, shown, swing_of
+from flex_planner.paper.cases import paper_arm, plan_certified, point_to_point, W_2
+from flex_planner.paper.checks import format_value, solve_by_ipopt, swing_of
 from flex_planner.paper.diagrams import joint_panels, POINTS, runs_on_limit, tip_panel
-from flex_planner.paper.evidence import Claim, confirmed_if, Picture, Section, Table, Verdict
+from flex_planner.paper.evidence import Claim, judge, Section, Table, Verdict
 from flex_planner.planning.objectives import Objectives
 from flex_planner.planning.plan import peaks, Plan, Samples
 from flex_planner.planning.plan_path import plan_path
+from flex_planner.plotting.diagrams import Picture
 import numpy as np
 
 _PAYLOAD, _WISHED = 1.0, 0.8  # [kg], [rad/s]
@@ -21,18 +22,18 @@ _BEYOND = 1e5  # a weight far beyond the paper's largest
 
 
 def study(*, reduced: bool = False) -> Section:
-    """Return what came of section 5.2."""
+    """Return the evidence on section 5.2."""
     rigid = _plans(math.inf, W_2)
     flexible = _plans(50.0, W_2[:1] if reduced else W_2)
     shown_plans = rigid if reduced else flexible
     samples = {f'w2 = {w_2:g}': plan.uniform_samples(POINTS) for w_2, plan in shown_plans.items()}
     speeds = {w_2: peaks(plan, plan.uniform_samples(POINTS)).speeds for w_2, plan in rigid.items()}
-    checks = {w_2: checked(rigid[w_2]) for w_2 in (W_2[:1] if reduced else W_2)}
+    checks = {w_2: solve_by_ipopt(rigid[w_2]) for w_2 in (W_2[:1] if reduced else W_2)}
     values = {f'rigid_cost_{w_2:g}': plan.cost for w_2, plan in rigid.items()}
     values |= {f'rigid_peak_{w_2:g}_joint_{j + 1}': float(speeds[w_2][j])
                for w_2 in speeds for j in range(2)}
     values |= {f'ei50_cost_{w_2:g}': plan.cost for w_2, plan in flexible.items()}
-    independent = {w_2: shown(check, check.cost) for w_2, check in checks.items()}
+    independent = {w_2: format_value(check, check.cost) for w_2, check in checks.items()}
     links = 'rigid' if reduced else 'EI = 50 N m^2'
     claims = _claims(links, speeds, list(samples.values()), shown_plans)
     if not reduced:
@@ -42,7 +43,7 @@ def study(*, reduced: bool = False) -> Section:
     return Section(
         key='5.2', title='Minimum effort and speed',
         text='The tip goes from (0.5, 0) m to (0.5, 0.5) m in 1 s with 1 kg; R = 1/8, W_2 = w_2 '
-        'at the joints. Rigid links, and the arm of Table I with two modes a link (EI = 50 '
+        'at the joints. Rigid links, and the arm of Table I with two modes per link (EI = 50 '
         'N m^2); the independent check is IPOPT on the rigid arm, from a straight line.',
         tables=(_table(speeds, rigid, flexible, independent),), claims=claims,
         pictures=_pictures(samples, links), values=values)
@@ -50,7 +51,7 @@ def study(*, reduced: bool = False) -> Section:
 
 def _plans(rigidity: float, weights: tuple[float, ...]) -> dict[float, Plan]:
     arm = paper_arm(rigidity)
-    return {w_2: certified(point_to_point(arm, _PAYLOAD, w_2)) for w_2 in weights}
+    return {w_2: plan_certified(point_to_point(arm, _PAYLOAD, w_2)) for w_2 in weights}
 
 
 def _table(speeds: dict[float, Array], rigid: dict[float, Plan], flexible: dict[float, Plan],
@@ -79,23 +80,23 @@ def _claims(links: str, speeds: dict[float, Array], samples: list[Samples],
         Claim(said='Larger w_2 brings the peak velocity from 1.2 down to 0.6 rad/s, greatly up '
               'to the third case and little in the fourth.',
               found=_falls(speeds),
-              verdict=confirmed_if(abs(top[0.0] - 1.2) < _ROUNDING > abs(top[1400.0] - 0.6)
-                                   and all(_levels_off(speeds, joint) for joint in range(2)))),
+              verdict=judge(abs(top[0.0] - 1.2) < _ROUNDING > abs(top[1400.0] - 0.6)
+                            and all(_levels_off(speeds, joint) for joint in range(2)))),
         Claim(said='w_2 = 10 is the first case within +-0.8 rad/s.',
               found=f'The first of the four is w_2 = {within[0]:g} (rigid).',
-              verdict=confirmed_if(within[0] == W_2[2])),
+              verdict=judge(within[0] == W_2[2])),
         Claim(said='With larger w_2 the joints move more and more along a straight line in time.',
               found='The largest distance of a joint from it falls from '
               f'{bent[0]:.1%} to {bent[1]:.1%} of its travel ({links}).',
-              verdict=confirmed_if(bent[1] < bent[0] / 2)),
+              verdict=judge(bent[1] < bent[0] / 2)),
         Claim(said='In the last case the torques reach their bounds at both ends of the motion.',
               found=f'On the bound ({links}): ' + '; '.join(
                   f'motor {joint + 1} ' + _spans(run) for joint, run in enumerate(runs)) + '.',
-              verdict=confirmed_if(ends)),
+              verdict=judge(ends)),
         Claim(said='Least effort comes with the highest velocity and the other way round.',
               found=f'Integral of the squared torques: {least.effort:.3g} N^2 m^2 s at w_2 = 0, '
               f'{most.effort:.3g} at 1400 ({links}).',
-              verdict=confirmed_if(least.effort < most.effort)))
+              verdict=judge(least.effort < most.effort)))
 
 
 def _levels_off(speeds: dict[float, Array], joint: int) -> bool:
@@ -131,7 +132,7 @@ def _slowest(start: Plan) -> float:
     weight, plan = W_2[-1], start
     while weight < _BEYOND:
         weight = min(4 * weight, _BEYOND)
-        plan = certified(point_to_point(start.arm, _PAYLOAD, weight), start_from=plan)
+        plan = plan_certified(point_to_point(start.arm, _PAYLOAD, weight), start_from=plan)
     return float(peaks(plan, plan.uniform_samples(POINTS)).speeds.max())
 
 
@@ -140,7 +141,7 @@ def _further_claims(weight: float, slowest: float) -> tuple[Claim, ...]:
         Claim(said='w_2 = 10 is the weight to choose for 0.8 rad/s.',
               found=f'It does keep the limit, but so does every weight from w_2 = {weight:.2f} '
               'on, with less effort; `Objectives(max_joint_speeds=...)` finds it.',
-              verdict=confirmed_if(weight > _NEXT)),
+              verdict=judge(weight > _NEXT)),
         Claim(said='Less than 0.6 rad/s is impossible, because with w_2 > 1400 the solution does '
               'not converge.',
               found=f'It converges: at w_2 = {_BEYOND:g} the certified motion peaks at '

@@ -9,15 +9,8 @@ from flex_planner.base.validation import Array
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectSettings
 from flex_planner.optimal_control.parameters import Parameters
-from flex_planner.paper.evidence import (
-    Claim,
-    confirmed_if,
-    Curve,
-    Panel,
-    Picture,
-    Section,
-    Table,
-)
+from flex_planner.paper.evidence import Claim, judge, Section, Table
+from flex_planner.plotting.diagrams import Curve, Panel, Picture
 import numpy as np
 from scipy.integrate import solve_ivp
 
@@ -58,7 +51,7 @@ def swing(model: ArmModel, rigidity: float | None = None, duration: float = _DUR
 
 
 def study(*, reduced: bool = False) -> Section:
-    """Return what came of section 5.1."""
+    """Return the evidence on section 5.1."""
     model = ArmModel(load_arm('korayem_hanging'))
     rigid = swing(ArmModel(model.arm.rigid()))
     swings = {rigidity: swing(model, rigidity)
@@ -66,7 +59,7 @@ def study(*, reduced: bool = False) -> Section:
     away = {rigidity: np.abs(one.states[:, :2] - rigid.states[:, :2]).max(axis=0)
             for rigidity, one in swings.items()}
     range_ = np.ptp(rigid.states[:, :2], axis=0)
-    torque, gap = _repeated(model)
+    torque, gap = _repeat_by_ipopt(model)
     values = {f'hanging_deviation_{rigidity:g}_joint_{joint + 1}': float(one[joint])
               for rigidity, one in away.items() for joint in range(2)}
     values |= {'hanging_ipopt_torque': torque, 'hanging_ipopt_gap': gap,
@@ -74,7 +67,7 @@ def study(*, reduced: bool = False) -> Section:
     share = float((away[100.0] / range_).max())
     return Section(
         key='5.1', title='The model: rigid and flexible arm, hanging',
-        text='The arm of Table I with two pinned-pinned modes a link is let go at rest at '
+        text='The arm of Table I with two pinned-pinned modes per link is let go at rest at '
         'theta = (-1.5, -0.5) rad from the horizontal, in a vertical plane, and swings for 2 s '
         '(DOP853, relative tolerance 1e-10).',
         tables=(_table(swings, away, values['hanging_energy_drift']),),
@@ -86,11 +79,11 @@ def study(*, reduced: bool = False) -> Section:
             + f'. IPOPT, asked for the motion of least effort between two states of the swing '
             f'{_CHECKED:g} s apart, finds the swing: torques below {max(torque, 1e-12):.0e} N m, '
             f'joints within {gap:.0e} rad.',
-            verdict=confirmed_if(share < _SMALL)),),
+            verdict=judge(share < _SMALL)),),
         pictures=(_picture(rigid, swings),), values=values)
 
 
-def _repeated(model: ArmModel) -> tuple[float, float]:
+def _repeat_by_ipopt(model: ArmModel) -> tuple[float, float]:
     """
     Return the torque and the error of the joints of a swing that IPOPT was to repeat.
 

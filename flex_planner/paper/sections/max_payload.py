@@ -10,20 +10,21 @@ from flex_planner.capacity.results import MaxPayload, PayloadMethod
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.paper.cases import (
     ACCURACY,
-    certified,
     EPSILON,
-    largest,
+    find_largest,
     LIMITS,
     NoPlanError,
     paper_arm,
     PAYLOADS,
+    plan_certified,
     point_to_point,
     STIFFNESS_LIMITS,
 )
-from flex_planner.paper.checks import largest_payload, shown
+from flex_planner.paper.checks import format_value, maximize_payload
 from flex_planner.paper.diagrams import joint_panels, POINTS, tip_panel
-from flex_planner.paper.evidence import Claim, confirmed_if, Picture, Section, Table, Verdict
+from flex_planner.paper.evidence import Claim, judge, Section, Table, Verdict
 from flex_planner.planning.plan import peaks, Plan, Samples
+from flex_planner.plotting.diagrams import Picture
 import numpy as np
 
 _PRICE = 1e3  # of the payload against effort, for IPOPT [1/kg]
@@ -32,28 +33,29 @@ _NEARLY_ALL = 0.95  # of the time
 
 
 def study(*, reduced: bool = False) -> Section:
-    """Return what came of section 5.3."""
-    found = {_RIGID: largest(point_to_point(paper_arm(_RIGID), 1.0))}
+    """Return the evidence on section 5.3."""
+    found = {_RIGID: find_largest(point_to_point(paper_arm(_RIGID), 1.0))}
     if not reduced:
-        found |= {rigidity: largest(point_to_point(paper_arm(rigidity), 1.0))
+        found |= {rigidity: find_largest(point_to_point(paper_arm(rigidity), 1.0))
                   for rigidity in STIFFNESS_LIMITS if not math.isinf(rigidity)}
     rigid = _plan_of(found[_RIGID])
-    light = {payload: certified(point_to_point(rigid.arm, payload)) for payload in PAYLOADS}
-    weighted = _weighted(rigid, (0.0, 1000.0) if reduced else tuple(LIMITS))
-    checks = {rigidity: largest_payload(one.task, _plan_of(one), _PRICE)
+    light = {payload: plan_certified(point_to_point(rigid.arm, payload)) for payload in PAYLOADS}
+    weighted = _plan_with_weights(rigid, (0.0, 1000.0) if reduced else tuple(LIMITS))
+    checks = {rigidity: maximize_payload(one.task, _plan_of(one), _PRICE)
               for rigidity, one in found.items()}
     values = {f'limit_{rigidity:g}': one.payload for rigidity, one in found.items()}
     values |= {f'limit_w2_{w_2:g}': plan.task.payload_mass for w_2, plan in weighted.items()}
-    raised = _raised(rigid)
+    raised = _raise_payload(rigid)
     values |= {'limit_fig_2': raised.payload}
-    independent = {rigidity: shown(check, check.payload, 5) for rigidity, check in checks.items()}
+    independent = {rigidity: format_value(check, check.payload, 5)
+                   for rigidity, check in checks.items()}
     samples = {f'{payload:g} kg': plan.uniform_samples(POINTS) for payload, plan in light.items()}
     by_weight = {f'w2 = {w_2:g}': plan.uniform_samples(POINTS) for w_2, plan in weighted.items()}
     as_printed = {
-        f'w2 = {w_2:g}, {LIMITS[w_2]:g} kg': certified(
+        f'w2 = {w_2:g}, {LIMITS[w_2]:g} kg': plan_certified(
             point_to_point(rigid.arm, LIMITS[w_2], w_2)).uniform_samples(POINTS)
         for w_2 in weighted}
-    by_stiffness = {_named(rigidity): _plan_of(one).uniform_samples(POINTS)
+    by_stiffness = {_link_name(rigidity): _plan_of(one).uniform_samples(POINTS)
                     for rigidity, one in found.items()}
     claims = (*_limit_claims(found[_RIGID], raised), *_weight_claims(weighted, by_weight))
     if not reduced:
@@ -69,7 +71,7 @@ def study(*, reduced: bool = False) -> Section:
         pictures=_pictures(samples, as_printed, by_weight, by_stiffness), values=values)
 
 
-def _named(rigidity: float) -> str:
+def _link_name(rigidity: float) -> str:
     return 'rigid' if math.isinf(rigidity) else f'EI = {rigidity:g} N m^2'
 
 
@@ -79,17 +81,17 @@ def _plan_of(found: MaxPayload) -> Plan:
     return found.plan
 
 
-def _weighted(rigid: Plan, weights: tuple[float, ...]) -> dict[float, Plan]:
+def _plan_with_weights(rigid: Plan, weights: tuple[float, ...]) -> dict[float, Plan]:
     """Return the motions with the rigid arm's largest payload at weights of the velocities."""
     plans, plan = {}, rigid
     for w_2 in weights:
         task = point_to_point(rigid.arm, rigid.task.payload_mass, w_2)
-        plan = plans[w_2] = certified(task, start_from=plan)
+        plan = plans[w_2] = plan_certified(task, start_from=plan)
     return plans
 
 
-def _raised(rigid: Plan) -> MaxPayload:
-    """Return what the algorithm of fig. 2 finds with the paper's accuracies."""
+def _raise_payload(rigid: Plan) -> MaxPayload:
+    """Return the result of the algorithm of fig. 2 with the paper's accuracies."""
     return find_max_payload(point_to_point(rigid.arm, 1.0), model=ArmModel(rigid.arm),
                             method=PayloadMethod.INCREMENTAL, accuracy=ACCURACY)
 
@@ -113,7 +115,7 @@ def _weight_table(weighted: dict[float, Plan]) -> Table:
 
 
 def _stiffness_table(found: dict[float, MaxPayload], independent: dict[float, str]) -> Table:
-    rows = tuple((_named(rigidity), f'{STIFFNESS_LIMITS[rigidity]:g}', f'{one.payload:.5f}',
+    rows = tuple((_link_name(rigidity), f'{STIFFNESS_LIMITS[rigidity]:g}', f'{one.payload:.5f}',
                   f'{one.upper:.5f}', independent[rigidity]) for rigidity, one in found.items())
     return Table(title='Table V: the largest payload', rows=rows,
                  header=('links', 'paper [kg]', 'ours, carried [kg]', 'too much [kg]',
@@ -130,18 +132,18 @@ def _limit_claims(found: MaxPayload, raised: MaxPayload) -> tuple[Claim, ...]:
               found=f'{found.payload:.5f} kg is carried by a certified motion, '
               f'{found.upper:.5f} kg is too much; the algorithm of fig. 2 ends at '
               f'{raised.payload:.3f} kg, to its accuracy of {ACCURACY:g} kg.',
-              verdict=confirmed_if(abs(found.payload - LIMITS[0.0]) <= ACCURACY)),
+              verdict=judge(abs(found.payload - LIMITS[0.0]) <= ACCURACY)),
         Claim(said='At the largest payload both torques lie on their limits completely.',
               found='On the limit for ' + ' and '.join(
                   f'{share:.1%}' for share in plan.saturation) + ' of the time; the rest are the '
               f'{plan.switching_times.size // 2} changes from one limit to the other.',
-              verdict=confirmed_if(plan.saturation.min() > _NEARLY_ALL)),
+              verdict=judge(plan.saturation.min() > _NEARLY_ALL)),
         Claim(said='Above it the error of eq. (17) grows suddenly beyond eps = 1e-3, which shows '
               'that the payload is too large.',
               found=f'The smallest error of a payload that is too large was {error:.1e} here'
               + (f', at {close[0].payload:.3f} kg: eps would have let it pass. It is the failure '
                  "of Newton's method, not the error, that tells." if close else '.'),
-              verdict=confirmed_if(not close)))
+              verdict=judge(not close)))
 
 
 def _weight_claims(weighted: dict[float, Plan],
@@ -178,7 +180,7 @@ def _stiffness_claims(found: dict[float, MaxPayload],
               f'{ACCURACY:g} kg to which the paper searches; from rigid links to 50 N m^2 it '
               f'falls by {limits[0] - limits[1]:.4f} kg only, not by 0.05. It is close because '
               'pinned-pinned shapes do not move the tip; with clamped ones it is not, see '
-              'section 6.2.', verdict=confirmed_if(
+              'section 6.2.', verdict=judge(
                   limits == sorted(limits, reverse=True) and all(
                       abs(limit - printed) <= ACCURACY + 1e-3 for limit, printed in zip(
                           limits, STIFFNESS_LIMITS.values(), strict=True)))),
@@ -188,11 +190,11 @@ def _stiffness_claims(found: dict[float, MaxPayload],
               + ' N m (rigid, 50, 5 N m^2), with '
               + ', '.join(str(_plan_of(one).switching_times.size) for one in found.values())
               + ' switching times.',
-              verdict=confirmed_if(bool((np.diff(rough.sum(axis=1)) > 0).all()))))
+              verdict=judge(bool((np.diff(rough.sum(axis=1)) > 0).all()))))
 
 
 def _roughness(samples: Samples) -> Array:
-    """Return how much each torque goes up and down in all, shape (n,) [N m]."""
+    """Return the total variation of each torque, shape (n,) [N m]."""
     change: Array = np.abs(np.diff(samples.torques, axis=0)).sum(axis=0)
     return change
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from flex_planner.paper.cases import certified, turn, turning_arm
-from flex_planner.paper.checks import checked, shown
+from flex_planner.paper.cases import plan_certified, turn, turning_arm
+from flex_planner.paper.checks import format_value, solve_by_ipopt
 from flex_planner.paper.diagrams import joint_panels, POINTS, runs_on_limit
-from flex_planner.paper.evidence import Claim, Picture, Section, Table, Verdict
+from flex_planner.paper.evidence import Claim, Section, Table, Verdict
 from flex_planner.planning.plan import peaks, Plan, Samples
+from flex_planner.plotting.diagrams import Picture
 
 # what J_1, J_2, J_3 = 1 kg m^2 may turn with: inertias at the nodes of the arm, each of which
 # turns with the link that starts there, the last with the tip
@@ -21,19 +22,19 @@ TAKEN = next(iter(READINGS))
 
 
 def study(*, reduced: bool = False) -> Section:
-    """Return what came of section 5.4."""
+    """Return the evidence on section 5.4."""
     names = list(READINGS)[:1] if reduced else list(READINGS)
-    plans = {name: certified(turn(turning_arm(READINGS[name]))) for name in names}
+    plans = {name: plan_certified(turn(turning_arm(READINGS[name]))) for name in names}
     samples = {name: plan.uniform_samples(POINTS) for name, plan in plans.items()}
-    checks = {name: checked(plan, 80) for name, plan in plans.items()
+    checks = {name: solve_by_ipopt(plan, 80) for name, plan in plans.items()
               if name in (TAKEN, names[-1])}
     values = {f'turn_cost_{k}': plan.cost for k, plan in enumerate(plans.values())}
     values |= {f'turn_peak_joint_{j + 1}': float(peaks(plans[TAKEN], samples[TAKEN]).speeds[j])
                for j in range(2)}
-    independent = {name: shown(check, check.cost) for name, check in checks.items()}
+    independent = {name: format_value(check, check.cost) for name, check in checks.items()}
     return Section(
         key='5.4', title='Minimum effort',
-        text='The arm of Table VI, one pinned-pinned mode a link, turns from (0, 180) deg to '
+        text='The arm of Table VI, one pinned-pinned mode per link, turns from (0, 180) deg to '
         '(180, 0) deg in 2 s; R = 1, motors of 13.5 and 4 N m at any speed. The paper does not '
         'say what J_1 to J_3 turn with; its readings are compared, and the first is taken below. '
         'The independent check is IPOPT from a straight line.',
@@ -43,7 +44,7 @@ def study(*, reduced: bool = False) -> Section:
 
 
 def _ends(samples: Samples, joint: int) -> str:
-    """Return where a motor is on its limit, in words."""
+    """Return the ends of the motion at which a motor is on its limit, in words."""
     runs, last = runs_on_limit(samples, joint), samples.times[-1]
     first = bool(runs) and runs[0][0] == 0
     final = bool(runs) and runs[-1][1] == last

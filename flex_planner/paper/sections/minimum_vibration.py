@@ -6,19 +6,12 @@ from flex_planner.base.validation import Array
 from flex_planner.dynamics.statics import natural_modes
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.parameters import Parameters
-from flex_planner.paper.cases import certified, turn, turning_arm, VIBRATION_WEIGHT
-from flex_planner.paper.checks import checked, shown
+from flex_planner.paper.cases import plan_certified, turn, turning_arm, VIBRATION_WEIGHT
+from flex_planner.paper.checks import format_value, solve_by_ipopt
 from flex_planner.paper.diagrams import joint_panels, modal_panels, tip_panel
-from flex_planner.paper.evidence import (
-    Claim,
-    confirmed_if,
-    Curve,
-    Panel,
-    Picture,
-    Section,
-    Table,
-)
+from flex_planner.paper.evidence import Claim, judge, Section, Table
 from flex_planner.planning.plan import peaks, Plan, Samples
+from flex_planner.plotting.diagrams import Curve, Panel, Picture
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
@@ -32,17 +25,17 @@ _RINGING = 10.0  # [Hz] and above: the slowest bending mode has 15
 
 
 def study(*, reduced: bool = False) -> Section:
-    """Return what came of section 5.5."""
+    """Return the evidence on section 5.5."""
     arm = turning_arm(limited=False)
     weights = (0.0, VIBRATION_WEIGHT) if reduced else (0.0, VIBRATION_WEIGHT, _HEAVY)
-    plans = {weight: certified(turn(arm, weight)) for weight in weights}
+    plans = {weight: plan_certified(turn(arm, weight)) for weight in weights}
     samples = {weight: plan.uniform_samples(_FFT + 1) for weight, plan in plans.items()}
-    checks = {weight: checked(plans[weight], 80) for weight in weights[:2]}
+    checks = {weight: solve_by_ipopt(plans[weight], 80) for weight in weights[:2]}
     shaken = {weight: _rms(one) for weight, one in samples.items()}
     values = {f'vibration_cost_{weight:g}': plan.cost for weight, plan in plans.items()}
     values |= {f'vibration_rms_{weight:g}_link_{j + 1}': float(shaken[weight][j])
                for weight in weights for j in range(2)}
-    independent = {weight: shown(check, check.cost) for weight, check in checks.items()}
+    independent = {weight: format_value(check, check.cost) for weight, check in checks.items()}
     named = {'minimum effort': samples[0.0],
              f'minimum vibration, w = {VIBRATION_WEIGHT:g}': samples[VIBRATION_WEIGHT]}
     return Section(
@@ -65,7 +58,7 @@ def _pair(values: Array, digits: str = '.3g') -> str:
     return ', '.join(format(float(value), digits) for value in values)
 
 
-def _bent(samples: Samples) -> Array:
+def _largest_bending(samples: Samples) -> Array:
     """Return the largest modal displacements [mm]."""
     most: Array = np.abs(samples.coordinates[:, 2:]).max(axis=0) * 1e3
     return most
@@ -75,7 +68,7 @@ def _table(plans: dict[float, Plan], samples: dict[float, Samples], shaken: dict
            independent: dict[float, str]) -> Table:
     rows = tuple(
         (f'{weight:g}', f'{plan.cost:.6g}', independent.get(weight, ''), f'{plan.effort:.6g}',
-         _pair(peaks(plan, samples[weight]).torques), _pair(_bent(samples[weight])),
+         _pair(peaks(plan, samples[weight]).torques), _pair(_largest_bending(samples[weight])),
          _pair(shaken[weight] * 1e3)) for weight, plan in plans.items())
     return Table(title='Effort against vibration', rows=rows, header=(
         'weight of the modal rates', 'J', 'J, IPOPT', 'effort [N^2 m^2 s]',
@@ -87,34 +80,34 @@ def _claims(plans: dict[float, Plan], samples: dict[float, Samples],
             shaken: dict[float, Array]) -> tuple[Claim, ...]:
     least, calm = samples[0.0], samples[VIBRATION_WEIGHT]
     fall = 1 - shaken[VIBRATION_WEIGHT] / shaken[0.0]
-    bent = 1 - _bent(calm) / _bent(least)
-    power = 1 - _ringing(calm) / _ringing(least)
+    bent = 1 - _largest_bending(calm) / _largest_bending(least)
+    power = 1 - _ringing_power(calm) / _ringing_power(least)
     effort = plans[VIBRATION_WEIGHT].effort / plans[0.0].effort - 1
     torque = (peaks(plans[VIBRATION_WEIGHT], calm).torques
               / peaks(plans[0.0], least).torques - 1)
-    fast = [_fast(one) for one in (least, calm)]
+    fast = [_fast_acceleration(one) for one in (least, calm)]
     place = np.linspace(0, 1, len(fast[0]))
     inner = (place > _ENDS) & (place < 1 - _ENDS)
     return (
         Claim(said='With a price on the modal rates the oscillation is considerably smaller.',
               found=f'The rms of the modal rates falls by {_pair(fall, ".0%")} (links 1, 2), the '
               f'power of the ringing above 10 Hz by {_pair(power, ".0%")}.',
-              verdict=confirmed_if(fall.min() > _CONSIDERABLE)),
+              verdict=judge(fall.min() > _CONSIDERABLE)),
         Claim(said='The amplitudes of the modes are much smaller.',
               found=f'The largest bending falls by {_pair(bent, ".0%")} only: it is that of '
               'accelerating the arm, which every motion of 2 s needs. It is what rings on top of '
-              'it that becomes small.', verdict=confirmed_if(bent.min() > _CONSIDERABLE)),
+              'it that becomes small.', verdict=judge(bent.min() > _CONSIDERABLE)),
         Claim(said='The torques are larger: a smoother motion takes more effort.',
               found=f'The integral of the squared torques grows by {effort:.2%}; peak torques '
               f'change by {_pair(torque, "+.1%")}. It takes more effort, but hardly any.',
-              verdict=confirmed_if(effort > 0 and torque.max() > 0)),
+              verdict=judge(effort > 0 and torque.max() > 0)),
         Claim(said='The path of the tip is smoother.',
               found="The rms of the tip's acceleration above 10 Hz falls from "
               f'{_rms_of(fast[0]):.3g} to {_rms_of(fast[1]):.3g} m/s^2: in the middle three '
               f'quarters of the time from {_rms_of(fast[0][inner]):.3g} to '
               f'{_rms_of(fast[1][inner]):.3g}, at the ends from {_rms_of(fast[0][~inner]):.3g} to '
               f'{_rms_of(fast[1][~inner]):.3g}.',
-              verdict=confirmed_if(_rms_of(fast[1]) < _rms_of(fast[0]))))
+              verdict=judge(_rms_of(fast[1]) < _rms_of(fast[0]))))
 
 
 def _power(samples: Samples, values: Array) -> tuple[Array, Array]:
@@ -125,7 +118,7 @@ def _power(samples: Samples, values: Array) -> tuple[Array, Array]:
     return np.fft.rfftfreq(_FFT, step).astype(np.float64), power
 
 
-def _ringing(samples: Samples) -> Array:
+def _ringing_power(samples: Samples) -> Array:
     """Return the power of the modal rates above 10 Hz."""
     frequencies, power = _power(samples, samples.rates[:, 2:])
     total: Array = power[frequencies > _RINGING].sum(axis=0)
@@ -141,13 +134,13 @@ def _acceleration(samples: Samples) -> Array:
 
 def _acceleration_panel(cases: dict[str, Samples]) -> Panel:
     curves = [Curve(x=samples.times[2:-2], label=label, color=f'C{k}',
-                    y=np.linalg.norm(_fast(samples), axis=1))
+                    y=np.linalg.norm(_fast_acceleration(samples), axis=1))
               for k, (label, samples) in enumerate(cases.items())]
     return Panel(title='acceleration of the tip above 10 Hz', x_label='time [s]',
                  y_label='acceleration [m/s^2]', curves=tuple(curves))
 
 
-def _fast(samples: Samples) -> Array:
+def _fast_acceleration(samples: Samples) -> Array:
     """Return the tip's acceleration above 10 Hz, without two points at either end [m/s^2]."""
     # in time: a window that hides what does not fit together at the ends would hide their ringing
     rate = 1 / (samples.times[1] - samples.times[0])

@@ -1,4 +1,4 @@
-"""What the paper prints and cannot mean, each with its evidence."""
+"""The slips of the paper, each with its evidence."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
 from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.paper.cases import (
-    certified,
-    largest,
+    find_largest,
     NoPlanError,
     paper_arm,
+    plan_certified,
     point_to_point,
 )
 from flex_planner.paper.evidence import Section, Table
@@ -54,7 +54,7 @@ class PrintedProblem(MotionProblem):
 
 
 def study(*, reduced: bool = False) -> Section:
-    """Return what the paper prints and cannot mean."""
+    """Return the slips of the paper with their evidence."""
     rows: list[tuple[str, str, str]] = []
     values: dict[str, float] = {}
     for part in (_angle, _costates, _appendix):
@@ -77,7 +77,7 @@ def _angle() -> Rows:
     arm = paper_arm(math.inf)
     tips = [tip_position(arm, np.radians([[60.0, angle]]))[0] for angle in (-60.0, -120.0)]
     right = point_to_point(arm, 1.0)
-    wrong = largest(replace(right, start_positions=np.radians([60.0, -60.0])))
+    wrong = find_largest(replace(right, start_positions=np.radians([60.0, -60.0])))
     solved = np.degrees(inverse_kinematics(arm, np.array([0.5, 0.0]), elbow=-1))
     return [('(28): theta_2(0) = -60 deg', '-120 deg',
              f'With theta_1 = 60 deg the tip is at ({tips[0][0]:.3f}, {tips[0][1]:.3f}) m for -60 '
@@ -94,9 +94,9 @@ def _costates() -> Rows:
     for kind in (PrintedProblem, MotionProblem):
         costs, solution, problem = [], None, None
         for payload in (_HEAVY - _STEP, _HEAVY + _STEP, _HEAVY):
-            plan = certified(point_to_point(arm, payload))
+            plan = plan_certified(point_to_point(arm, payload))
             problem = kind(plan.model, plan.task, task_parameters(plan.task))
-            solution = _solved(problem, plan.solution)
+            solution = _solve(problem, plan.solution)
             costs.append(_cost(problem, solution))
         assert problem is not None and solution is not None
         drifts.append(hamiltonian_drift(problem, solution))
@@ -111,7 +111,7 @@ def _costates() -> Rows:
                  'printed_slope_error': slopes[0], 'right_slope_error': slopes[1]}
 
 
-def _solved(problem: MotionProblem, guess: CollocationSolution | None) -> CollocationSolution:
+def _solve(problem: MotionProblem, guess: CollocationSolution | None) -> CollocationSolution:
     if guess is None:
         raise NoPlanError('a plan without a solution')
     result = solve(problem, guess, SolverSettings())
@@ -144,7 +144,7 @@ def _appendix() -> Rows:
         payload = float(rng.uniform(0, 6))
         parameters = Parameters.of(model.arm, payload_mass=payload).physical
         mass = model.mass_and_energy(np.concatenate([q, np.zeros(6)])[None], parameters)[0][0]
-        for name, (row, column, value) in _printed(q, payload).items():
+        for name, (row, column, value) in _printed_entries(q, payload).items():
             error = float(abs(value - mass[row, column]) / max(abs(mass[row, column]), 1e-9))
             worst[name] = max(worst.get(name, 0.0), error)
     return [
@@ -159,7 +159,7 @@ def _appendix() -> Rows:
         'appendix_j_rf112_mended': worst['J_rf112, mended']}
 
 
-def _printed(q: Array, payload: float) -> dict[str, tuple[int, int, float]]:
+def _printed_entries(q: Array, payload: float) -> dict[str, tuple[int, int, float]]:
     """
     Return entries of the appendix: row, column, value.
 

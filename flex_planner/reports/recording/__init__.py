@@ -1,5 +1,5 @@
 """
-What a recording tells: read back into the core's terms, checked again, shown as a page.
+Reports on recordings: read back into the core's terms, checked again, shown as a page.
 
 Needs neither ROS nor the planner that made the recording, only the recording.
 

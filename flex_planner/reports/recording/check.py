@@ -142,7 +142,7 @@ def check_motion(request: RecordedRequest, model: ArmModel | None = None,
     """
     motion, parameters = request.motion, request.parameters
     if motion is None:
-        raise RecordingError(f'{request.path} has no motion that could be checked: '
+        raise RecordingError(f'{request.path} has no motion to check: '
                              f'{request.report.error_msg or "it failed"}')
     model, limits = model or ArmModel(request.arm), limits or CheckLimits()
     ends = [_at_rest(model, row, parameters) for row in motion.coordinates[[0, -1]]]
@@ -153,7 +153,8 @@ def check_motion(request: RecordedRequest, model: ArmModel | None = None,
     return MotionCheck(tip=tip, findings=(
         *_resimulation(request, motion, states[-1] - ends[1], tip, limits),
         _joint_path(motion, states, request.arm.n_joints, limits),
-        *_ends(motion, ends, limits), *_asked(request, motion, limits),
+        *_deviation_from_rest(motion, ends, limits),
+        *_deviation_from_request(request, motion, limits),
         *_optimality(model, motion, parameters, limits)))
 
 
@@ -165,39 +166,40 @@ def _at_rest(model: ArmModel, coordinates: Array, parameters: Parameters) -> Arr
 
 def _resimulation(request: RecordedRequest, motion: RecordedMotion, miss: Array, tip: Array,
                   limits: CheckLimits) -> list[Finding]:
-    """Return where the recorded torques lead."""
+    """Return the errors of the motion that the recorded torques lead to."""
     most = limits.tip_deviation * request.arm.reach
     distance = np.linalg.norm(tip - motion.tip, axis=1)
     return [
         Finding(name='tip error at the end', unit='m', value=float(distance[-1]), limit=most,
                 recorded=float(request.report.tip_error)),
-        Finding(name='tip off its path', unit='m', value=float(distance.max()), limit=most),
+        Finding(name='largest tip deviation', unit='m', value=float(distance.max()), limit=most),
         Finding(name='boundary error (eq. 17)', unit='', value=float(miss @ miss / 2),
                 limit=request.tolerance, recorded=float(request.report.boundary_error))]
 
 
 def _joint_path(motion: RecordedMotion, states: Array, n: int, limits: CheckLimits) -> Finding:
-    """Return how far angles and speeds of the joints are from the recorded ones."""
+    """Return the distance of the joints' angles and speeds from the recorded ones."""
     n_t = motion.coordinates.shape[1]
     pairs = ((states[:, :n], motion.coordinates[:, :n]),
              (states[:, n_t:n_t + n], motion.rates[:, :n]))
     shares = [np.abs(found - recorded).max() / max(np.ptp(recorded, axis=0).max(), _TINY)
               for found, recorded in pairs]
-    return Finding(name='joints off their path', unit='', limit=limits.joint_deviation,
+    return Finding(name='largest joint deviation', unit='', limit=limits.joint_deviation,
                    value=float(np.max(shares)))
 
 
-def _ends(motion: RecordedMotion, ends: list[Array], limits: CheckLimits) -> list[Finding]:
-    """Return how far the first and the last sample are from rest."""
+def _deviation_from_rest(motion: RecordedMotion, ends: list[Array],
+                         limits: CheckLimits) -> list[Finding]:
+    """Return the distances of the first and the last sample from rest."""
     samples = np.hstack([motion.coordinates, motion.rates])[[0, -1]]
-    return [Finding(name=f'{name} from rest', unit='', limit=limits.end_error,
+    return [Finding(name=f'deviation from rest, {name}', unit='', limit=limits.end_error,
                     value=float(np.abs(sample - end).max()))
             for name, sample, end in zip(('start', 'goal'), samples, ends, strict=True)]
 
 
-def _asked(request: RecordedRequest, motion: RecordedMotion,
-           limits: CheckLimits) -> list[Finding]:
-    """Return how far both ends are from what was asked: joint angles, or the tip unbent."""
+def _deviation_from_request(request: RecordedRequest, motion: RecordedMotion,
+                            limits: CheckLimits) -> list[Finding]:
+    """Return the distances of both ends from the request: joint angles, or the unbent tip."""
     task, n = request.task, request.arm.n_joints
     joints = motion.coordinates[[0, -1], :n]
     if task.space == task.JOINT:
@@ -207,14 +209,14 @@ def _asked(request: RecordedRequest, motion: RecordedMotion,
         unbent = np.hstack([joints, np.zeros((2, request.arm.n_modes))])
         found, unit = tip_position(request.arm, unbent), 'm'
         asked = np.array([(point.x, point.y) for point in (task.start_point, task.goal_point)])
-    return [Finding(name=f'{name} from what was asked', unit=unit, limit=limits.end_error,
+    return [Finding(name=f'deviation from task, {name}', unit=unit, limit=limits.end_error,
                     value=float(np.abs(miss).max()))
             for name, miss in zip(('start', 'goal'), found - asked, strict=True)]
 
 
 def _optimality(model: ArmModel, motion: RecordedMotion, parameters: Parameters,
                 limits: CheckLimits) -> list[Finding]:
-    """Return whether torques keep their bounds and follow from the costates."""
+    """Return the violation of the torque bounds, and the errors of torques and Hamiltonian."""
     n, size = model.arm.n_joints, max(float(np.abs(motion.torques).max()), _TINY)
     lower, upper = TorqueLimits.of(model.arm).bounds(motion.rates[:, :n])
     bounds = np.where(motion.torques >= 0, upper, -lower)

@@ -122,7 +122,7 @@ class RecordedRequest:
         found = {entry.topic.type_name.removeprefix(_TYPES): entry.message
                  for entry in read_recording(path, types, _topics(path))}
         if 'MotionTask' not in found or 'PlanReport' not in found:
-            raise RecordingError(f'{path} is no recording of a request: it has no MotionTask '
+            raise RecordingError(f'{path} is not the recording of a request: it has no MotionTask '
                                  'with a PlanReport')
         trajectory = found.get('FlexibleTrajectory')
         try:
@@ -186,25 +186,25 @@ def _scenario(path: Path | str) -> Mapping[str, Any]:
     """Return the attachment with arm and parameters."""
     attached = read_attachments(path).get('scenario.yaml')
     if attached is None:
-        raise RecordingError(f'{path} is no recording of a request: it has no scenario.yaml')
+        raise RecordingError(f'{path} is not the recording of a request: it has no scenario.yaml')
     try:
         scenario = yaml.safe_load(attached)
     except yaml.YAMLError as error:
-        raise RecordingError(f'{path} has a scenario.yaml that is no YAML: {error}') from error
+        raise RecordingError(f'{path} has a scenario.yaml that is not YAML: {error}') from error
     if not isinstance(scenario, Mapping):
         raise RecordingError(f'{path} has a scenario.yaml without arm and parameters')
     return scenario
 
 
 def _topics(path: Path | str) -> list[str]:
-    """Return the names of the topics that tell of request and outcome."""
+    """Return the names of the topics with the request and its outcome."""
     wanted = {f'{_TYPES}{name}' for name in _WANTED}
     return [entry.topic.name for entry in read_metadata(path).topics
             if entry.topic.type_name in wanted]
 
 
 def _rows(points: Sequence[Any], field: str) -> Array:
-    """Return a field of all points, a point a row."""
+    """Return a field of all points, one row per point."""
     return np.array([getattr(point, field) for point in points], dtype=np.float64)
 
 
@@ -218,4 +218,4 @@ def _check_sizes(arm: Arm, motion: RecordedMotion) -> None:
         if shape != (count, columns):
             raise ValueError(f'{name} are {shape}, but must be {(count, columns)}')
     if count < 3 or not (np.diff(motion.times) > 0).all():
-        raise ValueError('the times of the motion do not increase, or are less than 3')
+        raise ValueError('the times of the motion do not increase, or are fewer than 3')

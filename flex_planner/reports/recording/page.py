@@ -24,7 +24,7 @@ from flex_planner.reports.recording.check import MotionCheck
 from flex_planner.reports.recording.contents import RecordedRequest
 from flex_planner.reports.recording.frequencies import NaturalFrequencies
 from flex_planner.reports.recording.plots import Plot, plots, Series
-from flex_planner.reports.recording.tables import Table, tables, verdict
+from flex_planner.reports.recording.tables import ReportTable, tables, verdict
 
 _FOLDER = Path(__file__).parent
 _DIGITS = 9
@@ -65,7 +65,7 @@ def write_report(path: Path, request: RecordedRequest, check: MotionCheck | None
         raise RecordingError(f'cannot write {path}: {error.strerror or error}') from error
 
 
-def _content(told: list[Table], drawn: list[Plot]) -> dict[str, Any]:
+def _content(told: list[ReportTable], drawn: list[Plot]) -> dict[str, Any]:
     """Return tables and plots; the arrays along x are shared."""
     axes: dict[str, list[float | None]] = {}
     names: dict[bytes, str] = {}

@@ -1,4 +1,4 @@
-"""The plots of a report, as what plots.js draws."""
+"""The plots of a report, as data for plots.js."""
 
 from __future__ import annotations
 
@@ -154,7 +154,7 @@ def _over_time(key: str, title: str, unit: str, times: Array, values: Array,
 
 
 def _bands(frequencies: NaturalFrequencies | None) -> Bands | None:
-    """Return where spectra should have their peaks: under given torques the joints are free."""
+    """Return the frequencies at which spectra peak: under given torques the joints are free."""
     if frequencies is None:
         return None
     ranges = frequencies.free.tolist()
@@ -173,7 +173,7 @@ def _spectrum(key: str, title: str, unit: str, times: Array, values: Array,
 
 
 def _tip(motion: RecordedMotion, check: MotionCheck | None) -> Plot:
-    """Return the path of the tip, and where the check went."""
+    """Return the path of the tip as planned, and as re-simulated by the check."""
     path = motion.tip
     series = [Series(name='planned', x=path[:, 0], y=path[:, 1], colour=0)]
     if check is not None:
@@ -191,19 +191,19 @@ def _search_plots(search: Any) -> list[Plot]:
     if len(search.front_payloads):
         payloads = np.asarray(search.front_payloads)
         for key, title, unit, values in (
-                ('front', 'Effort that carries a payload', 'J [N²m²s]', search.front_efforts),
+                ('front', 'Least effort for each payload', 'J [N²m²s]', search.front_efforts),
                 ('prices', 'Price of a payload', 'dJ/dm [N²m²s/kg]', search.front_prices)):
             line = Series(name=unit, x=payloads, y=np.asarray(values), colour=0)
             dots = Series(name='solved', x=payloads, y=np.asarray(values), colour=0, dots=True)
             found.append(Plot(key=key, title=title, x_label='payload [kg]', y_label=unit,
                               series=[line, dots], group='payload'))
     if len(search.tried_payloads):
-        found.append(_tried(np.asarray(search.tried_payloads, dtype=float),
-                            np.asarray(search.tried_solved, dtype=bool)))
+        found.append(_trials(np.asarray(search.tried_payloads, dtype=float),
+                             np.asarray(search.tried_solved, dtype=bool)))
     return found
 
 
-def _tried(payloads: Array, carried: NDArray[np.bool_]) -> Plot:
+def _trials(payloads: Array, carried: NDArray[np.bool_]) -> Plot:
     """Return the payloads in the order they were tried."""
     numbers: Array = np.arange(1, payloads.size + 1).astype(np.float64)
     return Plot(key='trials', title='Payloads tried', x_label='trial', y_label='payload [kg]',

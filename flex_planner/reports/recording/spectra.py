@@ -36,7 +36,7 @@ def spectrum(times: Array, values: Array) -> tuple[Array, Array]:
     """
     if not values.size or times.size < 2:
         return np.zeros(0), np.zeros((0, values.shape[1]))
-    times, values = _even(times, values)
+    times, values = _resample_evenly(times, values)
     window = np.hanning(times.size + 1)[:-1, None]  # periodic
     amplitudes: Array = np.abs(np.fft.rfft(window * (values - values.mean(axis=0)), axis=0))
     amplitudes *= 2 / window.sum()
@@ -47,7 +47,7 @@ def spectrum(times: Array, values: Array) -> tuple[Array, Array]:
     return frequencies[:count], amplitudes[:count]
 
 
-def _even(times: Array, values: Array) -> tuple[Array, Array]:
+def _resample_evenly(times: Array, values: Array) -> tuple[Array, Array]:
     """Return signals at times that are evenly spaced."""
     steps = np.diff(times)
     if np.ptp(steps) <= _UNEVEN * steps.mean():

@@ -20,9 +20,9 @@ _CERTIFICATE = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Table:
+class ReportTable:
     """
-    A table.
+    A table of a report.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class Table:
 
 
 def verdict(request: RecordedRequest, check: MotionCheck | None = None) -> str:
-    """Return in a sentence what came of the request."""
+    """Return the outcome of the request in a sentence."""
     report = request.report
     if not request.solved:
         return f'Failed, error {report.error_code}: {report.error_msg or "no reason is recorded"}'
@@ -54,7 +54,7 @@ def verdict(request: RecordedRequest, check: MotionCheck | None = None) -> str:
 
 
 def tables(request: RecordedRequest, check: MotionCheck | None = None,
-           frequencies: NaturalFrequencies | None = None) -> list[Table]:
+           frequencies: NaturalFrequencies | None = None) -> list[ReportTable]:
     """Return the tables of a report."""
     found = [_task(request), _outcome(request)]
     if request.solved:
@@ -72,9 +72,9 @@ def tables(request: RecordedRequest, check: MotionCheck | None = None,
     return [*found, *_arm(request.arm), _settings(request)]
 
 
-def check_table(check: MotionCheck) -> Table:
+def check_table(check: MotionCheck) -> ReportTable:
     """Return the findings of a check."""
-    return Table(title='Check of the recording against the model', rows=tuple(
+    return ReportTable(title='Check of the recording against the model', rows=tuple(
         (finding.name, f'{finding.value:.3g} {finding.unit}', f'{finding.limit:.3g}',
          'passed' if finding.passed else 'FAILED') for finding in check.findings),
         columns=('', 'found', 'limit', ''))
@@ -85,8 +85,8 @@ def numbers(values: Iterable[float]) -> str:
     return ', '.join(f'{value:.6g}' for value in values) or '–'
 
 
-def _task(request: RecordedRequest) -> Table:
-    """Return what was asked."""
+def _task(request: RecordedRequest) -> ReportTable:
+    """Return the task of the request."""
     task = request.task
     if task.space == task.CARTESIAN:
         ends = [f'({point.x:g}, {point.y:g}) m' for point in (task.start_point, task.goal_point)]
@@ -102,11 +102,11 @@ def _task(request: RecordedRequest) -> Table:
     for name in ('max_joint_speeds', 'max_torque_shares', 'max_modal_rates'):
         if len(getattr(task, name)):
             rows.append((name.replace('_', ' '), numbers(getattr(task, name))))
-    return Table(title='Task', rows=tuple(rows))
+    return ReportTable(title='Task', rows=tuple(rows))
 
 
-def _outcome(request: RecordedRequest) -> Table:
-    """Return what came of it."""
+def _outcome(request: RecordedRequest) -> ReportTable:
+    """Return the outcome of the request."""
     report = request.report
     seconds = report.planning_time.sec + report.planning_time.nanosec * 1e-9
     rows = [('error code', str(report.error_code))]
@@ -121,10 +121,10 @@ def _outcome(request: RecordedRequest) -> Table:
                  ('cost J', f'{report.cost:.6g}'), ('effort', f'{report.effort:.6g} N²m²s'),
                  ('energy', f'{report.energy:.6g} J'),
                  ('switching times [s]', numbers(report.switching_times))]
-    return Table(title='Outcome', rows=tuple(rows))
+    return ReportTable(title='Outcome', rows=tuple(rows))
 
 
-def _certificate(request: RecordedRequest) -> Table:
+def _certificate(request: RecordedRequest) -> ReportTable:
     """Return the certificate with the limits that it was held against."""
     limits = {entry.name: getattr(CertificateLimits(), entry.name)
               for entry in fields(CertificateLimits)} | {'boundary_error': request.tolerance}
@@ -134,18 +134,18 @@ def _certificate(request: RecordedRequest) -> Table:
         judged = '' if limit is None else 'passed' if value <= limit else 'FAILED'
         rows.append((name.replace('_', ' '), f'{value:.2e}{unit}',
                      '–' if limit is None else f'{limit:.0e}', judged))
-    return Table(title='Certificate when planned', columns=('', 'found', 'limit', ''),
-                 rows=tuple(rows))
+    return ReportTable(title='Certificate when planned', columns=('', 'found', 'limit', ''),
+                       rows=tuple(rows))
 
 
-def _joints(request: RecordedRequest) -> Table:
-    """Return what the motors have to give."""
+def _joints(request: RecordedRequest) -> ReportTable:
+    """Return the peak torques and speeds of the motors."""
     report, n = request.report, request.arm.n_joints
     shares = report.peak_speed_shares if len(report.peak_speed_shares) else np.full(n, np.nan)
     saturation = report.saturation if len(report.saturation) else np.full(n, np.nan)
     rows = zip(request.joint_names, report.peak_torques, report.peak_torque_shares,
                report.peak_speeds, shares, saturation, strict=True)
-    return Table(
+    return ReportTable(
         title='Motors', columns=('', 'peak torque', 'of its limit', 'peak speed',
                                  'of no-load speed', 'time on its limit'),
         rows=tuple((name, f'{torque:.4g} N m', _percent(part), f'{speed:.4g} rad/s',
@@ -153,64 +153,64 @@ def _joints(request: RecordedRequest) -> Table:
                    for name, torque, part, speed, share, full in rows))
 
 
-def _frequencies(frequencies: NaturalFrequencies) -> Table:
-    """Return how the arm rings with the payload of the plan."""
+def _frequencies(frequencies: NaturalFrequencies) -> ReportTable:
+    """Return the natural frequencies of the arm with the payload of the plan."""
     pairs = zip(frequencies.free, frequencies.locked, strict=True)
-    return Table(
+    return ReportTable(
         title='Natural frequencies over the postures of the motion [Hz]',
         columns=('', 'joints free (marked in the spectra)', 'joints locked'),
         rows=tuple((f'f{k}', _span(*free), _span(*locked))
                    for k, (free, locked) in enumerate(pairs, 1)))
 
 
-def _search(search: Any) -> Table:
-    """Return how the maximum payload was searched."""
-    return Table(title='Search for the maximum payload', rows=(
+def _search(search: Any) -> ReportTable:
+    """Return method and result of the search for the maximum payload."""
+    return ReportTable(title='Search for the maximum payload', rows=(
         ('method', 'payload as an unknown at a rising price' if search.method == search.DIRECT
          else 'payload raised step by step'),
         ('largest payload', f'{search.payload:.6g} kg'),
-        ('too much, or in vain', f'{search.payload_upper:.6g} kg'),
+        ('too much, or no solution', f'{search.payload_upper:.6g} kg'),
         ('accuracy asked for', f'{search.payload_accuracy:g} kg'),
         ('limiting joint', '–' if search.limiting_joint < 0 else
          f'{search.limiting_joint + 1}{", which can hold no more" if search.held else ""}')))
 
 
-def _trials(search: Any) -> list[Table]:
-    """Return the payloads met on the way."""
+def _trials(search: Any) -> list[ReportTable]:
+    """Return the payloads that the search solved or tried."""
     found = []
     if len(search.front_payloads):
-        rows = zip(search.front_payloads, search.front_efforts, search.front_prices, strict=True)
-        found.append(Table(title='What a payload costs',
-                           columns=('payload [kg]', 'J [N²m²s]', 'dJ/dm [N²m²s/kg]'),
-                           rows=tuple(_cells(row) for row in rows)))
+        front = zip(search.front_payloads, search.front_efforts, search.front_prices, strict=True)
+        found.append(ReportTable(title='Effort and price of each payload',
+                                 columns=('payload [kg]', 'J [N²m²s]', 'dJ/dm [N²m²s/kg]'),
+                                 rows=tuple(_cells(row) for row in front)))
     if len(search.tried_payloads):
         tried = zip(search.tried_payloads, search.tried_solved, search.tried_errors, strict=True)
-        found.append(Table(title='Payloads tried',
-                           columns=('payload [kg]', 'carried', 'boundary error'), rows=tuple(
-                               (f'{payload:.6g}', 'yes' if solved else 'no', f'{error:.2g}')
-                               for payload, solved, error in tried)))
+        rows = ((f'{payload:.6g}', 'yes' if solved else 'no', f'{error:.2g}')
+                for payload, solved, error in tried)
+        found.append(ReportTable(title='Payloads tried', rows=tuple(rows),
+                                 columns=('payload [kg]', 'carried', 'boundary error')))
     return found
 
 
-def _objectives(report: Any) -> Table:
+def _objectives(report: Any) -> ReportTable:
     """Return the weights tried for the objectives."""
     tried = zip(report.tried_objectives, report.tried_weights, report.tried_shares, strict=True)
-    return Table(title='Weights tried for the objectives',
-                 columns=('objective', 'weight', 'share of the limit'),
-                 rows=tuple((name, f'{weight:.5g}', f'{share:.4f}')
-                            for name, weight, share in tried))
+    return ReportTable(title='Weights tried for the objectives',
+                       columns=('objective', 'weight', 'share of the limit'),
+                       rows=tuple((name, f'{weight:.5g}', f'{share:.4f}')
+                                  for name, weight, share in tried))
 
 
-def _arm(arm: Arm) -> list[Table]:
+def _arm(arm: Arm) -> list[ReportTable]:
     """Return the arm's links and joints."""
     return [
-        Table(title=f'Arm: {arm.name}', columns=(
+        ReportTable(title=f'Arm: {arm.name}', columns=(
             'link', 'length [m]', 'density [kg/m]', 'E I [N m²]', 'modes', 'damping'), rows=tuple(
                 (str(i), f'{link.length:g}', f'{link.linear_density:g}',
                  f'{link.flexural_rigidity:g}', f'{link.modes} {link.mode_family}'
                  if link.modes else 'rigid', f'{link.damping_ratio:g}')
                 for i, link in enumerate(arm.links, 1))),
-        Table(title='Joints', columns=(
+        ReportTable(title='Joints', columns=(
             'joint', 'stall torque [N m]', 'no-load speed [rad/s]', 'friction [N m s/rad]',
             'mass at it [kg]'), rows=tuple(
                 (str(i), f'{joint.motor.stall_torque:g}', f'{joint.motor.no_load_speed:g}',
@@ -218,9 +218,9 @@ def _arm(arm: Arm) -> list[Table]:
                 for i, (joint, node) in enumerate(zip(arm.joints, arm.nodes, strict=False), 1)))]
 
 
-def _settings(request: RecordedRequest) -> Table:
+def _settings(request: RecordedRequest) -> ReportTable:
     """Return the planner's parameters."""
-    return Table(title='Parameters of the planner', rows=tuple(
+    return ReportTable(title='Parameters of the planner', rows=tuple(
         (name, ', '.join(map(str, value)) if isinstance(value, Sequence)
          and not isinstance(value, str) else str(value))
         for name, value in request.settings.items()))

@@ -12,7 +12,7 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 _INSTANTS = 9
-_STATIONS = 20  # points a link
+_STATIONS = 20  # points per link
 _LONGEST_PATH = 500  # points
 _LINK, _PATH, _START, _GOAL = (0.2, 0.4, 0.8), (0.9, 0.5, 0.1), (0.2, 0.7, 0.2), (0.8, 0.2, 0.2)
 

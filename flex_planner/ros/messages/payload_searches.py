@@ -21,7 +21,7 @@ _CODES = {method: code for code, method in METHODS.items()}
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SearchOptions:
     """
-    How a search is done, besides its task.
+    The options of a search.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class SearchOptions:
 
 def search_options(request: FindMaxPayload.Request, settings: PlannerSettings) -> SearchOptions:
     """
-    Return how a request wants its search done, with the parameters' defaults filled in.
+    Return the options of a request's search, with the parameters' defaults filled in.
 
     Raises
     ------
@@ -57,7 +57,7 @@ def search_options(request: FindMaxPayload.Request, settings: PlannerSettings) -
 
 
 def search_without_result(request: FindMaxPayload.Request) -> PayloadSearch:
-    """Return what is told of a search that failed before it could say anything itself."""
+    """Return the message of a search that failed before it began."""
     return PayloadSearch(
         method=request.method, payload_accuracy=request.payload_accuracy,
         payload_step=request.payload_step, payload_upper=float('inf'), limiting_joint=-1)

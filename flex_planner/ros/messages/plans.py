@@ -151,7 +151,7 @@ def report_from_plan(plan: Plan) -> PlanReport:
 
 
 def add_reference(report: PlanReport, plan: Plan, reference: SampledPlan) -> None:
-    """Add to a report what the sampled plan shows."""
+    """Add the peaks of the sampled plan to a report."""
     most = peaks(plan, reference.samples)
     limited = np.isfinite([joint.motor.no_load_speed for joint in plan.arm.joints]).any()
     report.peak_torques = most.torques.tolist()
@@ -173,7 +173,7 @@ def duration_seconds(duration: Duration) -> float:
 
 
 def joint_trajectory(reference: SampledPlan, joint_names: Sequence[str]) -> JointTrajectory:
-    """Return what a joint_trajectory_controller with an effort interface takes."""
+    """Return the trajectory for a joint_trajectory_controller with an effort interface."""
     samples, n = reference.samples, len(joint_names)
     points = [
         JointTrajectoryPoint(
@@ -199,8 +199,8 @@ def flexible_trajectory(plan: Plan, reference: SampledPlan, joints: JointTraject
     return message
 
 
-def reported_trajectory(report: PlanReport, plan: Plan, reference: SampledPlan,
-                        settings: PlannerSettings) -> FlexibleTrajectory:
+def report_trajectory(report: PlanReport, plan: Plan, reference: SampledPlan,
+                      settings: PlannerSettings) -> FlexibleTrajectory:
     """Return the trajectory of a sampled plan, and add to its report what the samples show."""
     add_reference(report, plan, reference)
     joints = joint_trajectory(reference, settings.joint_names)

@@ -1,4 +1,4 @@
-"""What the planner node says of itself on /diagnostics."""
+"""The status of the planner node on /diagnostics."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _BROKEN = (PlanReport.RECORDING_FAILED, PlanReport.UNKNOWN)
 @dataclass(slots=True)
 class Record:
     """
-    How the requests so far ended.
+    Counts of the requests so far by their ends.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class Diagnostics:
     ----------
     node : Node
         The planner.
-    desk : RequestQueue
+    queue : RequestQueue
         Its requests.
     record : Record
         How they ended.
@@ -79,9 +79,9 @@ class Diagnostics:
 
     """
 
-    def __init__(self, node: Node, desk: RequestQueue, record: Record, streamer: Streamer,
+    def __init__(self, node: Node, queue: RequestQueue, record: Record, streamer: Streamer,
                  trajectories: Publisher, arm: str) -> None:
-        self._node, self._desk, self._record, self._arm = node, desk, record, arm
+        self._node, self._queue, self._record, self._arm = node, queue, record, arm
         self._streamer, self._trajectories = streamer, trajectories
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 1)
         node.create_timer(_PERIOD, self._publish, callback_group=ReentrantCallbackGroup())
@@ -117,13 +117,13 @@ class Diagnostics:
         return state
 
     def _state(self) -> str:
-        active = self._desk.active
+        active = self._queue.active
         return f'planning: {active.progress.phase}' if active else 'idle'
 
     def _values(self) -> dict[str, object]:
-        active, record = self._desk.active, self._record
+        active, record = self._queue.active, self._record
         return {
-            'state': self._state(), 'requests waiting': self._desk.waiting,
+            'state': self._state(), 'requests waiting': self._queue.waiting,
             'requests solved': record.solved, 'requests failed': record.failed,
             'requests canceled': record.canceled, 'last error code': record.error_code,
             'iteration': active.progress.iteration if active else 0,

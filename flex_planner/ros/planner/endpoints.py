@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from flex_planner.ros.messages.payload_searches import fill_response, search_without_result
 from flex_planner.ros.messages.plans import duration_message
-from flex_planner.ros.planner.request_planner import Outcome
+from flex_planner.ros.planner.outcome import Outcome
 from flex_planner.ros.planner.request_queue import PendingRequest, Work
 from flex_planner.ros.planner.request_state import RequestState
 from flex_planner_interfaces.msg import MotionTask, PlanReport
@@ -28,7 +28,7 @@ _FEEDBACK_PERIOD = 0.1  # [s]
 
 class RequestHandlers(NamedTuple):
     """
-    What endpoints do with requests.
+    The operations of endpoints on requests.
 
     Attributes
     ----------
@@ -59,8 +59,8 @@ class Endpoint:
     kinds : pair of types
         Of the service and of the action; the request has the fields of the goal, and the
         response those of the result.
-    counter : RequestHandlers
-        Where requests are handed in.
+    handlers : RequestHandlers
+        Take and conclude requests.
     work : callable
         Returns the outcome of a request; runs in the thread of the worker.
     fill : callable
@@ -68,10 +68,10 @@ class Endpoint:
 
     """
 
-    def __init__(self, node: Node, name: str, kinds: tuple[Any, Any], counter: RequestHandlers,
+    def __init__(self, node: Node, name: str, kinds: tuple[Any, Any], handlers: RequestHandlers,
                  work: Callable[[Any, RequestState], Outcome],
                  fill: Callable[[Any, Any, Outcome], None]) -> None:
-        self._counter, self._work, self._fill = counter, work, fill
+        self._handlers, self._work, self._fill = handlers, work, fill
         self._goals: dict[bytes, tuple[ServerGoalHandle, PendingRequest]] = {}
         service, self._action = kinds
         # in the group that all else is in, a request that waits would hold up the others
@@ -87,20 +87,20 @@ class Endpoint:
 
     async def _on_request(self, request: Any, response: Any) -> Any:
         """Serve a request of the service."""
-        pending = self._counter.submit(partial(self._work, request))
-        self._fill(response, request, await self._counter.conclude(pending, request.task))
+        pending = self._handlers.submit(partial(self._work, request))
+        self._fill(response, request, await self._handlers.conclude(pending, request.task))
         return response
 
     def _on_goal(self, goal: ServerGoalHandle) -> None:
         """Hand in an accepted goal: it can be canceled from here on."""
-        pending = self._counter.submit(partial(self._work, goal.request))
+        pending = self._handlers.submit(partial(self._work, goal.request))
         self._goals[_key(goal)] = goal, pending
         goal.execute()
 
     async def _execute(self, goal: ServerGoalHandle) -> Any:
         """Wait for the outcome of a goal and return its result."""
         pending = self._goals[_key(goal)][1]
-        outcome = await self._counter.conclude(pending, goal.request.task)
+        outcome = await self._handlers.conclude(pending, goal.request.task)
         del self._goals[_key(goal)]
         result = self._action.Result()
         self._fill(result, goal.request, outcome)
@@ -108,18 +108,18 @@ class Endpoint:
         return result
 
     def _on_cancel(self, goal: ServerGoalHandle) -> CancelResponse:
-        """Give a goal up, unless its outcome is there."""
+        """Cancel a goal, unless it is concluded already."""
         entry = self._goals.get(_key(goal))
         if entry is None or entry[1].future.done():
             return CancelResponse.REJECT
-        self._counter.withdraw(entry[1])
+        self._handlers.withdraw(entry[1])
         return CancelResponse.ACCEPT
 
     def _send_feedback(self) -> None:
-        """Tell every client where its goal is, also while the solver says nothing new."""
+        """Send every client the progress of its goal, also if that is unchanged."""
         for goal, pending in list(self._goals.values()):
             if not pending.future.done():
-                goal.publish_feedback(_feedback(self._action, pending.ticket))
+                goal.publish_feedback(_feedback(self._action, pending.state))
 
 
 def fill_plan(response: Any, request: Any, outcome: Outcome) -> None:
@@ -133,12 +133,12 @@ def fill_search(response: Any, request: Any, outcome: Outcome) -> None:
     fill_response(response, outcome.search or search_without_result(request))
 
 
-def _feedback(action: Any, ticket: RequestState) -> Any:
-    progress = ticket.progress
+def _feedback(action: Any, state: RequestState) -> Any:
+    progress = state.progress
     return action.Feedback(
         phase=progress.phase, iteration=int(progress.iteration),
         residual=float(progress.residual), payload=float(progress.payload),
-        elapsed=duration_message(ticket.elapsed_ns), intervals=int(progress.intervals))
+        elapsed=duration_message(state.elapsed_ns), intervals=int(progress.intervals))
 
 
 def _key(goal: ServerGoalHandle) -> bytes:

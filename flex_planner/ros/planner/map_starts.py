@@ -35,7 +35,7 @@ class Starts:
     """
 
     def __init__(self, store: str, arm: Arm) -> None:
-        self._map = _loaded(store, arm) if store else None
+        self._map = _load_map(store, arm) if store else None
 
     def __len__(self) -> int:
         """Return the number of motions."""
@@ -52,12 +52,12 @@ class Starts:
             return None
 
 
-def _loaded(store: str, arm: Arm) -> MapStarts:
+def _load_map(store: str, arm: Arm) -> MapStarts:
     try:
         from flex_planner.maps.map_starts import MapStarts
     except ImportError as error:
-        raise FlexPlannerError(f'map_store is {store!r}, but to read maps takes '
-                               f"pip install 'flex_planner[maps]' ({error})") from error
+        raise FlexPlannerError(f'map_store is {store!r}, but the packages that read maps are '
+                               f"missing: pip install 'flex_planner[maps]' ({error})") from error
     try:
         return MapStarts(Path(store), arm)
     except FlexPlannerError as error:

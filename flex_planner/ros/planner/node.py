@@ -11,15 +11,16 @@ from flex_planner.ros.messages.plans import duration_seconds
 from flex_planner.ros.planner.diagnostics import Diagnostics, Record
 from flex_planner.ros.planner.endpoints import Endpoint, fill_plan, fill_search, RequestHandlers
 from flex_planner.ros.planner.map_starts import Starts
+from flex_planner.ros.planner.outcome import Outcome, unknown_failure
 from flex_planner.ros.planner.recorder import OutcomeRecorder
-from flex_planner.ros.planner.request_planner import Outcome, Planning, unknown_failure
+from flex_planner.ros.planner.request_planner import RequestPlanner
 from flex_planner.ros.planner.request_queue import PendingRequest, RequestQueue, Work
 from flex_planner.ros.planner.streamer import Streamer
 from flex_planner.ros.runtime.parameters import (
+    apply_changes,
     declare,
     declare_arm,
     judge_changes,
-    validated_changes,
 )
 from flex_planner.ros.runtime.running import run_node
 from flex_planner.ros.settings.planner import PlannerSettings
@@ -74,46 +75,46 @@ class PlannerNode(Node):  # type: ignore[misc]
         self.get_logger().info(f'preparing the dynamics of {arm.name}')
         starts = Starts(self._settings.map_store, arm)
         if self._settings.map_store:
-            self.get_logger().info(f'{len(starts)} motions of {self._settings.map_store} are '
-                                   'there to start from')
-        self._planning = Planning(
+            self.get_logger().info(f'requests may start from {len(starts)} motions of '
+                                   f'{self._settings.map_store}')
+        self._planner = RequestPlanner(
             ArmModel(arm), OutcomeRecorder(arm, self.get_fully_qualified_name()), starts)
-        self._desk = RequestQueue(self._settings.queue_length)
+        self._queue = RequestQueue(self._settings.queue_length)
         self._joints = self.create_publisher(JointTrajectory, '~/joint_trajectory', LATCHED)
         self._flexible = self.create_publisher(
             FlexibleTrajectory, '~/flexible_trajectory', LATCHED)
         self._markers = self.create_publisher(MarkerArray, '~/markers', LATCHED)
         self._record = Record()
-        self._diagnostics = Diagnostics(self, self._desk, self._record, self._streamer,
+        self._diagnostics = Diagnostics(self, self._queue, self._record, self._streamer,
                                         self._joints, arm.name)
         self._endpoints = self._create_endpoints()
         self._streamer.wait_until_ready()
         self.get_logger().info(f'ready to plan for {arm.name}')
 
     def _create_endpoints(self) -> list[Endpoint]:
-        counter = RequestHandlers(self._submit, self._desk.withdraw, self._conclude)
-        plan, search = self._planning.plan, self._planning.find_max_payload
+        handlers = RequestHandlers(self._submit, self._queue.withdraw, self._conclude)
+        plan, search = self._planner.plan, self._planner.find_max_payload
         return [
-            Endpoint(self, '~/plan_path', (PlanPath, action.PlanPath), counter,
-                     lambda request, ticket: plan(request.task, ticket), fill_plan),
-            Endpoint(self, '~/find_max_payload', (FindMaxPayload, action.FindMaxPayload), counter,
+            Endpoint(self, '~/plan_path', (PlanPath, action.PlanPath), handlers,
+                     lambda request, state: plan(request.task, state), fill_plan),
+            Endpoint(self, '~/find_max_payload', (FindMaxPayload, action.FindMaxPayload), handlers,
                      search, fill_search)]
 
     def _judge_parameters(self, changes: list[Parameter]) -> SetParametersResult:
         return judge_changes(self._settings, changes)
 
     def _apply_parameters(self, changes: list[Parameter]) -> None:
-        self._settings = validated_changes(self._settings, changes)
+        self._settings = apply_changes(self._settings, changes)
 
     def _submit(self, work: Work) -> PendingRequest:
-        return self._desk.submit(work, self._settings, self.executor)
+        return self._queue.submit(work, self._settings, self.executor)
 
     async def _conclude(self, pending: PendingRequest, task: MotionTask) -> Outcome:
-        """Return what a request led to: an exception here would end the node."""
+        """Return the outcome of a request; an exception here would end the node."""
         try:
             outcome: Outcome = await pending.future
             if task.publish and outcome.publishable:
-                self._publish(outcome, pending.ticket.settings)
+                self._publish(outcome, pending.state.settings)
         except Exception as error:
             self.get_logger().error(f'a request failed: {type(error).__name__}: {error}')
             outcome = unknown_failure(error)
@@ -146,15 +147,15 @@ class PlannerNode(Node):  # type: ignore[misc]
             self.get_logger().warning(f'error {report.error_code}: {report.error_msg}')
 
     def destroy_node(self) -> Any:
-        """Extremal the streamer and the worker, then the node."""
+        """Stop the streamer and the worker, then the node."""
         self._streamer.close()
-        if not self._desk.close(_STOP_TIMEOUT):
-            self._planning.abandon()
+        if not self._queue.close(_STOP_TIMEOUT):
+            self._planner.abandon()
         return super().destroy_node()
 
 
 def main(args: list[str] | None = None) -> None:
-    """Run the planner node until it is told to stop."""
+    """Run the planner node until a signal ends it."""
     sys.setswitchinterval(_SWITCH_INTERVAL)
     run_node(PlannerNode, 'flex_planner', args)
 

@@ -1,8 +1,7 @@
-"""What the planner node puts into a recording of one request."""
+"""The contents of the recording of one request."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from datetime import datetime, timezone
 import itertools
 from pathlib import Path
@@ -22,20 +21,17 @@ from flex_planner.recording import (
     Topic,
 )
 from flex_planner.ros.messages.plans import reference_state
+from flex_planner.ros.planner.outcome import Outcome
+from flex_planner.ros.planner.request_state import RequestState
 from flex_planner.ros.runtime.parameters import as_mapping
 from flex_planner.ros.settings.planner import PlannerSettings
-from flex_planner_interfaces.msg import (
-    FlexibleTrajectory,
-    MotionTask,
-    PayloadSearch,
-    PlanReport,
-)
+from flex_planner_interfaces.msg import MotionTask, PayloadSearch
 import yaml
 
 
 class OutcomeRecorder:
     """
-    Writes one recording a request.
+    Writes one recording per request.
 
     The request comes first, at the time it was accepted; report and trajectories follow when
     they were ready, then the samples at the times a controller would reach them.
@@ -64,33 +60,20 @@ class OutcomeRecorder:
         self._states = Topic(f'{namespace}/reference_states', 'sensor_msgs/msg/JointState',
                              DEFAULT)
 
-    def write(self, settings: PlannerSettings, stamp: int, task: MotionTask, report: PlanReport,
-              trajectory: FlexibleTrajectory, plan: Plan | None, reference: SampledPlan | None,
-              canceled: Callable[[], bool], *, search: PayloadSearch | None = None) -> Path:
+    def write(self, task: MotionTask, state: RequestState, outcome: Outcome) -> Path:
         """
         Write a recording and return its folder.
 
         Parameters
         ----------
-        settings : PlannerSettings
-            Parameters at the request, kept in an attachment; they tell where it goes and from
-            which size on it is split.
-        stamp : int
-            When the request was accepted [ns since 1970].
         task : MotionTask
             The request.
-        report : PlanReport
-            Its outcome; the recording's path is entered.
-        trajectory : FlexibleTrajectory
-            The plan as it is published.
-        plan : Plan or None
-            None where none was made.
-        reference : SampledPlan or None
-            Samples of the plan.
-        canceled : callable
-            Returns True once writing should stop, which is an error.
-        search : PayloadSearch, optional
-            Where the request was for a maximum payload; the folder's name says so.
+        state : RequestState
+            Of the request. The settings are kept in an attachment; they also give the folder and
+            the size at which the recording is split. Once it is stopping, writing is an error.
+        outcome : Outcome
+            Of the request; the recording's path is entered into the report. A search for the
+            maximum payload gives the folder another name.
 
         Raises
         ------
@@ -98,8 +81,9 @@ class OutcomeRecorder:
             If it cannot be written; nothing is left behind then.
 
         """
+        settings, stamp, report = state.settings, state.stamp_ns, outcome.report
         ready = stamp + report.planning_time.sec * 10**9 + report.planning_time.nanosec
-        path = settings.output_folder() / self._name(stamp, search)
+        path = settings.output_folder() / self._name(stamp, outcome.search)
         report.recording = str(path)
         with Recording.create(path.parent, path.name, self._types,
                               custom_data={'flex_planner': __version__},
@@ -108,19 +92,20 @@ class OutcomeRecorder:
                              media_type='application/yaml', time_ns=stamp)
             recording.write(self._task, task, stamp)
             recording.write(self._report, report, ready)
-            if search is not None:
-                recording.write(self._search, search, ready)
-            if plan is not None and reference is not None:
-                recording.write(self._joints, trajectory.joint_trajectory, ready)
-                recording.write(self._flexible, trajectory, ready)
-                self._write_states(recording, settings, plan, reference, ready, canceled)
+            if outcome.search is not None:
+                recording.write(self._search, outcome.search, ready)
+            if outcome.plan is not None and outcome.reference is not None:
+                recording.write(self._joints, outcome.trajectory.joint_trajectory, ready)
+                recording.write(self._flexible, outcome.trajectory, ready)
+                self._write_states(recording, state, outcome.plan, outcome.reference, ready)
         return path
 
-    def _write_states(self, recording: Recording, settings: PlannerSettings, plan: Plan,
-                      reference: SampledPlan, ready: int, canceled: Callable[[], bool]) -> None:
-        names = [*settings.joint_names, *plan.arm.modal_names]
+    def _write_states(self, recording: Recording, state: RequestState, plan: Plan,
+                      reference: SampledPlan, ready: int) -> None:
+        """Write the samples of a plan that is ready at a time [ns]."""
+        names = [*state.settings.joint_names, *plan.arm.modal_names]
         for k, time in enumerate(reference.times_ns):
-            if canceled():
+            if state.stopping():
                 raise RecordingError(f'writing stopped after {k} of {len(reference.times_ns)} '
                                      'samples')
             stamp = ready + int(time)

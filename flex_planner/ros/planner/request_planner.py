@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 import logging
 from pathlib import Path
 import shutil
 
 from flex_planner.base.errors import FlexPlannerError, InvalidTaskError
-from flex_planner.base.progress import Monitor, StoppedError, StopReason
+from flex_planner.base.progress import Monitor, StoppedError
 from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_path
-from flex_planner.planning.sampling import sample_plan, SampledPlan
+from flex_planner.planning.sampling import sample_plan
 from flex_planner.planning.strategies.initial_guesses import WARM_START
 from flex_planner.ros.messages.payload_searches import (
     report_from_search,
@@ -26,16 +26,16 @@ from flex_planner.ros.messages.payload_searches import (
 from flex_planner.ros.messages.plans import (
     duration_message,
     error_code,
-    failure_report,
     objectives_from_message,
     planning_time_limit,
     report_from_plan,
-    reported_trajectory,
+    report_trajectory,
     STOP_CODES,
     task_from_message,
 )
 from flex_planner.ros.messages.trajectory_rules import trajectory_violations
 from flex_planner.ros.planner.map_starts import Starts
+from flex_planner.ros.planner.outcome import failure_outcome, Outcome, unknown_failure
 from flex_planner.ros.planner.recorder import OutcomeRecorder
 from flex_planner.ros.planner.request_state import RequestState
 from flex_planner.ros.settings.planner import PlannerSettings
@@ -50,37 +50,7 @@ from flex_planner_interfaces.srv import FindMaxPayload
 _LOG = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Outcome:
-    """
-    What a request led to.
-
-    Attributes
-    ----------
-    report : PlanReport
-        Always filled.
-    trajectory : FlexibleTrajectory
-        Empty unless there is a plan.
-    plan, reference : Plan, Reference or None
-        What the trajectory was made of.
-    search : PayloadSearch or None
-        What came of a search for the maximum payload.
-
-    """
-
-    report: PlanReport
-    trajectory: FlexibleTrajectory
-    plan: Plan | None = None
-    reference: SampledPlan | None = None
-    search: PayloadSearch | None = None
-
-    @property
-    def publishable(self) -> bool:
-        """Whether a controller may have the trajectory."""
-        return bool(self.report.error_code == PlanReport.NONE)
-
-
-class Planning:
+class RequestPlanner:
     """
     Plans requests for one arm; never raises.
 
@@ -99,9 +69,9 @@ class Planning:
                  starts: Starts | None = None) -> None:
         self._model, self._recorder = model, recorder
         self._starts = Starts('', model.arm) if starts is None else starts
-        self._recorded_now: PlanReport | None = None
+        self._report_in_work: PlanReport | None = None
 
-    def plan(self, message: MotionTask, ticket: RequestState) -> Outcome:
+    def plan(self, message: MotionTask, state: RequestState) -> Outcome:
         """
         Plan a request and record it with its outcome.
 
@@ -109,13 +79,13 @@ class Planning:
         ----------
         message : MotionTask
             The request.
-        ticket : RequestState
+        state : RequestState
             What it is served with.
 
         """
-        settings = ticket.settings
+        settings = state.settings
 
-        def planned(task: Task, monitor: Monitor) -> Outcome:
+        def plan_task(task: Task, monitor: Monitor) -> Outcome:
             monitor.payload = task.payload_mass
             cell = self._starts.near(task, searched=False)
             plan = plan_path(task, model=self._model, solver=settings.solver(),
@@ -126,9 +96,9 @@ class Planning:
                 report.map_cell = cell.place
             return _outcome(report, plan, settings, monitor)
 
-        return self._concluded(planned, message, ticket)
+        return self._conclude(plan_task, message, state)
 
-    def find_max_payload(self, request: FindMaxPayload.Request, ticket: RequestState) -> Outcome:
+    def find_max_payload(self, request: FindMaxPayload.Request, state: RequestState) -> Outcome:
         """
         Find the maximum payload, plan the motion with it, and record both.
 
@@ -136,16 +106,16 @@ class Planning:
         ----------
         request : FindMaxPayload.Request
             The request, or the goal of the action, which has the same fields.
-        ticket : RequestState
+        state : RequestState
             What it is served with.
 
         """
-        settings = ticket.settings
+        settings = state.settings
 
-        def searched(task: Task, monitor: Monitor) -> Outcome:
+        def search_payload(task: Task, monitor: Monitor) -> Outcome:
             if objectives_from_message(request.task) is not None:
-                raise InvalidTaskError('objectives such as max_joint_speeds do not go with a '
-                                       'search for the maximum payload')
+                raise InvalidTaskError('objectives such as max_joint_speeds cannot be combined '
+                                       'with a search for the maximum payload: leave them out')
             options = search_options(request, settings)
             cell = self._starts.near(task, searched=True)
             found = find_max_payload(
@@ -158,46 +128,44 @@ class Planning:
             outcome = _outcome(report, found.plan, settings, monitor)
             return replace(outcome, search=search_message(found, options))
 
-        return self._concluded(searched, request.task, ticket, search_without_result(request))
+        return self._conclude(search_payload, request.task, state, search_without_result(request))
 
     def abandon(self) -> None:
         """Remove what is left of a recording that another thread had no time to finish."""
-        report = self._recorded_now
+        report = self._report_in_work
         path = Path(report.recording) if report and report.recording else None
         for stage in path.parent.glob(f'.{path.name}.*') if path else ():
             shutil.rmtree(stage, ignore_errors=True)
 
-    def _concluded(self, work: Callable[[Task, Monitor], Outcome], message: MotionTask,
-                   ticket: RequestState, search: PayloadSearch | None = None) -> Outcome:
+    def _conclude(self, work: Callable[[Task, Monitor], Outcome], message: MotionTask,
+                  state: RequestState, search: PayloadSearch | None = None) -> Outcome:
         """Do the work of a request and record its outcome, with `search` where it failed."""
         try:
-            ticket.report(replace(ticket.progress, phase='start'))
-            task = task_from_message(message, self._model.arm, ticket.settings)
-            monitor = Monitor(time_limit=planning_time_limit(message, ticket.settings),
-                              canceled=ticket.canceled, report=ticket.report)
+            state.report(replace(state.progress, phase='start'))
+            task = task_from_message(message, self._model.arm, state.settings)
+            monitor = Monitor(time_limit=planning_time_limit(message, state.settings),
+                              canceled=state.is_canceled, report=state.report)
             outcome = work(task, monitor)
         except FlexPlannerError as error:
-            outcome = _failure(error_code(error), str(error))
+            outcome = failure_outcome(error_code(error), str(error))
         except StoppedError as stop:
-            outcome = _failure(STOP_CODES[stop.reason], stop.reason.value)
+            outcome = failure_outcome(STOP_CODES[stop.reason], stop.reason.value)
         except Exception as error:
             _LOG.exception('planning failed')
             outcome = unknown_failure(error)
         outcome = replace(outcome, search=outcome.search or search)
-        outcome.report.planning_time = duration_message(ticket.elapsed_ns)
-        return self._recorded(message, ticket, outcome)
+        outcome.report.planning_time = duration_message(state.elapsed_ns)
+        return self._record(message, state, outcome)
 
-    def _recorded(self, message: MotionTask, ticket: RequestState, outcome: Outcome) -> Outcome:
+    def _record(self, message: MotionTask, state: RequestState, outcome: Outcome) -> Outcome:
         """Record an outcome; a plan that cannot be recorded is a failure with a trajectory."""
         # a node that ends has no time to record what it gave up
-        given_up = outcome.report.error_code == PlanReport.CANCELED and ticket.stopping()
-        if not ticket.settings.record or given_up:
+        given_up = outcome.report.error_code == PlanReport.CANCELED and state.stopping()
+        if not state.settings.record or given_up:
             return outcome
-        self._recorded_now = outcome.report
+        self._report_in_work = outcome.report
         try:
-            path = self._recorder.write(
-                ticket.settings, ticket.stamp_ns, message, outcome.report, outcome.trajectory,
-                outcome.plan, outcome.reference, ticket.stopping, search=outcome.search)
+            path = self._recorder.write(message, state, outcome)
         except Exception as error:
             extrapolate_extremal = isinstance(error, FlexPlannerError)
             _LOG.error('recording failed: %s', error, exc_info=not extrapolate_extremal)
@@ -208,7 +176,7 @@ class Planning:
             outcome.report.error_msg = f'the plan could not be recorded: {error}'
             return outcome
         finally:
-            self._recorded_now = None
+            self._report_in_work = None
         outcome.report.recording = str(path)
         return outcome
 
@@ -219,30 +187,8 @@ def _outcome(report: PlanReport, plan: Plan | None, settings: PlannerSettings,
     if plan is None or report.error_code != PlanReport.NONE:
         return Outcome(report=report, trajectory=FlexibleTrajectory(), plan=plan)
     reference = sample_plan(plan, settings.sampling(), monitor)
-    trajectory = reported_trajectory(report, plan, reference, settings)
+    trajectory = report_trajectory(report, plan, reference, settings)
     broken = trajectory_violations(trajectory.joint_trajectory, settings.joint_names)
     if broken:
         raise RuntimeError(f'the trajectory would be refused: {"; ".join(broken)}')
     return Outcome(report=report, trajectory=trajectory, plan=plan, reference=reference)
-
-
-def _failure(code: int, sentence: str) -> Outcome:
-    return Outcome(report=failure_report(code, sentence), trajectory=FlexibleTrajectory())
-
-
-def unknown_failure(error: Exception) -> Outcome:
-    """Return the outcome of an exception that nobody foresaw."""
-    return _failure(PlanReport.UNKNOWN, f'{type(error).__name__}: {error}')
-
-
-def canceled(ticket: RequestState) -> Outcome:
-    """Return the outcome of a request that its client gave up."""
-    outcome = _failure(PlanReport.CANCELED, StopReason.CANCELED.value)
-    outcome.report.planning_time = duration_message(ticket.elapsed_ns)
-    return outcome
-
-
-def busy(queue_length: int) -> Outcome:
-    """Return the outcome of a request that finds the queue full."""
-    return _failure(PlanReport.BUSY, f'{queue_length} requests are waiting already; '
-                                     'the parameter queue_length allows no more')

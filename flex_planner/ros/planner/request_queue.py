@@ -1,4 +1,4 @@
-"""Where requests are handed in and their outcomes are waited for, without blocking callbacks."""
+"""The queue of requests, whose outcomes are awaited without blocking callbacks."""
 
 from __future__ import annotations
 
@@ -6,7 +6,12 @@ from collections.abc import Callable
 from functools import partial
 import threading
 
-from flex_planner.ros.planner.request_planner import busy, canceled, Outcome, unknown_failure
+from flex_planner.ros.planner.outcome import (
+    busy_outcome,
+    canceled_outcome,
+    Outcome,
+    unknown_failure,
+)
 from flex_planner.ros.planner.request_state import RequestState
 from flex_planner.ros.planner.worker import Job, Worker
 from flex_planner.ros.settings.planner import PlannerSettings
@@ -22,15 +27,15 @@ class PendingRequest:
 
     Parameters
     ----------
-    ticket : RequestState
+    state : RequestState
         Of the request.
     executor : Executor
         Runs what awaits `future`.
 
     """
 
-    def __init__(self, ticket: RequestState, executor: Executor) -> None:
-        self.ticket, self.future = ticket, Future(executor=executor)
+    def __init__(self, state: RequestState, executor: Executor) -> None:
+        self.state, self.future = state, Future(executor=executor)
         self.job: Job | None = None
         self._executor, self._lock = executor, threading.Lock()
 
@@ -62,14 +67,14 @@ class RequestQueue:
 
     @property
     def waiting(self) -> int:
-        """How many requests wait."""
+        """Return the number of waiting requests."""
         return self._worker.waiting
 
     @property
     def active(self) -> RequestState | None:
-        """Return what is at work, None if nothing is."""
+        """Return the state of the request at work, None if there is none."""
         active = self._active
-        return active.ticket if active else None
+        return active.state if active else None
 
     def submit(self, work: Work, settings: PlannerSettings, executor: Executor) -> PendingRequest:
         """
@@ -85,33 +90,33 @@ class RequestQueue:
             Runs what awaits the outcome.
 
         """
-        ticket = RequestState(settings=settings, stopping=lambda: self._worker.stopping)
-        pending = PendingRequest(ticket, executor)
+        state = RequestState(settings=settings, stopping=lambda: self._worker.stopping)
+        pending = PendingRequest(state, executor)
         pending.job = partial(self._serve, work, pending)
         if not self._worker.submit(pending.job):
-            pending.conclude(busy(self._queue_length))
+            pending.conclude(busy_outcome(self._queue_length))
         return pending
 
     def withdraw(self, pending: PendingRequest) -> None:
         """
-        Cancel a request, whose outcome is there at once.
+        Cancel a request and conclude it at once.
 
-        A solver that works on it gives up at its next iteration.
+        A solver that works on it stops at its next iteration.
 
         """
-        pending.ticket.withdrawn = True
+        pending.state.withdrawn = True
         if pending.job is not None:
             self._worker.withdraw(pending.job)
-        pending.conclude(canceled(pending.ticket))
+        pending.conclude(canceled_outcome(pending.state))
 
     def close(self, timeout: float) -> bool:
-        """Take no more, tell the one at work to give up, and return whether it did [s]."""
+        """Take no more, stop the one at work, and return whether it ended in time [s]."""
         return self._worker.stop(timeout)
 
     def _serve(self, work: Work, pending: PendingRequest) -> None:
         self._active = pending
         try:
-            outcome = work(pending.ticket)
+            outcome = work(pending.state)
         except Exception as error:
             outcome = unknown_failure(error)
         finally:

@@ -10,7 +10,7 @@ import time
 from flex_planner.base.progress import Progress
 from flex_planner.ros.settings.planner import PlannerSettings
 
-_WAITING = Progress(phase='waiting for the requests before', iteration=0, residual=math.inf,
+_WAITING = Progress(phase='waiting for earlier requests', iteration=0, residual=math.inf,
                     intervals=0)
 
 
@@ -52,8 +52,8 @@ class RequestState:
         """Time since it was accepted [ns]."""
         return time.monotonic_ns() - self.accepted_ns
 
-    def canceled(self) -> bool:
-        """Return whether to give up."""
+    def is_canceled(self) -> bool:
+        """Return whether to stop working on it."""
         return self.withdrawn or self.stopping()
 
     def report(self, progress: Progress) -> None:

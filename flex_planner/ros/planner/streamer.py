@@ -32,7 +32,7 @@ class Streamer:
 
     def __init__(self, node: Node) -> None:
         self._node = node
-        self._process = self._started()
+        self._process = self._start_process()
 
     def wait_until_ready(self) -> None:
         """Wait for the process to be there; it says one word, or ends."""
@@ -55,7 +55,7 @@ class Streamer:
 
     @property
     def failure(self) -> str:
-        """Return why nothing can be streamed, empty while the process runs."""
+        """Return the reason why nothing can be streamed, empty while the process runs."""
         code = self._process.poll()
         return '' if code is None else (
             f'the process that streams ~/reference_states {_end(code)}; it is started again with '
@@ -74,9 +74,9 @@ class Streamer:
                 self._write(data)
                 return
         self._node.get_logger().warning(
-            'the process that streams ~/reference_states is gone: it is started again')
+            'the process that streams ~/reference_states has ended: starting it again')
         self.close()
-        self._process = self._started()
+        self._process = self._start_process()
         self._write(data)
 
     def _write(self, data: bytes) -> None:
@@ -84,7 +84,7 @@ class Streamer:
             self._process.stdin.write(data)
             self._process.stdin.flush()
 
-    def _started(self) -> subprocess.Popen[bytes]:
+    def _start_process(self) -> subprocess.Popen[bytes]:
         node, topic = self._node, self._node.resolve_topic_name('~/reference_states')
         return subprocess.Popen(
             [sys.executable, '-m', 'flex_planner.ros.reference_states',
@@ -93,7 +93,7 @@ class Streamer:
 
 
 def _end(code: int) -> str:
-    """Return in words how a process ended that had this exit code."""
+    """Return the end of a process in words, from its exit code."""
     if code >= 0:
         return f'has ended with code {code}'
     with suppress(ValueError):

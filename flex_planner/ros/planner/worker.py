@@ -41,7 +41,7 @@ class Worker:
 
     @property
     def waiting(self) -> int:
-        """How many jobs wait."""
+        """Return the number of waiting jobs."""
         return len(self._jobs)
 
     def submit(self, job: Job) -> bool:

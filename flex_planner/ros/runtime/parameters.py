@@ -46,8 +46,8 @@ class Description:
         return descriptor
 
 
-def described(default: Any, text: str, *, lowest: float | None = None,
-              highest: float | None = None, read_only: bool = False) -> Any:
+def parameter_field(default: Any, text: str, *, lowest: float | None = None,
+                    highest: float | None = None, read_only: bool = False) -> Any:
     """Return a dataclass field that is a parameter."""
     description = Description(text=text, lowest=lowest, highest=highest, read_only=read_only)
     metadata = {'description': description}
@@ -106,7 +106,7 @@ def declare_arm(node: Node) -> Arm:
     return load_arm(name)
 
 
-def validated_changes(settings: Settings, changes: list[Parameter]) -> Settings:
+def apply_changes(settings: Settings, changes: list[Parameter]) -> Settings:
     """
     Return the settings with changed parameters; those of others (use_sim_time) are ignored.
 
@@ -124,7 +124,7 @@ def validated_changes(settings: Settings, changes: list[Parameter]) -> Settings:
 def judge_changes(settings: Any, changes: list[Parameter]) -> SetParametersResult:
     """Return whether changed parameters are acceptable, with the reason if not."""
     try:
-        validated_changes(settings, changes)
+        apply_changes(settings, changes)
     except FlexPlannerError as error:
         return SetParametersResult(successful=False, reason=str(error))
     return SetParametersResult(successful=True)

@@ -1,1 +1,1 @@
-"""."""
+"""The parameters of the nodes, each with its description, range and default."""

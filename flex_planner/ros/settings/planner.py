@@ -12,7 +12,7 @@ from flex_planner.base.validation import vector
 from flex_planner.collocation import Solver, SolverSettings
 from flex_planner.optimal_control.task import MAX_PAYLOAD
 from flex_planner.planning.sampling import SamplingSettings
-from flex_planner.ros.runtime.parameters import described
+from flex_planner.ros.runtime.parameters import parameter_field
 
 # of the largest payload [kg]
 MIN_ACCURACY, MAX_ACCURACY = 1e-6, 1e3
@@ -23,7 +23,7 @@ MIN_RECORDING_SIZE, MAX_RECORDING_SIZE = 2**16, 2**40
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlannerSettings:
     """
-    A snapshot of the node's parameters; each request is served with the one at its arrival.
+    The node's parameters; a request uses those at the time of its arrival.
 
     Raises
     ------
@@ -32,56 +32,56 @@ class PlannerSettings:
 
     """
 
-    elbow: int = described(
-        -1, 'Sign of the second joint angle, +1 or -1, where a request leaves elbow at 0.',
+    elbow: int = parameter_field(
+        -1, 'Sign of the second joint angle, +1 or -1, for requests whose elbow is 0.',
         lowest=-1, highest=1)
-    tolerance: float = described(
+    tolerance: float = parameter_field(
         1e-3, 'eps of eq. (17): largest half squared error of the final state.',
         lowest=1e-9, highest=1.0)
-    allowed_planning_time: float = described(
+    allowed_planning_time: float = parameter_field(
         30.0, 'Time limit of a request that sets none [s].', lowest=1e-3, highest=3600.0)
-    effort_weights: list[float] = described(
-        [1.0], 'Diagonal of R where a request gives none: one entry a joint.')
-    payload_accuracy: float = described(
-        1e-3, 'Largest error of a maximum payload where a request gives none [kg].',
+    effort_weights: list[float] = parameter_field(
+        [1.0], 'Diagonal of R for requests that give none: one entry per joint.')
+    payload_accuracy: float = parameter_field(
+        1e-3, 'Largest error of a maximum payload, for requests that give none [kg].',
         lowest=MIN_ACCURACY, highest=MAX_ACCURACY)
-    payload_step: float = described(
-        1.0, 'First step of the incremental search for it where a request gives none; where that '
-        'is less than the accuracy, the accuracy counts [kg].',
+    payload_step: float = parameter_field(
+        1.0, 'First step of the incremental search for a maximum payload, for requests that give '
+        'none; at least the accuracy is used [kg].',
         lowest=MIN_ACCURACY, highest=MAX_PAYLOAD)
-    joint_names: list[str] = described(
+    joint_names: list[str] = parameter_field(
         ['joint1'], 'Names of the joints in trajectories, from the base outwards.',
         read_only=True)
-    base_frame: str = described('base_link', 'Frame of tip paths.', read_only=True)
-    stages: int = described(
+    base_frame: str = parameter_field('base_link', 'Frame of tip paths.', read_only=True)
+    stages: int = parameter_field(
         8, 'Gauss points in a mesh interval; the order is twice that.', lowest=2, highest=11)
-    intervals: int = described(20, 'Intervals of the first mesh.', lowest=4, highest=20000)
-    max_intervals: int = described(
+    intervals: int = parameter_field(20, 'Intervals of the first mesh.', lowest=4, highest=20000)
+    max_intervals: int = parameter_field(
         2000, 'Most intervals of a mesh.', lowest=4, highest=20000)
-    max_iterations: int = described(
-        60, 'Newton iterations on one mesh.', lowest=1, highest=1000)
-    error_tolerance: float = described(
+    max_iterations: int = parameter_field(
+        60, 'Most Newton iterations on one mesh.', lowest=1, highest=1000)
+    error_tolerance: float = parameter_field(
         1e-6, 'Largest estimated error of states and costates relative to their magnitude.',
         lowest=1e-11, highest=1.0)
-    sampling_step: float = described(
+    sampling_step: float = parameter_field(
         0.01, 'Longest time between published samples [s].', lowest=2.5e-4, highest=1.0)
-    torque_tolerance: float = described(
-        0.02, 'Samples get closer until linear interpolation of the torque is this exact [N m].',
+    torque_tolerance: float = parameter_field(
+        0.02, 'Largest error of linear interpolation of the torque between the samples [N m].',
         lowest=1e-6, highest=1e6)
-    reference_rate: float = described(
-        100.0, 'States a second that are streamed along a published plan [Hz].', lowest=1.0,
+    reference_rate: float = parameter_field(
+        100.0, 'Rate of the states that are streamed along a published plan [Hz].', lowest=1.0,
         highest=1000.0)
-    map_store: str = described(
-        '', 'Store of a map of this arm that flex-planner map has made: requests near one of its '
-        'cells start from the motion there. Empty for none.', read_only=True)
-    queue_length: int = described(
+    map_store: str = parameter_field(
+        '', 'Store of a map of this arm, made by flex-planner map: requests near one of its cells '
+        'start from the motion of that cell. Empty for none.', read_only=True)
+    queue_length: int = parameter_field(
         8, 'Requests that may wait; more are answered BUSY.', lowest=1, highest=1000,
         read_only=True)
-    recording_folder: str = described(
+    recording_folder: str = parameter_field(
         '', 'Folder of the recordings; empty for $ROS_HOME/flex_planner.', read_only=True)
-    record: bool = described(True, 'Whether to record every request with its outcome.')
-    max_recording_size: int = described(
-        0, 'Size from which on a recording continues in another file, at least 65536 [bytes]; 0: '
+    record: bool = parameter_field(True, 'Whether to record every request with its outcome.')
+    max_recording_size: int = parameter_field(
+        0, 'Size at which a recording continues in another file, at least 65536 [bytes]; 0: '
         'recordings are never split.', lowest=0, highest=MAX_RECORDING_SIZE)
 
     def __post_init__(self) -> None:
@@ -115,12 +115,12 @@ class PlannerSettings:
             max_iterations=self.max_iterations, error_tolerance=self.error_tolerance))
 
     def sampling(self) -> SamplingSettings:
-        """Return how trajectories are sampled."""
+        """Return the settings of the sampling of trajectories."""
         return SamplingSettings(longest_step=self.sampling_step,
                                 torque_tolerance=self.torque_tolerance)
 
     def output_folder(self) -> Path:
-        """Return where recordings go."""
+        """Return the folder of the recordings."""
         if self.recording_folder:
             return Path(self.recording_folder)
         home = os.environ.get('ROS_HOME') or os.path.join(os.path.expanduser('~'), '.ros')

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from flex_planner.arms.arm import Arm
 from flex_planner.base.validation import vector
-from flex_planner.ros.runtime.parameters import described
+from flex_planner.ros.runtime.parameters import parameter_field
 from flex_planner.simulation.joint_control import Disturbance, Encoder, Gains, MAX_RATE
 from flex_planner.simulation.mismatch import AS_GIVEN, Mismatch
 from flex_planner.simulation.plant import Control
@@ -23,69 +23,69 @@ class SimulatorSettings:
     Raises
     ------
     InvalidValueError
-        If a list does not have one entry a joint, or a value breaks its bound.
+        If a list does not have one entry per joint, or a value breaks its bound.
 
     """
 
-    joint_names: list[str] = described(
+    joint_names: list[str] = parameter_field(
         ['joint1'], 'Names of the joints, from the base outwards.', read_only=True)
-    initial_positions: list[float] = described(
+    initial_positions: list[float] = parameter_field(
         [0.0], 'Joint angles at the start [rad].', read_only=True)
-    payload_mass: float = described(
+    payload_mass: float = parameter_field(
         1.0, 'Mass at the tip of the simulated arm, whatever was planned for [kg].', lowest=0.0,
         highest=_FAR, read_only=True)
-    payload_inertia: float = described(
+    payload_inertia: float = parameter_field(
         0.0, 'Rotary inertia of that mass about the tip [kg m^2].', lowest=0.0, highest=_FAR,
         read_only=True)
-    modes: int = described(
+    modes: int = parameter_field(
         AS_GIVEN, 'Modes of every flexible link; -1: as in the arm file.', lowest=-1, highest=8,
         read_only=True)
-    rigidity_scale: float = described(
+    rigidity_scale: float = parameter_field(
         1.0, 'Factor on the flexural rigidity of every link.', lowest=1e-3, highest=1e3,
         read_only=True)
-    added_friction: list[float] = described(
+    added_friction: list[float] = parameter_field(
         [0.0], 'Viscous friction of each joint beyond that of the arm file [N m s/rad].',
         read_only=True)
-    stiffness: list[float] = described(
+    stiffness: list[float] = parameter_field(
         [100.0], 'Proportional gain of each joint [N m/rad].', read_only=True)
-    damping: list[float] = described(
+    damping: list[float] = parameter_field(
         [10.0], 'Derivative gain of each joint [N m s/rad].', read_only=True)
-    feedforward: bool = described(
+    feedforward: bool = parameter_field(
         True, 'Whether the torques of a trajectory are applied; if not, PD alone moves the arm.',
         read_only=True)
-    limit_torques: bool = described(
+    limit_torques: bool = parameter_field(
         True, 'Whether the motors have the limits of the arm file, eq. (15).', read_only=True)
-    control_rate: float = described(
+    control_rate: float = parameter_field(
         1000.0, 'Rate of the simulated controller [Hz].', lowest=10.0, highest=MAX_RATE,
         read_only=True)
-    encoder_rate: float = described(
+    encoder_rate: float = parameter_field(
         0.0, 'Rate at which the joints are measured [Hz]; 0: that of the controller.',
         lowest=0.0, highest=MAX_RATE, read_only=True)
-    encoder_resolution: float = described(
+    encoder_resolution: float = parameter_field(
         0.0, 'Step of the measured joint angles [rad]; 0: exact.', lowest=0.0, highest=1.0,
         read_only=True)
-    encoder_differences: bool = described(
+    encoder_differences: bool = parameter_field(
         False, 'Whether joint speeds are differences of measured angles; if not, exact.',
         read_only=True)
-    disturbance_joint: int = described(
+    disturbance_joint: int = parameter_field(
         0, 'Joint that a pulse of torque from outside acts on, from 1 at the base; 0: none.',
         lowest=0, highest=8, read_only=True)
-    disturbance_torque: float = described(
+    disturbance_torque: float = parameter_field(
         0.0, 'Torque of the pulse [N m].', lowest=-_FAR, highest=_FAR, read_only=True)
-    disturbance_start: float = described(
+    disturbance_start: float = parameter_field(
         0.0, 'Time from the start of a motion to the pulse [s].', lowest=0.0, highest=_FAR,
         read_only=True)
-    disturbance_duration: float = described(
+    disturbance_duration: float = parameter_field(
         0.0, 'Duration of the pulse [s].', lowest=0.0, highest=_FAR, read_only=True)
-    vibration_window: float = described(
+    vibration_window: float = parameter_field(
         1.0, 'Time after an arrival over which the residual vibration is measured [s].',
         lowest=0.01, highest=100.0, read_only=True)
-    publish_rate: float = described(
+    publish_rate: float = parameter_field(
         100.0, 'Rate of the published states [Hz].', lowest=1.0, highest=1000.0, read_only=True)
-    start_tolerance: float = described(
+    start_tolerance: float = parameter_field(
         0.05, 'A trajectory that starts further from the arm than this is refused [rad].',
         lowest=0.0, highest=10.0, read_only=True)
-    base_frame: str = described('base_link', 'Frame of the tip.', read_only=True)
+    base_frame: str = parameter_field('base_link', 'Frame of the tip.', read_only=True)
 
     def __post_init__(self) -> None:
         count = len(self.joint_names)
@@ -104,13 +104,13 @@ class SimulatorSettings:
 
     @property
     def mismatch(self) -> Mismatch:
-        """Return how the simulated arm differs from that of the arm file."""
+        """Return the differences of the simulated arm from that of the arm file."""
         return Mismatch(modes=self.modes, rigidity_scale=self.rigidity_scale,
                         added_friction=np.asarray(self.added_friction))
 
     @property
     def control(self) -> Control:
-        """Return how the joints are driven."""
+        """Return the control of the joints."""
         return Control(
             gains=Gains(stiffness=np.asarray(self.stiffness), damping=np.asarray(self.damping)),
             rate=self.control_rate, feedforward=self.feedforward,

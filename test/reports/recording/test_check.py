@@ -49,21 +49,21 @@ def test_recorded_plans_pass_their_check(name: str, model: str,
 
 @pytest.mark.parametrize(('change', 'expected'), [
     (lambda motion: {'torques': 1.02 * motion.torques},
-     {'tip error at the end', 'tip off its path', 'torques against eq. (14)'}),
+     {'tip error at the end', 'largest tip deviation', 'torques against eq. (14)'}),
     (lambda motion: {'torques': 3 * motion.torques},
-     {'tip error at the end', 'tip off its path', 'torques against eq. (14)',
+     {'tip error at the end', 'largest tip deviation', 'torques against eq. (14)',
       'boundary error (eq. 17)', 'torque beyond its bounds'}),
     (lambda motion: {'payload_mass': 1.0},
-     {'tip error at the end', 'tip off its path', 'torques against eq. (14)'}),
-    (lambda motion: {'tip': motion.tip + 0.01}, {'tip error at the end', 'tip off its path'}),
-    (lambda motion: {'rates': 1.02 * motion.rates}, {'joints off their path'}),
+     {'tip error at the end', 'largest tip deviation', 'torques against eq. (14)'}),
+    (lambda motion: {'tip': motion.tip + 0.01}, {'tip error at the end', 'largest tip deviation'}),
+    (lambda motion: {'rates': 1.02 * motion.rates}, {'largest joint deviation'}),
     (lambda motion: {'velocity_costates': 0.9 * motion.velocity_costates},
      {'torques against eq. (14)', 'Hamiltonian drift'}),
     (lambda motion: {'torques': np.full_like(motion.torques, 1e200)}, {
-        'tip error at the end', 'tip off its path', 'torques against eq. (14)',
+        'tip error at the end', 'largest tip deviation', 'torques against eq. (14)',
         'boundary error (eq. 17)', 'torque beyond its bounds'}),
     (lambda motion: {'rates': motion.rates + 1e-3}, {
-        'start from rest', 'goal from rest'})])
+        'deviation from rest, start', 'deviation from rest, goal'})])
 def test_every_falsified_plan_is_found_out(request_of_plan: RecordedRequest, ei50_model: ArmModel,
                                            change: Callable[[Any], dict[str, Any]],
                                            expected: set[str]) -> None:
@@ -76,7 +76,7 @@ def test_plan_of_another_task_is_found_out(request_of_plan: RecordedRequest,
     original = request_of_plan.task.goal_point
     request_of_plan.task.goal_point = type(original)(0.5, 0.4, 0.0)
     try:
-        assert failed_findings(request_of_plan, ei50_model) == {'goal from what was asked'}
+        assert failed_findings(request_of_plan, ei50_model) == {'deviation from task, goal'}
     finally:
         request_of_plan.task.goal_point = original
 
@@ -101,7 +101,7 @@ def test_check_obeys_its_monitor_and_needs_a_motion(request_of_plan: RecordedReq
                                                     ei50_model: ArmModel, failure: Path) -> None:
     with pytest.raises(StoppedError):
         check_motion(request_of_plan, ei50_model, Monitor(canceled=lambda: True))
-    with pytest.raises(RecordingError, match='has no motion that could be checked: impossible'):
+    with pytest.raises(RecordingError, match='has no motion to check: impossible'):
         check_motion(RecordedRequest.read(failure))
 
 

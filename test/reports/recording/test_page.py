@@ -41,7 +41,7 @@ def test_report_on_the_command_line(plan: Path, failure: Path, tmp_path: Path,
     assert {path.name for path in tmp_path.iterdir()} == {
         f'{plan.name}.html', f'{failure.name}_0.html'}
     for arguments, complaint in ((['/nowhere'], 'cannot read /nowhere'),
-                                 ([__file__], 'is damaged or no MCAP file'),
+                                 ([__file__], 'is damaged or not an MCAP file'),
                                  ([str(plan), '--output', '/nowhere/x.html'], 'cannot write'),
                                  ([str(failure), '--check'], 'no motion to check: impossible')):
         assert main(['report', *arguments]) == 1

@@ -36,7 +36,7 @@ from flex_planner.ros.messages.plans import (
     STATUS_CODES,
     task_from_message,
 )
-from flex_planner.ros.planner.request_planner import busy, unknown_failure
+from flex_planner.ros.planner.outcome import busy_outcome, unknown_failure
 from flex_planner.ros.settings.planner import PlannerSettings
 from flex_planner_interfaces.msg import MotionTask, PlanReport
 from geometry_msgs.msg import Point
@@ -192,7 +192,7 @@ def test_report_of_a_stopped_plan_has_its_own_code(rigid_arm: Arm, rigid_model: 
 
 def test_outcomes_without_a_plan_are_not_publishable() -> None:
     for outcome, code, word in (
-            (busy(3), PlanReport.BUSY, '3 requests are waiting'),
+            (busy_outcome(3), PlanReport.BUSY, '3 requests are waiting'),
             (unknown_failure(KeyError('x')), PlanReport.UNKNOWN, "KeyError: 'x'")):
         assert not outcome.publishable
         assert outcome.report.error_code == code

@@ -137,7 +137,7 @@ def test_waiting_goal_can_be_canceled_and_leaves_its_place(planner: Planner) -> 
     planner.spin(0.3)
     waiting = planner.plan_goal()
     planner.spin(0.3)
-    assert waiting.feedback[-1][1].phase == 'waiting for the requests before'
+    assert waiting.feedback[-1][1].phase == 'waiting for earlier requests'
     assert waiting.feedback[-1][1].iteration == 0
     assert waiting.cancel()
     assert waiting.end(1.0)[0] == CANCELED

@@ -9,8 +9,9 @@ from typing import Any
 
 from flex_planner.arms.arm import Arm
 from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.ros.planner.outcome import Outcome
 from flex_planner.ros.planner.recorder import OutcomeRecorder
-from flex_planner.ros.planner.request_planner import Outcome, Planning
+from flex_planner.ros.planner.request_planner import RequestPlanner
 from flex_planner.ros.planner.request_state import RequestState
 from flex_planner.ros.settings.planner import PlannerSettings
 from flex_planner_interfaces.msg import PlanReport
@@ -26,17 +27,17 @@ def settings(rigid_arm: Arm, tmp_path: Path) -> PlannerSettings:
 
 
 @pytest.fixture
-def worker(rigid_arm: Arm, rigid_model: ArmModel) -> Planning:
-    return Planning(rigid_model, OutcomeRecorder(rigid_arm, '/flex_planner'))
+def worker(rigid_arm: Arm, rigid_model: ArmModel) -> RequestPlanner:
+    return RequestPlanner(rigid_model, OutcomeRecorder(rigid_arm, '/flex_planner'))
 
 
-def planned(worker: Planning, settings: PlannerSettings, **fields: Any) -> Outcome:
+def plan_task(worker: RequestPlanner, settings: PlannerSettings, **fields: Any) -> Outcome:
     return worker.plan(task(**fields), RequestState(settings=settings))
 
 
 def test_request_with_a_speed_limit_gets_the_weights_that_keep_it(
-        worker: Planning, settings: PlannerSettings) -> None:
-    outcome = planned(worker, settings, max_joint_speeds=[0.8, 0.8])
+        worker: RequestPlanner, settings: PlannerSettings) -> None:
+    outcome = plan_task(worker, settings, max_joint_speeds=[0.8, 0.8])
     report = outcome.report
     assert report.error_code == PlanReport.NONE, report.error_msg
     assert 0.79 < max(report.peak_speeds) <= 0.8
@@ -49,16 +50,16 @@ def test_request_with_a_speed_limit_gets_the_weights_that_keep_it(
     assert outcome.trajectory.points
 
 
-def test_request_without_objectives_keeps_its_weights(worker: Planning,
+def test_request_without_objectives_keeps_its_weights(worker: RequestPlanner,
                                                       settings: PlannerSettings) -> None:
-    report = planned(worker, settings, velocity_weights=[1.0, 2.0]).report
+    report = plan_task(worker, settings, velocity_weights=[1.0, 2.0]).report
     assert list(report.velocity_weights) == [1.0, 2.0]
     assert not report.tried_weights
 
 
 def test_limit_that_cannot_be_kept_is_an_error_without_a_trajectory(
-        worker: Planning, settings: PlannerSettings) -> None:
-    outcome = planned(worker, settings, max_joint_speeds=[0.5, inf])
+        worker: RequestPlanner, settings: PlannerSettings) -> None:
+    outcome = plan_task(worker, settings, max_joint_speeds=[0.5, inf])
     assert outcome.report.error_code == PlanReport.OBJECTIVE_NOT_MET
     assert 'joint 1 reaches 0.55' in outcome.report.error_msg
     assert 'must be <= 0.5' in outcome.report.error_msg
@@ -77,16 +78,16 @@ def test_limit_that_cannot_be_kept_is_an_error_without_a_trajectory(
     ({'max_modal_rates': [0.1]}, PlanReport.INVALID_SIZE,
      'max_modal_rates has 1 entries, but must be empty: the links are rigid')])
 def test_limits_that_make_no_sense_are_refused(
-        worker: Planning, settings: PlannerSettings, fields: dict[str, Any], code: int,
+        worker: RequestPlanner, settings: PlannerSettings, fields: dict[str, Any], code: int,
         text: str) -> None:
-    outcome = planned(worker, settings, **fields)
+    outcome = plan_task(worker, settings, **fields)
     assert (outcome.report.error_code, outcome.report.error_msg) == (code, text)
 
 
-def test_search_for_the_maximum_payload_takes_no_objectives(worker: Planning,
+def test_search_for_the_maximum_payload_takes_no_objectives(worker: RequestPlanner,
                                                             settings: PlannerSettings) -> None:
     request = search_request()
     request.task.max_joint_speeds = [0.8, 0.8]
     outcome = worker.find_max_payload(request, RequestState(settings=settings))
     assert outcome.report.error_code == PlanReport.INVALID_TASK
-    assert 'do not go with a search for the maximum payload' in outcome.report.error_msg
+    assert 'cannot be combined with a search for the maximum payload' in outcome.report.error_msg

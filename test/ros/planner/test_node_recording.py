@@ -18,7 +18,9 @@ from flex_planner.ros.messages.plans import (
     joint_trajectory,
     report_from_plan,
 )
+from flex_planner.ros.planner.outcome import Outcome
 from flex_planner.ros.planner.recorder import OutcomeRecorder
+from flex_planner.ros.planner.request_state import RequestState
 from flex_planner.ros.settings.planner import MIN_RECORDING_SIZE, PlannerSettings
 from flex_planner_interfaces.msg import (
     FlexibleTrajectory,
@@ -306,9 +308,9 @@ def test_every_field_of_a_search_is_read_back(rigid_arm: Arm, tmp_path: Path, re
         front_efforts=[3.0, 4.0], front_prices=[5.0, 6.0], tried_payloads=[7.0, 8.0, 9.0],
         tried_solved=[True, False, True], tried_errors=[1e-9, float('inf'), 0.0])
     settings = replace(PlannerSettings.for_arm(rigid_arm), recording_folder=str(tmp_path))
-    report, trajectory = PlanReport(), FlexibleTrajectory()
     folder = OutcomeRecorder(rigid_arm, NODE).write(
-        settings, STAMP, task(), report, trajectory, None, None, lambda: False, search=sent)
+        task(), RequestState(settings=settings, stamp_ns=STAMP),
+        Outcome(report=PlanReport(), trajectory=FlexibleTrajectory(), search=sent))
     assert folder == tmp_path / 'find_max_payload_20231114T221320_000000005_0001'
     found = only(read(folder), 'payload_search')
     assert found.time == STAMP
@@ -336,9 +338,10 @@ def written(plan: Plan, folder: Path, **changes: Any) -> Path:
     reference = sample_plan(plan, settings.sampling())
     joints = joint_trajectory(reference, settings.joint_names)
     trajectory = flexible_trajectory(plan, reference, joints, settings.base_frame)
+    outcome = Outcome(report=report_from_plan(plan), trajectory=trajectory, plan=plan,
+                      reference=reference)
     return OutcomeRecorder(plan.arm, NODE).write(
-        settings, STAMP, task(), report_from_plan(plan), trajectory, plan, reference,
-        lambda: False)
+        task(), RequestState(settings=settings, stamp_ns=STAMP), outcome)
 
 
 def raw(folder: Path) -> list[tuple[str, int, bytes]]:

@@ -12,8 +12,9 @@ from flex_planner.arms.arm import Arm, Joint
 from flex_planner.base.progress import StoppedError, StopReason
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.ros.planner import request_planner
+from flex_planner.ros.planner.outcome import Outcome
 from flex_planner.ros.planner.recorder import OutcomeRecorder
-from flex_planner.ros.planner.request_planner import Outcome, Planning
+from flex_planner.ros.planner.request_planner import RequestPlanner
 from flex_planner.ros.planner.request_state import RequestState
 from flex_planner.ros.settings.planner import PlannerSettings
 from flex_planner_interfaces.msg import PayloadSearch, PlanReport
@@ -22,8 +23,8 @@ from ros_support import search_request, task
 
 
 @pytest.fixture
-def worker(rigid_arm: Arm, rigid_model: ArmModel) -> Planning:
-    return Planning(rigid_model, OutcomeRecorder(rigid_arm, '/flex_planner'))
+def worker(rigid_arm: Arm, rigid_model: ArmModel) -> RequestPlanner:
+    return RequestPlanner(rigid_model, OutcomeRecorder(rigid_arm, '/flex_planner'))
 
 
 @pytest.fixture
@@ -34,7 +35,7 @@ def settings(rigid_arm: Arm, tmp_path: Path) -> PlannerSettings:
 @pytest.mark.parametrize(('reason', 'code'), [
     (StopReason.TIMEOUT, PlanReport.TIMEOUT), (StopReason.CANCELED, PlanReport.CANCELED)])
 def test_stop_after_the_solve_is_reported_without_a_trajectory(
-        worker: Planning, settings: PlannerSettings, monkeypatch: pytest.MonkeyPatch,
+        worker: RequestPlanner, settings: PlannerSettings, monkeypatch: pytest.MonkeyPatch,
         reason: StopReason, code: int) -> None:
     def stopped(*arguments: Any) -> None:
         raise StoppedError(reason)
@@ -47,7 +48,7 @@ def test_stop_after_the_solve_is_reported_without_a_trajectory(
 
 
 def test_recording_that_is_told_to_stop_leaves_nothing_and_is_not_published(
-        worker: Planning, settings: PlannerSettings, tmp_path: Path,
+        worker: RequestPlanner, settings: PlannerSettings, tmp_path: Path,
         monkeypatch: pytest.MonkeyPatch) -> None:
     told = []  # once the samples are made, everyone is told to stop
     sample = request_planner.sample_plan
@@ -67,7 +68,7 @@ def test_recording_that_is_told_to_stop_leaves_nothing_and_is_not_published(
 
 
 def test_recording_that_is_abandoned_leaves_nothing(
-        worker: Planning, settings: PlannerSettings, tmp_path: Path,
+        worker: RequestPlanner, settings: PlannerSettings, tmp_path: Path,
         monkeypatch: pytest.MonkeyPatch) -> None:
     reached, go_on = threading.Event(), threading.Event()
 
@@ -89,19 +90,19 @@ def test_recording_that_is_abandoned_leaves_nothing(
 
 
 def test_client_that_gives_up_is_recorded_as_canceled(
-        worker: Planning, settings: PlannerSettings, tmp_path: Path) -> None:
+        worker: RequestPlanner, settings: PlannerSettings, tmp_path: Path) -> None:
     outcome = worker.plan(task(), RequestState(settings=settings, withdrawn=True))
     assert outcome.report.error_code == PlanReport.CANCELED
     assert [str(path) for path in tmp_path.iterdir()] == [outcome.report.recording]
 
 
-def test_ticket_tells_how_far_a_plan_is(worker: Planning, settings: PlannerSettings) -> None:
-    ticket = RequestState(settings=replace(settings, record=False))
-    assert ticket.progress.iteration == 0
-    outcome = worker.plan(task(), ticket)
-    assert ticket.progress.iteration == outcome.report.iterations > 0
-    assert ticket.progress.payload == 1.0
-    assert ticket.progress.intervals == outcome.report.mesh_intervals
+def test_ticket_tells_how_far_a_plan_is(worker: RequestPlanner, settings: PlannerSettings) -> None:
+    state = RequestState(settings=replace(settings, record=False))
+    assert state.progress.iteration == 0
+    outcome = worker.plan(task(), state)
+    assert state.progress.iteration == outcome.report.iterations > 0
+    assert state.progress.payload == 1.0
+    assert state.progress.intervals == outcome.report.mesh_intervals
 
 
 # The maximum payload
@@ -112,7 +113,7 @@ MOST_EI5 = 5.742  # [kg], with links of 5 N m^2
 ACCURACY = 2e-3  # [kg], of both, and twice the default of a request
 
 
-def search(worker: Planning, settings: PlannerSettings, **fields: Any) -> Outcome:
+def search(worker: RequestPlanner, settings: PlannerSettings, **fields: Any) -> Outcome:
     """Ask for the maximum payload of the motion of the paper with some fields changed."""
     return worker.find_max_payload(search_request(**fields), RequestState(settings=settings))
 
@@ -129,7 +130,7 @@ def check_failure(outcome: Outcome, code: int, text: str) -> None:
 
 
 def test_direct_search_finds_the_maximum_payload_and_its_motion(
-        worker: Planning, settings: PlannerSettings) -> None:
+        worker: RequestPlanner, settings: PlannerSettings) -> None:
     outcome = search(worker, settings)
     report, found = outcome.report, outcome.search
     assert outcome.publishable
@@ -144,7 +145,7 @@ def test_direct_search_finds_the_maximum_payload_and_its_motion(
 
 
 def test_flexible_arm_carries_less(ei5_model: ArmModel, settings: PlannerSettings) -> None:
-    worker = Planning(ei5_model, OutcomeRecorder(ei5_model.arm, '/flex_planner'))
+    worker = RequestPlanner(ei5_model, OutcomeRecorder(ei5_model.arm, '/flex_planner'))
     outcome = search(worker, settings)
     assert outcome.report.error_code == PlanReport.NONE
     assert outcome.search is not None
@@ -152,7 +153,7 @@ def test_flexible_arm_carries_less(ei5_model: ArmModel, settings: PlannerSetting
     assert len(outcome.trajectory.modal_names) == 4
 
 
-def test_incremental_search_takes_the_steps_of_the_request(worker: Planning,
+def test_incremental_search_takes_the_steps_of_the_request(worker: RequestPlanner,
                                                            settings: PlannerSettings) -> None:
     outcome = search(worker, settings, method=PayloadSearch.INCREMENTAL, payload_mass=5.0,
                      payload_accuracy=0.3, payload_step=0.5)
@@ -164,7 +165,7 @@ def test_incremental_search_takes_the_steps_of_the_request(worker: Planning,
     assert outcome.trajectory.payload_mass == 5.75
 
 
-def test_parameters_decide_where_the_request_does_not(worker: Planning,
+def test_parameters_decide_where_the_request_does_not(worker: RequestPlanner,
                                                       settings: PlannerSettings) -> None:
     coarse = replace(settings, payload_accuracy=0.1, payload_step=0.9, record=False)
     found = search(worker, coarse).search
@@ -173,7 +174,7 @@ def test_parameters_decide_where_the_request_does_not(worker: Planning,
     assert 10 * settings.payload_accuracy < found.payload_upper - found.payload <= 0.1
 
 
-def test_search_from_more_than_the_maximum_is_infeasible(worker: Planning,
+def test_search_from_more_than_the_maximum_is_infeasible(worker: RequestPlanner,
                                                          settings: PlannerSettings) -> None:
     outcome = search(worker, settings, payload_mass=7.0)
     check_failure(outcome, PlanReport.INFEASIBLE,
@@ -190,7 +191,7 @@ def test_search_from_more_than_the_maximum_is_infeasible(worker: Planning,
     ({'effort_weights': [1.0]}, PlanReport.INVALID_SIZE, 'effort_weights has 1 numbers, but'),
     ({'allowed_planning_time': 1e-9}, PlanReport.TIMEOUT, 'time limit reached'),
 ])
-def test_search_that_cannot_be_done_says_why(worker: Planning, settings: PlannerSettings,
+def test_search_that_cannot_be_done_says_why(worker: RequestPlanner, settings: PlannerSettings,
                                              fields: dict[str, Any], code: int,
                                              text: str) -> None:
     check_failure(search(worker, settings, **fields), code, text)
@@ -199,11 +200,11 @@ def test_search_that_cannot_be_done_says_why(worker: Planning, settings: Planner
 @pytest.mark.parametrize('method', [PayloadSearch.DIRECT, PayloadSearch.INCREMENTAL])
 @pytest.mark.parametrize('looks', [0, 8])
 def test_search_is_canceled_before_and_while_it_is_at_work(
-        worker: Planning, settings: PlannerSettings, method: int, looks: int) -> None:
+        worker: RequestPlanner, settings: PlannerSettings, method: int, looks: int) -> None:
     left = iter(range(looks))
-    ticket = RequestState(settings=replace(settings, record=False),
-                          stopping=lambda: next(left, None) is None)
-    outcome = worker.find_max_payload(search_request(method=method), ticket)
+    state = RequestState(settings=replace(settings, record=False),
+                         stopping=lambda: next(left, None) is None)
+    outcome = worker.find_max_payload(search_request(method=method), state)
     assert (outcome.report.error_code, outcome.publishable) == (PlanReport.CANCELED, False)
     assert 0 <= outcome.report.iterations <= looks
     assert bool(outcome.report.iterations) == bool(looks)
@@ -214,12 +215,14 @@ def test_search_is_canceled_before_and_while_it_is_at_work(
 def test_arm_whose_motors_have_no_limit_has_no_maximum_payload(
         rigid_arm: Arm, settings: PlannerSettings) -> None:
     free = replace(rigid_arm, joints=(Joint(), Joint()))
-    outcome = search(Planning(ArmModel(free), OutcomeRecorder(free, '/flex_planner')), settings)
+    planner = RequestPlanner(ArmModel(free), OutcomeRecorder(free, '/flex_planner'))
+    outcome = search(planner, settings)
     check_failure(outcome, PlanReport.INVALID_TASK, 'no motor of the arm has a stall torque')
 
 
 def test_search_that_is_stopped_after_the_solve_has_no_payload(
-        worker: Planning, settings: PlannerSettings, monkeypatch: pytest.MonkeyPatch) -> None:
+        worker: RequestPlanner, settings: PlannerSettings,
+        monkeypatch: pytest.MonkeyPatch) -> None:
     def stopped(*arguments: Any) -> None:
         raise StoppedError(StopReason.TIMEOUT)
 
@@ -228,7 +231,8 @@ def test_search_that_is_stopped_after_the_solve_has_no_payload(
 
 
 def test_search_that_breaks_is_reported_as_unknown(
-        worker: Planning, settings: PlannerSettings, monkeypatch: pytest.MonkeyPatch) -> None:
+        worker: RequestPlanner, settings: PlannerSettings,
+        monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*arguments: Any, **options: Any) -> None:
         raise ZeroDivisionError('somewhere')
 
@@ -237,7 +241,7 @@ def test_search_that_breaks_is_reported_as_unknown(
 
 
 def test_payload_found_is_returned_but_not_published_if_it_cannot_be_recorded(
-        worker: Planning, settings: PlannerSettings, tmp_path: Path) -> None:
+        worker: RequestPlanner, settings: PlannerSettings, tmp_path: Path) -> None:
     blocker = tmp_path / 'file'
     blocker.write_text('no folder')
     outcome = search(worker, replace(settings, recording_folder=str(blocker / 'recordings')))

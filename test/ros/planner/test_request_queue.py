@@ -8,7 +8,7 @@ import time
 from typing import Any
 
 from flex_planner.base.progress import Progress
-from flex_planner.ros.planner.request_planner import Outcome, unknown_failure
+from flex_planner.ros.planner.outcome import Outcome, unknown_failure
 from flex_planner.ros.planner.request_queue import RequestQueue
 from flex_planner.ros.planner.request_state import RequestState
 from flex_planner.ros.settings.planner import PlannerSettings
@@ -30,10 +30,10 @@ class FakeExecutor:
 
 
 @pytest.fixture
-def desk() -> Iterator[RequestQueue]:
-    desk = RequestQueue(1)
-    yield desk
-    assert desk.close(5)
+def queue() -> Iterator[RequestQueue]:
+    queue = RequestQueue(1)
+    yield queue
+    assert queue.close(5)
 
 
 @pytest.fixture
@@ -48,9 +48,9 @@ def wait(done: Any) -> None:
         time.sleep(0.001)
 
 
-def until_canceled(ticket: RequestState) -> Outcome:
-    ticket.report(Progress(phase='test', iteration=3, residual=0.5, intervals=7))
-    wait(ticket.canceled)
+def until_canceled(state: RequestState) -> Outcome:
+    state.report(Progress(phase='test', iteration=3, residual=0.5, intervals=7))
+    wait(state.is_canceled)
     return unknown_failure(ValueError('too late'))
 
 
@@ -58,63 +58,63 @@ def code(pending: Any) -> int:
     return int(pending.future.result().report.error_code)
 
 
-def test_outcome_wakes_the_executor(desk: RequestQueue, settings: PlannerSettings) -> None:
+def test_outcome_wakes_the_executor(queue: RequestQueue, settings: PlannerSettings) -> None:
     executor = FakeExecutor()
-    pending = desk.submit(lambda ticket: unknown_failure(ValueError('x')), settings, executor)
+    pending = queue.submit(lambda state: unknown_failure(ValueError('x')), settings, executor)
     wait(pending.future.done)
     wait(lambda: executor.woken)
     assert pending.future.result().report.error_msg == 'ValueError: x'
 
 
-def test_exception_of_the_work_is_an_outcome(desk: RequestQueue,
+def test_exception_of_the_work_is_an_outcome(queue: RequestQueue,
                                              settings: PlannerSettings) -> None:
-    def fail(ticket: RequestState) -> Outcome:
+    def fail(state: RequestState) -> Outcome:
         raise KeyError('nobody foresaw this')
 
-    pending = desk.submit(fail, settings, FakeExecutor())
+    pending = queue.submit(fail, settings, FakeExecutor())
     wait(pending.future.done)
     assert code(pending) == PlanReport.UNKNOWN
-    assert desk.active is None
+    assert queue.active is None
 
 
-def test_one_works_one_waits_and_the_third_is_refused(desk: RequestQueue,
+def test_one_works_one_waits_and_the_third_is_refused(queue: RequestQueue,
                                                       settings: PlannerSettings) -> None:
     executor = FakeExecutor()
-    first = desk.submit(until_canceled, settings, executor)
-    wait(lambda: desk.active is not None and desk.active.progress.iteration == 3)
-    second = desk.submit(until_canceled, settings, executor)
-    assert desk.waiting == 1
-    assert code(desk.submit(until_canceled, settings, executor)) == PlanReport.BUSY
-    desk.withdraw(second)
-    assert desk.waiting == 0
+    first = queue.submit(until_canceled, settings, executor)
+    wait(lambda: queue.active is not None and queue.active.progress.iteration == 3)
+    second = queue.submit(until_canceled, settings, executor)
+    assert queue.waiting == 1
+    assert code(queue.submit(until_canceled, settings, executor)) == PlanReport.BUSY
+    queue.withdraw(second)
+    assert queue.waiting == 0
     assert code(second) == PlanReport.CANCELED
     assert not first.future.done()
-    desk.withdraw(first)
+    queue.withdraw(first)
 
 
 def test_withdrawn_request_has_its_outcome_at_once_and_keeps_it(
-        desk: RequestQueue, settings: PlannerSettings) -> None:
+        queue: RequestQueue, settings: PlannerSettings) -> None:
     ended = threading.Event()
 
-    def slow(ticket: RequestState) -> Outcome:
-        until_canceled(ticket)
+    def slow(state: RequestState) -> Outcome:
+        until_canceled(state)
         time.sleep(0.05)
         ended.set()
         return unknown_failure(ValueError('too late'))
 
-    pending = desk.submit(slow, settings, FakeExecutor())
-    wait(lambda: desk.active)
-    desk.withdraw(pending)
+    pending = queue.submit(slow, settings, FakeExecutor())
+    wait(lambda: queue.active)
+    queue.withdraw(pending)
     assert not ended.is_set()
     assert code(pending) == PlanReport.CANCELED
-    wait(lambda: desk.active is None)
+    wait(lambda: queue.active is None)
     assert ended.is_set()
     assert code(pending) == PlanReport.CANCELED
 
 
 def test_desk_that_closes_tells_the_work_and_takes_no_more(settings: PlannerSettings) -> None:
-    desk = RequestQueue(1)
-    desk.submit(until_canceled, settings, FakeExecutor())
-    wait(lambda: desk.active)
-    assert desk.close(5)
-    assert code(desk.submit(until_canceled, settings, FakeExecutor())) == PlanReport.BUSY
+    queue = RequestQueue(1)
+    queue.submit(until_canceled, settings, FakeExecutor())
+    wait(lambda: queue.active)
+    assert queue.close(5)
+    assert code(queue.submit(until_canceled, settings, FakeExecutor())) == PlanReport.BUSY

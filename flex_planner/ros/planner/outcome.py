@@ -1,0 +1,65 @@
+"""The outcome of a request, as it is answered, published and recorded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from flex_planner.base.progress import StopReason
+from flex_planner.planning.plan import Plan
+from flex_planner.planning.sampling import SampledPlan
+from flex_planner.ros.messages.plans import duration_message, failure_report
+from flex_planner.ros.planner.request_state import RequestState
+from flex_planner_interfaces.msg import FlexibleTrajectory, PayloadSearch, PlanReport
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Outcome:
+    """
+    The outcome of a request.
+
+    Attributes
+    ----------
+    report : PlanReport
+        Always filled.
+    trajectory : FlexibleTrajectory
+        Empty unless there is a plan.
+    plan, reference : Plan, SampledPlan or None
+        What the trajectory was made of.
+    search : PayloadSearch or None
+        Result of a search for the maximum payload.
+
+    """
+
+    report: PlanReport
+    trajectory: FlexibleTrajectory
+    plan: Plan | None = None
+    reference: SampledPlan | None = None
+    search: PayloadSearch | None = None
+
+    @property
+    def publishable(self) -> bool:
+        """Whether a controller may have the trajectory."""
+        return bool(self.report.error_code == PlanReport.NONE)
+
+
+def failure_outcome(code: int, sentence: str) -> Outcome:
+    """Return the outcome of a request that failed."""
+    return Outcome(report=failure_report(code, sentence), trajectory=FlexibleTrajectory())
+
+
+def unknown_failure(error: Exception) -> Outcome:
+    """Return the outcome of an unexpected exception."""
+    return failure_outcome(PlanReport.UNKNOWN, f'{type(error).__name__}: {error}')
+
+
+def canceled_outcome(state: RequestState) -> Outcome:
+    """Return the outcome of a request that its client gave up."""
+    outcome = failure_outcome(PlanReport.CANCELED, StopReason.CANCELED.value)
+    outcome.report.planning_time = duration_message(state.elapsed_ns)
+    return outcome
+
+
+def busy_outcome(queue_length: int) -> Outcome:
+    """Return the outcome of a request that finds the queue full."""
+    return failure_outcome(PlanReport.BUSY, f'{queue_length} requests are waiting already; '
+                           'the parameter queue_length allows no more: try again later')
