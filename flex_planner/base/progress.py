@@ -10,7 +10,7 @@ import time
 
 
 class StopReason(Enum):
-    """Why work was stopped from outside; the value is shown to people."""
+    """Reasons for stopping work from outside; the value is shown to people."""
 
     CANCELED = 'canceled'
     TIMEOUT = 'time limit reached'

@@ -34,9 +34,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (FlexPlannerError, OSError) as error:
         print(f'flex-planner: {error}', file=sys.stderr)
         return 1
-    except StoppedError as stop:
-        print(f'flex-planner: {stop}', file=sys.stderr)
-        return _CANCELED if stop.reason is StopReason.CANCELED else 1
+    except StoppedError as error:
+        print(f'flex-planner: {error}', file=sys.stderr)
+        return _CANCELED if error.reason is StopReason.CANCELED else 1
     except (CanceledError, KeyboardInterrupt) as error:
         print(f'flex-planner: {str(error) or "canceled"}', file=sys.stderr)
         return _CANCELED

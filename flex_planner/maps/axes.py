@@ -1,4 +1,4 @@
-"""What a map may be drawn over: axes with their units and bounds, and their tiles."""
+"""The axes of a map with their units and bounds, and the tiles of its grid."""
 
 from __future__ import annotations
 

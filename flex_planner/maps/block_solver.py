@@ -108,9 +108,9 @@ class _BlockRun:
             if result.code is CellCode.SOLVED or isinstance(found, MinDuration):
                 self._done[index] = found
             return result
-        except StoppedError as stop:
-            return CellResult(index=index, code=CellCode.of(STOP_STATUS[stop.reason]),
-                              message=str(stop))
+        except StoppedError as error:
+            return CellResult(index=index, code=CellCode.of(STOP_STATUS[error.reason]),
+                              message=str(error))
         except (UnreachableError, SingularError) as error:
             return CellResult(index=index, code=CellCode.UNREACHABLE, message=str(error))
         except FlexPlannerError as error:

@@ -1,4 +1,4 @@
-"""Where the motions of a map start and end: points of the tip, some of them moved by axes."""
+"""Start and goal of the motions of a map: points of the tip, some of them moved by axes."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from flex_planner.maps.axes import Axis, check_cells
 
 
 class Quantity(Enum):
-    """What a map shows; the value is shown to people."""
+    """Quantities of maps; the value is shown to people."""
 
     MAX_PAYLOAD = 'maximum payload'
     MIN_EFFORT = 'minimum effort'

@@ -76,7 +76,7 @@ class MapStore:
                 write_empty(Path(scratch, 'new'), study)
                 os.rename(Path(scratch, 'new'), path)
         except (OSError, KeyError) as error:  # zarr makes a KeyError of some
-            _tell(error, path, 'the map is not created')
+            _raise_named(error, path, 'the map is not created')
         return cls(path)
 
     @classmethod
@@ -108,7 +108,7 @@ class MapStore:
             try:
                 shutil.rmtree(path)
             except OSError as error:
-                _tell(error, path, 'it cannot be removed')
+                _raise_named(error, path, 'it cannot be removed')
             finally:
                 store.close()
         return cls.create(path, study)
@@ -162,7 +162,7 @@ class MapStore:
                              for result in ordered]
                 target[block] = values.reshape(shape)
         except OSError as error:
-            _tell(error, self.path, 'finished blocks are kept')
+            _raise_named(error, self.path, 'finished blocks are kept')
         self.codes[block] = values.reshape(shape)
 
     def _write_motions(self, block: Block, ordered: Sequence[CellResult],
@@ -270,7 +270,7 @@ def _readable_codes(stored: Any) -> NDArray[np.int8]:
     return codes
 
 
-def _tell(error: Exception, path: Path, consequence: str) -> NoReturn:
+def _raise_named(error: Exception, path: Path, consequence: str) -> NoReturn:
     """Raise OSError that names the store."""
     cause = error.__cause__ if isinstance(error, KeyError) else error
     number, text = (cause.errno, cause.strerror) if isinstance(cause, OSError) else (None, None)

@@ -1,4 +1,4 @@
-"""How a map is laid out in its store: variables, chunks and metadata."""
+"""The layout of a map in its store: variables, chunks and metadata."""
 
 from __future__ import annotations
 

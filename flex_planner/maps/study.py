@@ -1,4 +1,4 @@
-"""What a map is of: an arm, a quantity, the motion, and the axes that it is drawn over."""
+"""The subject of a map: an arm, a quantity, a motion, and the axes that change them."""
 
 from __future__ import annotations
 

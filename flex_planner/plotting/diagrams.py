@@ -1,4 +1,4 @@
-"""What pictures of equal diagrams are made of: curves, in panels, in a picture."""
+"""The parts of pictures of equal diagrams: curves, in panels, in a picture."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a recording holds: rosbag2's metadata.yaml, version 9."""
+"""The contents of a recording: rosbag2's metadata.yaml, version 9."""
 
 from __future__ import annotations
 

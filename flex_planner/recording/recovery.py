@@ -1,8 +1,8 @@
 """
-What is complete of a recording whose writer was killed, or that is damaged further on.
+Recovery of the complete part of a recording that is damaged, or whose writer was killed.
 
 A reader refuses such a recording as a whole: a plan moves an arm. Here its complete part becomes
-a new recording, by the will of whoever asks for it.
+a new recording, on request only.
 
 """
 

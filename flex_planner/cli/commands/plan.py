@@ -69,10 +69,10 @@ def _plan(options: argparse.Namespace) -> int:
 
     plan = run_with_progress(request.task.arm, request.time_limit, work)
     reference, most = _sample(request, plan)
-    _tell(request, f'with {request.task.payload_mass:g} kg', plan_rows(plan, most))
+    _print_result(request, f'with {request.task.payload_mass:g} kg', plan_rows(plan, most))
     if text := weights_table(plan):
         print(f'\n{text}\n')
-    _tell_files(outputs.write_plan(plan, reference if plan.solved else None))
+    _print_files(outputs.write_plan(plan, reference if plan.solved else None))
     return _exit_code(request, plan)
 
 
@@ -91,10 +91,10 @@ def _payload(options: argparse.Namespace) -> int:
 
     found = run_with_progress(request.task.arm, request.time_limit, work)
     reference, most = _sample(request, found.plan)
-    _tell(request, '', payload_rows(found, most))
+    _print_result(request, '', payload_rows(found, most))
     if text := search_table(found):
         print(f'\n{text}\n')
-    _tell_files(outputs.write_search(found, accuracy, step, reference if found.solved else None))
+    _print_files(outputs.write_search(found, accuracy, step, reference if found.solved else None))
     return _exit_code(request, found)
 
 
@@ -106,13 +106,13 @@ def _sample(request: Request, plan: Plan | None) -> tuple[SampledPlan | None, Pe
     return reference, peaks(plan, reference.samples)
 
 
-def _tell(request: Request, payload: str, rows: list[Row]) -> None:
+def _print_result(request: Request, payload: str, rows: list[Row]) -> None:
     """Print the request and its result."""
     print(table([('arm', request.task.arm.name), ('motion', f'{request} {payload}'.rstrip()),
                  *rows]), flush=True)
 
 
-def _tell_files(files: Iterator[Row]) -> None:
+def _print_files(files: Iterator[Row]) -> None:
     """Write the files, and print the name of each as it is written."""
     for row in files:
         print(table([row]), flush=True)

@@ -1,4 +1,4 @@
-"""What the pictures of a map need to know of it, read from its store."""
+"""The contents of a map for its pictures, read from its store."""
 
 from __future__ import annotations
 

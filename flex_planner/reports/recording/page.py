@@ -65,7 +65,7 @@ def write_report(path: Path, request: RecordedRequest, check: MotionCheck | None
         raise RecordingError(f'cannot write {path}: {error.strerror or error}') from error
 
 
-def _content(told: list[ReportTable], drawn: list[Plot]) -> dict[str, Any]:
+def _content(shown_tables: list[ReportTable], drawn: list[Plot]) -> dict[str, Any]:
     """Return tables and plots; the arrays along x are shared."""
     axes: dict[str, list[float | None]] = {}
     names: dict[bytes, str] = {}
@@ -85,7 +85,7 @@ def _content(told: list[ReportTable], drawn: list[Plot]) -> dict[str, Any]:
     shown = [{**{name: getattr(plot, name) for name in _PLAIN},
               'bands': None if plot.bands is None else asdict(plot.bands),
               'series': [line(series) for series in plot.series]} for plot in drawn]
-    return {'tables': [asdict(table) for table in told], 'axes': axes, 'plots': shown}
+    return {'tables': [asdict(table) for table in shown_tables], 'axes': axes, 'plots': shown}
 
 
 def _numbers(values: Array) -> list[float | None]:

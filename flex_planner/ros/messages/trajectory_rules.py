@@ -1,5 +1,5 @@
 """
-What ros2_controllers' joint_trajectory_controller demands of a trajectory.
+The rules of ros2_controllers' joint_trajectory_controller for trajectories.
 
 Rules of ``validate_trajectory_msg`` and of its handling of effort, Jazzy 4.22 and later. Works
 on any object with the fields of ``trajectory_msgs/msg/JointTrajectory``.

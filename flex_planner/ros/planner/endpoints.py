@@ -33,7 +33,7 @@ class RequestHandlers(NamedTuple):
     Attributes
     ----------
     submit : callable
-        Hands a request in.
+        Adds a request to the queue.
     withdraw : callable
         Cancels it.
     conclude : callable
@@ -92,7 +92,7 @@ class Endpoint:
         return response
 
     def _on_goal(self, goal: ServerGoalHandle) -> None:
-        """Hand in an accepted goal: it can be canceled from here on."""
+        """Submit an accepted goal, which can be canceled from now on."""
         pending = self._handlers.submit(partial(self._work, goal.request))
         self._goals[_key(goal)] = goal, pending
         goal.execute()

@@ -80,7 +80,7 @@ class RequestPlanner:
         message : MotionTask
             The request.
         state : RequestState
-            What it is served with.
+            Its settings, progress and cancellation.
 
         """
         settings = state.settings
@@ -107,7 +107,7 @@ class RequestPlanner:
         request : FindMaxPayload.Request
             The request, or the goal of the action, which has the same fields.
         state : RequestState
-            What it is served with.
+            Its settings, progress and cancellation.
 
         """
         settings = state.settings
@@ -148,8 +148,8 @@ class RequestPlanner:
             outcome = work(task, monitor)
         except FlexPlannerError as error:
             outcome = failure_outcome(error_code(error), str(error))
-        except StoppedError as stop:
-            outcome = failure_outcome(STOP_CODES[stop.reason], stop.reason.value)
+        except StoppedError as error:
+            outcome = failure_outcome(STOP_CODES[error.reason], error.reason.value)
         except Exception as error:
             _LOG.exception('planning failed')
             outcome = unknown_failure(error)
@@ -167,8 +167,8 @@ class RequestPlanner:
         try:
             path = self._recorder.write(message, state, outcome)
         except Exception as error:
-            extrapolate_extremal = isinstance(error, FlexPlannerError)
-            _LOG.error('recording failed: %s', error, exc_info=not extrapolate_extremal)
+            expected = isinstance(error, FlexPlannerError)
+            _LOG.error('recording failed: %s', error, exc_info=not expected)
             outcome.report.recording = ''
             if outcome.report.error_code != PlanReport.NONE:
                 return outcome

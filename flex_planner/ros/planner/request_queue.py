@@ -23,7 +23,7 @@ Work = Callable[[RequestState], Outcome]
 
 class PendingRequest:
     """
-    A request that was handed in.
+    A request in the queue or at work.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ class RequestQueue:
 
     def submit(self, work: Work, settings: PlannerSettings, executor: Executor) -> PendingRequest:
         """
-        Hand in a request.
+        Add a request.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""A request on its way through the node."""
+"""The state of a request in the node."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def _never() -> bool:
 @dataclass(slots=True, kw_only=True, eq=False)
 class RequestState:
     """
-    What a request is served with, how far it is, and whether anyone still waits for it.
+    The settings of a request, its progress, and whether its client has canceled it.
 
     One thread reads it while another one writes.
 
@@ -57,5 +57,5 @@ class RequestState:
         return self.withdrawn or self.stopping()
 
     def report(self, progress: Progress) -> None:
-        """Note how far it is."""
+        """Store the progress."""
         self.progress = progress

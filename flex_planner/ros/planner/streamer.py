@@ -35,7 +35,7 @@ class Streamer:
         self._process = self._start_process()
 
     def wait_until_ready(self) -> None:
-        """Wait for the process to be there; it says one word, or ends."""
+        """Wait until the process has started; it says one word, or ends."""
         output = self._process.stdout
         if output is None or not output.readline():
             self._node.get_logger().error('the process that streams states did not start')

@@ -1,1 +1,1 @@
-"""What all nodes share: how they start, end, log, and declare their parameters."""
+"""The common parts of all nodes: start and end, logging, and parameters."""

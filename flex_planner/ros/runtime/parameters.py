@@ -25,7 +25,7 @@ _DEFAULT_ARM = 'korayem_ei50'
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Description:
-    """What a parameter is for, and which values it takes."""
+    """Purpose and range of a parameter."""
 
     text: str
     lowest: float | None = None

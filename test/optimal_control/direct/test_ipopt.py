@@ -251,7 +251,7 @@ def test_cancel_stops_it_and_says_so(plan_of: PlanFactory) -> None:
             event.set()
 
     result = solved(plan_of('rigid', 5.5).problem, Monitor(canceled=event.is_set, report=report))
-    assert (result.status, result.message) == (DirectStatus.INTERRUPTED, 'canceled')
+    assert (result.status, result.message) == (DirectStatus.STOPPED, 'canceled')
     assert not result.converged
     assert [each.iteration for each in reports] == [1, 2, 3, 4]
     assert {each.intervals for each in reports} == {40}
@@ -262,7 +262,7 @@ def test_cancel_stops_it_and_says_so(plan_of: PlanFactory) -> None:
 
 def test_time_limit_stops_it(plan_of: PlanFactory) -> None:
     result = solved(plan_of('rigid', 1.0).problem, Monitor(time_limit=0.0))
-    assert (result.status, result.message) == (DirectStatus.INTERRUPTED, 'time limit reached')
+    assert (result.status, result.message) == (DirectStatus.STOPPED, 'time limit reached')
 
 
 def test_problem_that_was_stopped_can_be_solved_again(plan_of: PlanFactory) -> None:
