@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from flex_planner.arms.arm import Arm
+from flex_planner import Arm
 from flex_planner.base.validation import Array
 from flex_planner.optimal_control.parameters import Parameters
 import numpy as np

@@ -12,17 +12,14 @@ import time
 
 from bench.model import uniform_arm
 from bench.solver import paper_problem
-from flex_planner.arms.arm import Arm, Motor
-from flex_planner.base.progress import Monitor
+from flex_planner import Arm, Monitor, Plan, plan_path, Task
+from flex_planner.arms.arm import Motor
 from flex_planner.collocation import Solver, SolverSettings
 from flex_planner.collocation.equations import collocation_residual, factorised, linearised
 from flex_planner.collocation.estimate import estimated
 from flex_planner.collocation.mesh import defects
 from flex_planner.optimal_control.arm_model import ArmModel
-from flex_planner.optimal_control.task import Task
 from flex_planner.planning.certificate import certify
-from flex_planner.planning.plan import Plan
-from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.strategies.initial_guesses import cold_start
 import numpy as np
 

@@ -15,9 +15,8 @@ import statistics
 import sys
 import tempfile
 
-from flex_planner.arms.arm_files import load_arm
+from flex_planner import find_max_payload, load_arm
 from flex_planner.base.processes import one_thread_each
-from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.maps.axes import Axis
 from flex_planner.maps.block_solver import blocks, solve_block
 from flex_planner.maps.end_points import End

@@ -19,8 +19,7 @@ import time
 from typing import Any
 
 from bench.brute_force import brute_force_rate
-from flex_planner.arms.arm import Arm
-from flex_planner.arms.arm_files import load_arm
+from flex_planner import Arm, load_arm
 from flex_planner.base.validation import Array
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.parameters import Parameters

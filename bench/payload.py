@@ -15,10 +15,8 @@ import statistics
 import time
 
 from bench.solver import paper_problem
+from flex_planner import find_max_payload, find_min_duration, Monitor
 from flex_planner.arms.kinematics import tip_position
-from flex_planner.base.progress import Monitor
-from flex_planner.capacity.max_payload import find_max_payload
-from flex_planner.capacity.min_duration import find_min_duration
 from flex_planner.capacity.results import PayloadMethod
 from flex_planner.dynamics.integration import PiecewisePolynomial, simulate
 from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectResult, DirectSettings

@@ -15,12 +15,12 @@ from dataclasses import dataclass, replace
 import time
 from typing import Any
 
-from flex_planner.base.progress import Monitor, StoppedError
+from flex_planner import Monitor, Plan
+from flex_planner.base.progress import StoppedError
 from flex_planner.base.validation import Array
 from flex_planner.collocation import GaussRule
 from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectResult, DirectSettings
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
-from flex_planner.planning.plan import Plan
 import numpy as np
 from scipy.integrate import solve_bvp
 

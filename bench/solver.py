@@ -22,14 +22,12 @@ from bench.rivals import (
     warm_boundary_value_run,
     warm_direct_run,
 )
-from flex_planner.arms.arm_files import load_arm
-from flex_planner.base.progress import Monitor
+from flex_planner import load_arm, Monitor, plan_path, Task
 from flex_planner.collocation import CollocationResult, Solver, SolverSettings
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
-from flex_planner.optimal_control.task import postures_from_points, Task
+from flex_planner.optimal_control.task import postures_from_points
 from flex_planner.optimal_control.totals import integrate_totals
-from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.strategies.initial_guesses import cold_start
 import numpy as np
 

@@ -15,25 +15,19 @@ from dataclasses import replace
 from pathlib import Path
 import sys
 
-from flex_planner.arms.arm_files import load_arm
-from flex_planner.capacity.max_payload import find_max_payload
-from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner import find_max_payload, load_arm, plan_path, Task
 from flex_planner.optimal_control.free_payload import payload_price
-from flex_planner.optimal_control.task import postures_from_points, Task
-from flex_planner.planning.plan_path import plan_path
 from flex_planner.plotting import draw_max_payload, Motion
-import numpy as np
 
 PICTURE = Path('output') / 'find_the_payload.png'
 
 
 def main() -> None:
     """Search, then print and draw the bracket and the front."""
-    model = ArmModel(load_arm('korayem_ei50'))
-    start, goal = postures_from_points(model.arm, (0.5, 0.0), (0.5, 0.5), elbow=-1)
-    task = Task(arm=model.arm, start_positions=start, goal_positions=goal, duration=1.0,
-                effort_weights=np.full(2, 1 / 8))
-    found = find_max_payload(task, model=model, accuracy=1e-3)
+    arm = load_arm('korayem_ei50')
+    task = Task.between_points(arm, (0.5, 0.0), (0.5, 0.5), duration=1.0,
+                               effort_weights=[1 / 8, 1 / 8])
+    found = find_max_payload(task, accuracy=1e-3)
     if not found.solved or found.plan is None:
         sys.exit(found.message)
 
@@ -45,7 +39,7 @@ def main() -> None:
     print('\npayload [kg]      J     dJ/dm_p   (the last grams cost most)')
     plan = None
     for payload in (0.0, 2.0, 4.0, 5.5):
-        plan = plan_path(replace(task, payload_mass=payload), model=model, start_from=plan)
+        plan = plan_path(replace(task, payload_mass=payload), start_from=plan)
         if plan.solution is not None:
             price = payload_price(plan.problem, plan.solution)
             print(f'{payload:10.4f} {plan.cost:9.4f} {price:9.3f}')

@@ -13,12 +13,8 @@ from __future__ import annotations
 
 import sys
 
-from flex_planner.arms.arm_files import load_arm
-from flex_planner.optimal_control.arm_model import ArmModel
-from flex_planner.optimal_control.task import postures_from_points, Task
-from flex_planner.planning.objectives import Objectives
+from flex_planner import load_arm, Objectives, plan_path, Task
 from flex_planner.planning.plan import peaks
-from flex_planner.planning.plan_path import plan_path
 from flex_planner.reports.motion import weights_table
 import numpy as np
 
@@ -27,13 +23,12 @@ LIMIT = 0.8  # [rad/s]
 
 def main() -> None:
     """Plan without and with the limit, then with one that cannot be kept."""
-    model = ArmModel(load_arm('korayem_rigid'))
-    start, goal = postures_from_points(model.arm, (0.5, 0.0), (0.5, 0.5), elbow=-1)
-    task = Task(arm=model.arm, start_positions=start, goal_positions=goal, duration=1.0,
-                payload_mass=1.0, effort_weights=np.full(2, 1 / 8))
+    arm = load_arm('korayem_rigid')
+    task = Task.between_points(arm, (0.5, 0.0), (0.5, 0.5), duration=1.0,
+                               payload_mass=1.0, effort_weights=[1 / 8, 1 / 8])
 
-    free = plan_path(task, model=model)
-    kept = plan_path(task, model=model, objectives=speed_limit(LIMIT))
+    free = plan_path(task)
+    kept = plan_path(task, objectives=speed_limit(LIMIT))
     for name, plan in (('no limit', free), (f'at most {LIMIT} rad/s', kept)):
         if not plan.solved:
             sys.exit(plan.message)
@@ -48,7 +43,7 @@ def main() -> None:
               f'{margin.relaxed_weight:.4f} does not ({margin.relaxed_share:.2%})')
 
     # 0.52 rad in a second need 0.52 rad/s at the very least, and motors take time to speed up
-    impossible = plan_path(task, model=model, objectives=speed_limit(0.55))
+    impossible = plan_path(task, objectives=speed_limit(0.55))
     print(f'\nat most 0.55 rad/s: {impossible.message}')
 
 

@@ -12,16 +12,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from flex_planner.capacity.max_payload import find_max_payload
+from flex_planner import find_max_payload, Task
 from flex_planner.maps.cell_results import CellCode
 from flex_planner.maps.draw_map import draw_map
 from flex_planner.maps.map_starts import MapStarts
 from flex_planner.maps.run_map import run_map
 from flex_planner.maps.store import MapStore, open_map
 from flex_planner.maps.study import load_study
-from flex_planner.optimal_control.arm_model import ArmModel
-from flex_planner.optimal_control.task import postures_from_points, Task
-import numpy as np
 
 STUDY = """\
 name: Payload in 1 s
@@ -56,14 +53,13 @@ def main() -> None:
             for value, code in zip(row.max_payload.values, row.code.values, strict=True)))
 
     arm = study.arm
-    start, goal = postures_from_points(arm, (0.5, 0.0), (0.53, 0.47), elbow=-1)
-    task = Task(arm=arm, start_positions=start, goal_positions=goal, duration=1.0,
-                effort_weights=np.full(2, 1 / 8))
-    cell, model = MapStarts(place, arm).near(task, searched=True), ArmModel(arm)
+    task = Task.between_points(arm, (0.5, 0.0), (0.53, 0.47), duration=1.0,
+                               effort_weights=[1 / 8, 1 / 8])
+    cell = MapStarts(place, arm).near(task, searched=True)
     known = cell.motion.start() if cell else None
     print()
     for name, motion in (('from nothing', None), ('from the map', known)):
-        search = find_max_payload(task, model=model, start_from=motion)
+        search = find_max_payload(task, start_from=motion)
         print(f'{name}: {search.payload:.3f} kg after {search.iterations} iterations')
     for picture in draw_map(place, FOLDER):
         print(f'picture: {picture}')

@@ -10,12 +10,9 @@ from __future__ import annotations
 from pathlib import Path
 import sys
 
-from flex_planner.arms.arm_files import load_arm
-from flex_planner.capacity.min_duration import find_min_duration, payload_against_duration
-from flex_planner.optimal_control.arm_model import ArmModel
-from flex_planner.optimal_control.task import postures_from_points, Task
+from flex_planner import find_min_duration, load_arm, plan_path, Task
+from flex_planner.capacity.min_duration import payload_against_duration
 from flex_planner.planning.objectives import minimum_time
-from flex_planner.planning.plan_path import plan_path
 from matplotlib.figure import Figure
 import numpy as np
 
@@ -24,26 +21,25 @@ PICTURE = Path('output') / 'minimum_time.png'
 
 def main() -> None:
     """Plan one motion in these three ways."""
-    model = ArmModel(load_arm('korayem_rigid'))
-    start, goal = postures_from_points(model.arm, (0.5, 0.0), (0.5, 0.5), elbow=-1)
-    task = Task(arm=model.arm, start_positions=start, goal_positions=goal, duration=1.0,
-                payload_mass=1.0, effort_weights=np.full(2, 1 / 8))
+    arm = load_arm('korayem_rigid')
+    task = Task.between_points(arm, (0.5, 0.0), (0.5, 0.5), duration=1.0,
+                               payload_mass=1.0, effort_weights=[1 / 8, 1 / 8])
 
     # as fast as the motors can: a bracket again, with a certified plan at its upper end
-    shortest = find_min_duration(task, model=model)
+    shortest = find_min_duration(task)
     if not shortest.solved:
         sys.exit(shortest.message)
     print(f'shortest time with 1 kg: {shortest.lower:.5f} to {shortest.duration:.5f} s')
 
     # at a price: the duration is free, and every second adds to the cost
     for price in (1.0, 10.0, 100.0):
-        plan = plan_path(minimum_time(task, price), model=model)
+        plan = plan_path(minimum_time(task, price))
         print(f'at a price of {price:5.1f} per second: {plan.task.duration:.4f} s, '
               f'effort {plan.effort:7.2f} N^2 m^2 s, {plan.status.value}')
 
     # the same front from its other side: less time, less payload
     durations = np.linspace(1.3, 0.7, 5)
-    front = list(payload_against_duration(task, durations, model=model))
+    front = list(payload_against_duration(task, durations))
     for found in front:
         print(f'in {found.task.duration:.2f} s: {found.payload:.3f} kg')
 
@@ -51,7 +47,7 @@ def main() -> None:
     axes = figure.subplots()
     axes.plot([found.task.duration for found in front], [found.payload for found in front], 'o-')
     axes.plot(shortest.duration, task.payload_mass, 's', label='shortest time with 1 kg')
-    axes.set(xlabel='duration [s]', ylabel='largest payload [kg]', title=model.arm.name)
+    axes.set(xlabel='duration [s]', ylabel='largest payload [kg]', title=arm.name)
     axes.legend()
     PICTURE.parent.mkdir(exist_ok=True)
     figure.savefig(PICTURE)

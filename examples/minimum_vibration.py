@@ -13,11 +13,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from flex_planner.arms.arm_files import load_arm
-from flex_planner.optimal_control.arm_model import ArmModel
-from flex_planner.optimal_control.task import postures_from_points, Task
+from flex_planner import load_arm, plan_path, Task
 from flex_planner.planning.objectives import minimum_effort, minimum_vibration
-from flex_planner.planning.plan_path import plan_path
 from matplotlib.figure import Figure
 import numpy as np
 
@@ -27,11 +24,10 @@ WEIGHT = 500.0
 
 def main() -> None:
     """Plan the same motion twice and compare."""
-    model = ArmModel(load_arm('korayem_ei5'))
-    arm, n = model.arm, model.arm.n_joints
-    start, goal = postures_from_points(arm, (0.5, 0.0), (0.5, 0.5), elbow=-1)
-    task = Task(arm=arm, start_positions=start, goal_positions=goal, duration=1.0,
-                payload_mass=1.0)
+    arm = load_arm('korayem_ei5')
+    n = arm.n_joints
+    task = Task.between_points(arm, (0.5, 0.0), (0.5, 0.5), duration=1.0,
+                               payload_mass=1.0)
     tasks = {'minimum effort': minimum_effort(task),
              'minimum vibration': minimum_vibration(task, WEIGHT)}
 
@@ -39,7 +35,7 @@ def main() -> None:
     grid = figure.subplots(2, 2, sharex=True, sharey='row')
     print(f'modal rates of {", ".join(arm.modal_names)}')
     for column, (name, each) in enumerate(tasks.items()):
-        plan = plan_path(each, model=model)
+        plan = plan_path(each)
         samples = plan.uniform_samples(2001)
         rates = samples.rates[:, n:] * 1e3
         rms = ', '.join(f'{value:.2f}' for value in np.sqrt((rates**2).mean(axis=0)))

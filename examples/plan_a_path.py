@@ -14,10 +14,8 @@ from __future__ import annotations
 from pathlib import Path
 import sys
 
-from flex_planner.arms.arm_files import load_arm
-from flex_planner.optimal_control.task import postures_from_points, Task
+from flex_planner import load_arm, plan_path, Task
 from flex_planner.planning.plan import Samples
-from flex_planner.planning.plan_path import plan_path
 from flex_planner.plotting import draw_motion, Motion
 import numpy as np
 
@@ -27,9 +25,8 @@ PICTURE = Path('output') / 'plan_a_path.png'
 def main() -> None:
     """Plan a motion, then print and draw it."""
     arm = load_arm('korayem_ei50')  # a preset of config/arms, or the path of a YAML file
-    start, goal = postures_from_points(arm, (0.5, 0.0), (0.5, 0.5), elbow=-1)
-    task = Task(arm=arm, start_positions=start, goal_positions=goal, duration=1.0,
-                payload_mass=1.0, effort_weights=np.full(2, 1 / 8))
+    task = Task.between_points(arm, (0.5, 0.0), (0.5, 0.5), duration=1.0,
+                               payload_mass=1.0, effort_weights=[1 / 8, 1 / 8])
     plan = plan_path(task)
     if not plan.solved:  # a failure is a status with a reason, never an exception
         sys.exit(plan.message)

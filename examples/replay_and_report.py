@@ -15,11 +15,9 @@ from collections import Counter
 from pathlib import Path
 import sys
 
-from flex_planner.arms.arm_files import load_arm
+from flex_planner import load_arm, plan_path, Task
 from flex_planner.cli.recorder import RequestRecorder
 from flex_planner.cli.request import Request
-from flex_planner.optimal_control.task import postures_from_points, Task
-from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.sampling import sample_plan
 from flex_planner.recording import definition_folder, MessageTypes, read_recording
 from flex_planner.reports.recording import check_motion, RecordedRequest, verdict, write_report
@@ -31,9 +29,8 @@ FOLDER = Path('output')
 def record_plan() -> Path:
     """Plan a motion, record it as the node would, and return the folder."""
     arm, points = load_arm('korayem_ei50'), (np.array([0.5, 0.0]), np.array([0.5, 0.5]))
-    start, goal = postures_from_points(arm, *points, elbow=-1)
-    task = Task(arm=arm, start_positions=start, goal_positions=goal, duration=1.0,
-                payload_mass=1.0, effort_weights=np.full(2, 1 / 8))
+    task = Task.between_points(arm, *points, duration=1.0, payload_mass=1.0,
+                               effort_weights=[1 / 8, 1 / 8])
     request = Request(task=task, points=points, elbow=-1, time_limit=30.0)
     plan = plan_path(task)
     if not plan.solved:

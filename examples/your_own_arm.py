@@ -13,10 +13,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from flex_planner.arms.arm_files import ArmFileError, load_arm
+from flex_planner import load_arm, plan_path, Task
+from flex_planner.arms.arm_files import ArmFileError
 from flex_planner.optimal_control.arm_model import ArmModel
-from flex_planner.optimal_control.task import Task
-from flex_planner.planning.plan_path import plan_path
 from flex_planner.plotting import draw_mode_shapes
 from flex_planner.reports.arm import describe_arm
 import numpy as np
@@ -55,14 +54,15 @@ def main() -> None:
     except ArmFileError as error:  # every mistake is named by its place in the file
         print(f'the mistake is found: {error}\n')
 
-    model, payload = ArmModel(load_arm(str(file))), 0.2
+    arm, payload = load_arm(str(file)), 0.2
+    model = ArmModel.of(arm)  # its compiled functions, which plans of the same arm share
     hanging, level = np.array([-np.pi / 2]), np.array([0.0])
     print(describe_arm(model, [hanging, level], payload), '\n')
     draw_mode_shapes(FOLDER / 'my_arm_modes.png', model, level, payload)
 
     # the states at both ends are those of the arm at rest, bent by its weight
-    plan = plan_path(Task(arm=model.arm, start_positions=hanging, goal_positions=level,
-                          duration=1.0, payload_mass=payload), model=model)
+    plan = plan_path(Task(arm=arm, start_positions=hanging, goal_positions=level, duration=1.0,
+                          payload_mass=payload))
     print(f'hanging to level in 1 s: {plan.status.value}, {plan.strategy}')
     print(f'tip error {plan.certificate.tip_error * 1e3:.1e} mm, remaining vibration '
           f'{plan.certificate.residual_vibration * 1e3:.1e} mm')

@@ -19,9 +19,9 @@ from flex_planner.collocation import (
     SolverStatus,
 )
 from flex_planner.optimal_control.arm_model import ArmModel
-from flex_planner.optimal_control.totals import integrate_totals
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import Task
+from flex_planner.optimal_control.totals import integrate_totals
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.strategies.catalogue import CATALOGUE
