@@ -41,16 +41,16 @@ def settings() -> PlannerSettings:
     return PlannerSettings()
 
 
-def wait(done: Any) -> None:
-    end = time.monotonic() + 5
+def wait(what: str, done: Any) -> None:
+    end = time.monotonic() + 60
     while not done():
-        assert time.monotonic() < end
+        assert time.monotonic() < end, f'waited for {what}'
         time.sleep(0.001)
 
 
 def until_canceled(ticket: RequestState) -> Outcome:
     ticket.report(Progress(phase='test', iteration=3, residual=0.5, intervals=7))
-    wait(ticket.canceled)
+    wait('the cancellation', ticket.canceled)
     return unknown_failure(ValueError('too late'))
 
 
@@ -61,8 +61,8 @@ def code(pending: Any) -> int:
 def test_outcome_wakes_the_executor(desk: RequestQueue, settings: PlannerSettings) -> None:
     executor = FakeExecutor()
     pending = desk.submit(lambda ticket: unknown_failure(ValueError('x')), settings, executor)
-    wait(pending.future.done)
-    wait(lambda: executor.woken)
+    wait('the outcome', pending.future.done)
+    wait('the executor to be woken', lambda: executor.woken)
     assert pending.future.result().report.error_msg == 'ValueError: x'
 
 
@@ -72,7 +72,7 @@ def test_exception_of_the_work_is_an_outcome(desk: RequestQueue,
         raise KeyError('nobody foresaw this')
 
     pending = desk.submit(fail, settings, FakeExecutor())
-    wait(pending.future.done)
+    wait('the outcome', pending.future.done)
     assert code(pending) == PlanReport.UNKNOWN
     assert desk.active is None
 
@@ -81,7 +81,8 @@ def test_one_works_one_waits_and_the_third_is_refused(desk: RequestQueue,
                                                       settings: PlannerSettings) -> None:
     executor = FakeExecutor()
     first = desk.submit(until_canceled, settings, executor)
-    wait(lambda: desk.active is not None and desk.active.progress.iteration == 3)
+    wait('the third iteration', lambda: (
+        desk.active is not None and desk.active.progress.iteration == 3))
     second = desk.submit(until_canceled, settings, executor)
     assert desk.waiting == 1
     assert code(desk.submit(until_canceled, settings, executor)) == PlanReport.BUSY
@@ -103,11 +104,11 @@ def test_withdrawn_request_has_its_outcome_at_once_and_keeps_it(
         return unknown_failure(ValueError('too late'))
 
     pending = desk.submit(slow, settings, FakeExecutor())
-    wait(lambda: desk.active)
+    wait('a request at work', lambda: desk.active)
     desk.withdraw(pending)
     assert not ended.is_set()
     assert code(pending) == PlanReport.CANCELED
-    wait(lambda: desk.active is None)
+    wait('the end of the work', lambda: desk.active is None)
     assert ended.is_set()
     assert code(pending) == PlanReport.CANCELED
 
@@ -115,6 +116,6 @@ def test_withdrawn_request_has_its_outcome_at_once_and_keeps_it(
 def test_desk_that_closes_tells_the_work_and_takes_no_more(settings: PlannerSettings) -> None:
     desk = RequestQueue(1)
     desk.submit(until_canceled, settings, FakeExecutor())
-    wait(lambda: desk.active)
+    wait('a request at work', lambda: desk.active)
     assert desk.close(5)
     assert code(desk.submit(until_canceled, settings, FakeExecutor())) == PlanReport.BUSY
