@@ -1,5 +1,5 @@
 .DEFAULT_GOAL := help
-.PHONY: help setup demo paper test lint bench clean
+.PHONY: help setup demo paper test test-thorough lint bench clean
 
 # The interpreter for .venv; a finished .venv stays as it is unless PYTHON is given.
 ifeq ($(origin PYTHON),undefined)
@@ -12,7 +12,8 @@ CODE := bench examples flex_planner launch test tools setup.py
 help:
 	@echo 'make demo     plan motions of a flexible arm through a ROS 2 node; results in output/'
 	@echo 'make paper    recompute Korayem et al. 2009 and write docs/paper.md (1 to 3 minutes)'
-	@echo 'make test     check the style and run all tests'
+	@echo 'make test     check the style, run all unit tests and a node test of each kind (4 minutes)'
+	@echo 'make test-thorough   run the other tests: long plans, every node test, every example'
 	@echo 'make setup    only create .venv and build into install/'
 	@echo 'make lint     only check the style'
 	@echo 'make bench    measure, and write docs/benchmarks.md (some minutes, on an idle machine)'
@@ -31,10 +32,18 @@ paper: setup
 	@tools/run flex-planner paper --output docs
 
 test: lint
-	@failed=0; \
-	tools/run python -m pytest -n auto --dist loadfile -m 'not alone' || failed=1; \
-	tools/run python -m pytest -m alone || failed=1; \
-	exit $$failed
+	$(call run_tests,not thorough)
+
+test-thorough: setup
+	$(call run_tests,thorough)
+
+# run_tests MARKS: first what runs beside others, then what does not, also if the first fails
+define run_tests
+@failed=0; \
+tools/run python -m pytest -n auto --dist loadfile -m '$(1) and not alone' || failed=1; \
+tools/run python -m pytest -m '$(1) and alone' || failed=1; \
+exit $$failed
+endef
 
 lint: setup
 	tools/run ruff check

@@ -1,13 +1,15 @@
 """
-Response times of a planner while it solves.
+How quickly a planner answers, reports, streams and stops while it solves.
 
-Run by ``tools/run python -m bench.stress``; fails if parameters take too long, or the node ends.
-``test/ros/planner/test_node_endurance.py`` tests that five hundred requests are all answered.
+Run by ``tools/run python -m bench.stress`` on an idle machine; fails if one of these takes too
+long, or the node ends. Tests assert no times: that five hundred requests of all kinds are answered
+is tested in ``test/ros/planner/test_node_endurance.py``.
 
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 import sys
 import tempfile
@@ -24,10 +26,13 @@ import rclpy
 from rclpy.action import ActionClient
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.task import Future
+from sensor_msgs.msg import JointState
 
 PATIENCE = 60.0  # [s]
-LATENCY_LIMIT = 50.0  # [ms]
-LOOKS = 300
+LOOKS, CANCELLATIONS, STATES = 300, 10, 201
+LONG: dict[str, Any] = {'duration': 100.0, 'allowed_planning_time': 20.0}
+# [ms]; states may miss their times by the last
+LATENCY, CANCELING, FEEDBACK, LEAVING, MEDIAN_ERROR = 50.0, 1000.0, 500.0, 2000.0, 1.0
 NODE = '/flex_planner'
 
 
@@ -53,16 +58,27 @@ class Client:
         """Return a result, or raise TimeoutError."""
         # spin_until_future_complete() leaves tasks behind while a goal runs, and after some
         # hundred calls this client, not the node, takes tens of milliseconds
-        end = time.monotonic() + PATIENCE
-        while not future.done():
-            if time.monotonic() > end:
-                raise TimeoutError(f'no answer within {PATIENCE:g} s')
-            self._executor.spin_once(timeout_sec=0.1)
+        self.spin_until(future.done)
         return future.result()
 
-    def start(self, **fields: Any) -> Any:
+    def start(self, feedback: Callable[[Any], None] | None = None, **fields: Any) -> Any:
         """Return the handle of an accepted goal."""
-        return self.wait(self._goals.send_goal_async(action.PlanPath.Goal(task=task(**fields))))
+        return self.wait(self._goals.send_goal_async(
+            action.PlanPath.Goal(task=task(**fields)), feedback_callback=feedback))
+
+    def stop(self, handle: Any) -> None:
+        """Cancel a goal and wait for its end."""
+        result = handle.get_result_async()
+        self.wait(handle.cancel_goal_async())
+        self.wait(result)
+
+    def spin_until(self, done: Callable[[], bool]) -> None:
+        """Receive until something is the case, or raise TimeoutError."""
+        end = time.monotonic() + PATIENCE
+        while not done():
+            if time.monotonic() > end:
+                raise TimeoutError(f'not within {PATIENCE:g} s')
+            self._executor.spin_once(timeout_sec=0.1)
 
     def latency(self) -> float:
         """Return the time to read a parameter [ms]."""
@@ -84,7 +100,7 @@ def watch(client: Client) -> float:
     client.latency()
     times: list[float] = []
     while len(times) < LOOKS:
-        handle = client.start(duration=100.0, allowed_planning_time=20.0)
+        handle = client.start(**LONG)
         result = handle.get_result_async()
         while not result.done() and len(times) < LOOKS:
             times.append(client.latency())
@@ -97,6 +113,60 @@ def watch(client: Client) -> float:
     return float(most)
 
 
+def canceling(client: Client) -> float:
+    """Return how long the slowest of some cancellations takes to the end of its goal [ms]."""
+    times = []
+    for _ in range(CANCELLATIONS):
+        handle = client.start(**LONG)
+        time.sleep(0.4)
+        began = time.monotonic()
+        client.stop(handle)
+        times.append((time.monotonic() - began) * 1e3)
+    print(f'cancellation: shortest {min(times):.0f} ms, longest {max(times):.0f} ms')
+    return max(times)
+
+
+def feedback_gap(client: Client) -> float:
+    """Return the longest time between two messages of feedback [ms]."""
+    heard: list[float] = []
+    handle = client.start(lambda _: heard.append(time.monotonic()), **LONG)
+    client.spin_until(lambda: len(heard) >= 11)
+    client.stop(handle)
+    gaps = np.diff(heard) * 1e3
+    print(f'feedback: every {np.median(gaps):.0f} ms, longest pause {max(gaps):.0f} ms')
+    return float(max(gaps))
+
+
+def stream_error(client: Client) -> float:
+    """Return by how much a period of the streamed states is wrong in the median [ms]."""
+    published: list[int] = []
+    client.node.create_subscription(
+        JointState, f'{NODE}/reference_states',
+        lambda _, info: published.append(info['source_timestamp']), 1000)
+    client.spin_until(lambda: client.node.count_publishers(f'{NODE}/reference_states') == 1)
+    time.sleep(1.0)  # that the publisher knows of the subscription shows in nothing
+    client.wait(client.start(duration=2.0, publish=True).get_result_async())
+    handle = client.start(**LONG)
+    client.spin_until(lambda: len(published) >= STATES)
+    client.stop(handle)
+    errors = np.abs(np.diff(published[:STATES - 1]) * 1e-6 - 10)
+    middle, most = np.percentile(errors, [50, 99])
+    print(f'states while solving: periods of 10 ms wrong by {middle:.2f} ms in the median, '
+          f'99 % within {most:.2f} ms')
+    return float(middle)
+
+
+def leaving(client: Client, node: NodeProcess) -> float:
+    """Return how long a node takes to leave that is at work [ms]; infinity if it fails."""
+    client.start(**LONG)
+    time.sleep(0.4)
+    began = time.monotonic()
+    code = node.stop()
+    taken = (time.monotonic() - began) * 1e3
+    print(f'interrupt while solving: exit code {code} after {taken:.0f} ms')
+    return taken if code == 0 else float('inf')
+
+
 def main() -> int:
     """Measure and return the exit code."""
     rclpy.init()
@@ -106,12 +176,12 @@ def main() -> int:
                          {'arm': 'korayem_ei50', 'recording_folder': folder / 'recordings'},
                          log=folder / 'planner.log') as node:
             client = Client()
-            latency = watch(client)
-            alive = node.process.poll() is None
+            good = [watch(client) < LATENCY, canceling(client) < CANCELING,
+                    feedback_gap(client) < FEEDBACK, stream_error(client) < MEDIAN_ERROR,
+                    leaving(client, node) < LEAVING]
             client.close()
     rclpy.try_shutdown()
-    print(f'alive: {alive}')
-    return 0 if alive and latency < LATENCY_LIMIT else 1
+    return 0 if all(good) else 1
 
 
 if __name__ == '__main__':

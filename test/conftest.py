@@ -33,13 +33,28 @@ settings.load_profile('repository')
 
 # tests in these folders have other processes, and some of them are timed
 ALONE = {'ros', 'system'}
+# the ids of files, tests and cases that `make test` leaves out
+THOROUGH = FOLDER / 'thorough.txt'
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the tests that do not run beside others."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark the tests that do not run beside others, and those that take long."""
+    listed = {line for line in THOROUGH.read_text().splitlines() if line and line[0] != '#'}
+    found = set()
     for item in items:
         if item.path.relative_to(FOLDER).parts[0] in ALONE:
             item.add_marker(pytest.mark.alone)
+        matches = {item.nodeid, *_wholes(item.nodeid)} & listed
+        if matches:
+            item.add_marker(pytest.mark.thorough)
+            found |= matches
+    if config.args_source is pytest.Config.ArgsSource.TESTPATHS and found != listed:
+        raise pytest.UsageError(f'{THOROUGH.name} names no test: {", ".join(listed - found)}')
+
+
+def _wholes(identifier: str) -> tuple[str, str]:
+    """Return the ids of the test that a case is of, and of its file."""
+    return identifier.partition('[')[0], identifier.partition('::')[0]
 
 
 @pytest.fixture(scope='session')

@@ -316,7 +316,7 @@ def long_search(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
 def test_interrupt_ends_the_search_and_leaves_nothing(long_search: subprocess.Popen[str],
                                                       tmp_path: Path) -> None:
     long_search.send_signal(signal.SIGINT)
-    out, err = long_search.communicate(timeout=20)
+    out, err = long_search.communicate(timeout=60)
     assert (long_search.returncode, out) == (130, '')
     assert re.fullmatch(r'flex-planner: canceled after [\d.]+ s, in the phase '
                         r"'payload raised'; nothing was written\n", err)

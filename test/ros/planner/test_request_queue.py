@@ -41,16 +41,16 @@ def settings() -> PlannerSettings:
     return PlannerSettings()
 
 
-def wait(done: Any) -> None:
-    end = time.monotonic() + 5
+def wait(what: str, done: Any) -> None:
+    end = time.monotonic() + 60
     while not done():
-        assert time.monotonic() < end
+        assert time.monotonic() < end, f'waited for {what}'
         time.sleep(0.001)
 
 
 def until_canceled(state: RequestState) -> Outcome:
     state.report(Progress(phase='test', iteration=3, residual=0.5, intervals=7))
-    wait(state.is_canceled)
+    wait('the cancellation', state.is_canceled)
     return unknown_failure(ValueError('too late'))
 
 
@@ -61,8 +61,8 @@ def code(pending: Any) -> int:
 def test_outcome_wakes_the_executor(queue: RequestQueue, settings: PlannerSettings) -> None:
     executor = FakeExecutor()
     pending = queue.submit(lambda state: unknown_failure(ValueError('x')), settings, executor)
-    wait(pending.future.done)
-    wait(lambda: executor.woken)
+    wait('the outcome', pending.future.done)
+    wait('the executor to be woken', lambda: executor.woken)
     assert pending.future.result().report.error_msg == 'ValueError: x'
 
 
@@ -72,7 +72,7 @@ def test_exception_of_the_work_is_an_outcome(queue: RequestQueue,
         raise KeyError('nobody foresaw this')
 
     pending = queue.submit(fail, settings, FakeExecutor())
-    wait(pending.future.done)
+    wait('the outcome', pending.future.done)
     assert code(pending) == PlanReport.UNKNOWN
     assert queue.active is None
 
@@ -81,7 +81,8 @@ def test_one_works_one_waits_and_the_third_is_refused(queue: RequestQueue,
                                                       settings: PlannerSettings) -> None:
     executor = FakeExecutor()
     first = queue.submit(until_canceled, settings, executor)
-    wait(lambda: queue.active is not None and queue.active.progress.iteration == 3)
+    wait('the third iteration', lambda: (
+        queue.active is not None and queue.active.progress.iteration == 3))
     second = queue.submit(until_canceled, settings, executor)
     assert queue.waiting == 1
     assert code(queue.submit(until_canceled, settings, executor)) == PlanReport.BUSY
@@ -103,11 +104,11 @@ def test_withdrawn_request_has_its_outcome_at_once_and_keeps_it(
         return unknown_failure(ValueError('too late'))
 
     pending = queue.submit(slow, settings, FakeExecutor())
-    wait(lambda: queue.active)
+    wait('a request at work', lambda: queue.active)
     queue.withdraw(pending)
     assert not ended.is_set()
     assert code(pending) == PlanReport.CANCELED
-    wait(lambda: queue.active is None)
+    wait('the end of the work', lambda: queue.active is None)
     assert ended.is_set()
     assert code(pending) == PlanReport.CANCELED
 
@@ -115,6 +116,6 @@ def test_withdrawn_request_has_its_outcome_at_once_and_keeps_it(
 def test_desk_that_closes_tells_the_work_and_takes_no_more(settings: PlannerSettings) -> None:
     queue = RequestQueue(1)
     queue.submit(until_canceled, settings, FakeExecutor())
-    wait(lambda: queue.active)
+    wait('a request at work', lambda: queue.active)
     assert queue.close(5)
     assert code(queue.submit(until_canceled, settings, FakeExecutor())) == PlanReport.BUSY
