@@ -67,7 +67,7 @@ def warnings_of(caplog: pytest.LogCaptureFixture) -> list[str]:
 
 
 def run_python(code: str, **environment: str) -> subprocess.Popen[str]:
-    """SearchStart the interpreter of this test on some code."""
+    """Start the interpreter of this test on some code."""
     folder = str(Path(flex_planner.__file__).parents[1])
     return subprocess.Popen(
         [sys.executable, '-c', code], text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
