@@ -45,27 +45,33 @@ def end_of(plan: Plan, torque: PlannedTorque, rtol: float, model: ArmModel | Non
 # One step
 
 
+def dormand_prince(rate: Callable[[Array, Array], Array], x: Array, torques: Array,
+                   h: float) -> tuple[tuple[Array, Array, Array], Array]:
+    """Return the next state with two error estimates, and the slopes, by SciPy's tableau."""
+    slopes = np.zeros((13, x.size))
+    for i, u in enumerate(torques):
+        slopes[i] = rate(x + h * DOP853.A[i, :i] @ slopes[:i], u)
+    following = x + h * DOP853.B @ slopes[:12]
+    slopes[12] = rate(following, torques[-1])
+    return (following, h * DOP853.E5 @ slopes, h * DOP853.E3 @ slopes), slopes
+
+
 @pytest.mark.parametrize('name', ['rigid', 'ei5', 'crane'])
 def test_steps_are_those_of_dormand_and_prince(request: pytest.FixtureRequest,
                                                name: str) -> None:
     model: ArmModel = request.getfixturevalue(f'{name}_model')
     n_t, h, rng = model.arm.n_coordinates, 2e-3, np.random.default_rng(0)
     p = Parameters.of(model.arm, payload_mass=1.0, payload_inertia=0.1).physical
-    rate, x = model.state_rate(p), rng.normal(size=2 * n_t) * np.repeat([0.1, 1.0], n_t)
+    x = rng.normal(size=2 * n_t) * np.repeat([0.1, 1.0], n_t)
     torques = rng.normal(size=(3, RUNGE_KUTTA_STAGES, 2))
     found = model.runge_kutta_steps(p)(x, torques.reshape(3, -1), h)
     for k, at_stages in enumerate(torques):
-        slopes = np.zeros((13, 2 * n_t))
-        for i, u in enumerate(at_stages):
-            slopes[i] = rate(x + h * DOP853.A[i, :i] @ slopes[:i], u)
-        following = x + h * DOP853.B @ slopes[:12]
-        slopes[12] = rate(following, at_stages[-1])
-        expected = following, h * DOP853.E5 @ slopes, h * DOP853.E3 @ slopes
+        expected, slopes = dormand_prince(model.state_rate(p), x, at_stages, h)
         for one, other in zip(found, expected, strict=True):
             # rounding of accelerations up to 1e4
             np.testing.assert_allclose(one[k], other, rtol=1e-13,
                                        atol=1e-13 * np.abs(h * slopes).max())
-        x = following
+        x = expected[0]
 
 
 def test_step_is_of_eighth_order(ei5_model: ArmModel) -> None:
@@ -165,23 +171,29 @@ def test_torque_that_is_not_a_number_gives_none(plan_of: PlanFactory) -> None:
     assert np.isnan(end_of(plan, replace(torque, pieces=pieces), 1e-8)).all()
 
 
-def test_monitor_stops_it(plan_of: PlanFactory) -> None:
+@pytest.mark.parametrize(('limit', 'reason'), [
+    (float('inf'), StopReason.CANCELED), (-1.0, StopReason.TIMEOUT)])
+def test_monitor_stops_it(plan_of: PlanFactory, limit: float, reason: StopReason) -> None:
     plan, checks = plan_of('ei5'), [0]
-    torque = torque_of(plan)
 
     def canceled() -> bool:
         checks[0] += 1
-        return checks[0] > 10
+        return checks[0] > 10 and reason is StopReason.CANCELED
 
     with pytest.raises(StoppedError) as caught:
-        end_of(plan, torque, 1e-8, monitor=Monitor(canceled=canceled))
-    assert caught.value.reason is StopReason.CANCELED
-    with pytest.raises(StoppedError) as caught:
-        end_of(plan, torque, 1e-8, monitor=Monitor(time_limit=-1.0))
-    assert caught.value.reason is StopReason.TIMEOUT
-    checks[0] = -10**9
-    end_of(plan, torque, 1e-8, monitor=Monitor(canceled=canceled))
-    assert checks[0] + 10**9 >= plan.mesh_intervals  # it asks in every interval
+        end_of(plan, torque_of(plan), 1e-8, monitor=Monitor(canceled=canceled, time_limit=limit))
+    assert caught.value.reason is reason
+
+
+def test_monitor_is_asked_in_every_interval(plan_of: PlanFactory) -> None:
+    plan, checks = plan_of('ei5'), [0]
+
+    def canceled() -> bool:
+        checks[0] += 1
+        return False
+
+    end_of(plan, torque_of(plan), 1e-8, monitor=Monitor(canceled=canceled))
+    assert checks[0] >= plan.mesh_intervals
 
 
 # Polynomials

@@ -26,7 +26,7 @@ TaskFactory = Callable[..., Task]
 Case = tuple[str, float, float]
 
 # by Gauss rules with 5 to 10 stages on 20 to 800 intervals, whose first 11 digits agree;
-# test_direct.py comes to the same motions by another method
+# direct/test_ipopt.py comes to the same motions by another method
 COSTS = {
     # arm, payload [kg], w_2: tables II to V, where the paper's solver converged
     ('rigid', 1.0, 0.0): 0.6468129775, ('rigid', 1.0, 1.0): 1.042830679,

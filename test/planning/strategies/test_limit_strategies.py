@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import math
-from typing import Any
 
 from factories import model_of, TaskFactory
 from flex_planner.arms.arm import Arm, Joint, Link
-from flex_planner.base.progress import Monitor
+from flex_planner.base.progress import Monitor, Progress
 from flex_planner.collocation import Solver
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.task import Task
@@ -21,7 +20,7 @@ from flex_planner.planning.strategies.limit_strategies import (
 from flex_planner.planning.strategies.strategy import Attempt
 from known_limits import HEAVIEST, pendulum, SHORTEST
 import numpy as np
-from plan_checks import problem_of
+from plan_checks import problem_of, stopped_in
 import pytest
 
 EVIDENCE = [
@@ -130,19 +129,12 @@ def test_search_for_a_limit_is_stopped(
         rigid_model: ArmModel, paper_task: TaskFactory, changes: dict[str, float], phase: str,
         status: PlanStatus) -> None:
     for patience in (0, 1, 5, 20):
-        monitor, seen = Monitor(), [0]
-
-        def due(count: int = patience, watch: Monitor = monitor, at: Any = seen) -> bool:
-            if watch.phase != phase:
-                at[0] = watch.iteration
-            late = watch.phase == phase and watch.iteration - at[0] >= count
-            if late and status is PlanStatus.TIMEOUT:
-                watch.time_limit = -1.0
-            return late and status is PlanStatus.CANCELED
-
-        monitor.canceled = due
+        lines: list[Progress] = []
+        monitor = stopped_in(phase, status, patience)
+        monitor.report = lines.append
         plan = plan_path(paper_task(rigid_model.arm, **changes), model=rigid_model,
                          monitor=monitor)
         assert (plan.status, plan.strategy) == (status, phase)
         assert plan.solution is None
-        assert plan.iterations <= seen[0] + patience + 1
+        assert plan.iterations == len(lines)
+        assert sum(line.phase == phase for line in lines) <= patience + 1

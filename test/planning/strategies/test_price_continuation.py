@@ -14,6 +14,7 @@ from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.free_payload import FreePayloadProblem
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import Task
+from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.strategies.extremals import Extremal
 from flex_planner.planning.strategies.free_parameters import DURATION, FreeParameter, PAYLOAD
@@ -145,26 +146,34 @@ def crane_task(crane_arm: Arm) -> Task:
                 duration=1.0, payload_mass=0.2)
 
 
-def test_price_under_gravity_counts_how_the_payload_bends_the_ends(
-        crane_model: ArmModel, crane_task: Task) -> None:
-    h, mass = 4e-3, crane_task.payload_mass
-    plan = plan_path(crane_task, model=crane_model, solver=Solver(EXACT))
-    costs = [plan_path(replace(crane_task, payload_mass=mass + k * h), model=crane_model,
-                       solver=Solver(EXACT), start_from=plan).cost for k in (-2, -1, 1, 2)]
+@pytest.fixture(scope='module')
+def crane_plan(crane_model: ArmModel, crane_task: Task) -> Plan:
+    return plan_path(crane_task, model=crane_model, solver=Solver(EXACT))
+
+
+def test_price_under_gravity_counts_how_the_payload_bends_the_ends(crane_plan: Plan) -> None:
+    h, task, model = 4e-3, crane_plan.task, crane_plan.model
+    near = {k: replace(task, payload_mass=task.payload_mass + k * h) for k in (-2, -1, 1, 2)}
+    costs = [plan_path(each, model=model, solver=Solver(EXACT), start_from=crane_plan).cost
+             for each in near.values()]
     price = np.array([1, -8, 8, -1]) @ costs / (12 * h)
-    starts, goals = ([problem_of(crane_model, replace(crane_task, payload_mass=mass + k * h))
-                      for k in (-1, 1)] for _ in range(2))
-    bent = [np.subtract(starts[1].start, starts[0].start) / (2 * h),
-            np.subtract(goals[1].goal, goals[0].goal) / (2 * h)]
-    share = share_of(plan.problem, solution_of(plan))
-    assert price == pytest.approx(
-        share + costates(plan, 0.0) @ bent[0] - costates(plan, 1.0) @ bent[1], rel=1e-6)
+    less, more = (problem_of(model, near[k]) for k in (-1, 1))
+    start, goal = (more.start - less.start) / (2 * h), (more.goal - less.goal) / (2 * h)
+    share = share_of(crane_plan.problem, solution_of(crane_plan))
+    ends = costates(crane_plan, 0.0) @ start - costates(crane_plan, 1.0) @ goal
+    assert price == pytest.approx(share + ends, rel=1e-6)
+    assert price == pytest.approx(PAYLOAD.price(crane_plan.problem, solution_of(crane_plan)),
+                                  rel=1e-6)
     assert abs(price - share) > 0.02
-    # at this price the payload is worth its effort
-    problem = FreePayloadProblem(problem_of(crane_model, crane_task), float(price))
-    found = solve(problem, problem.extend(solution_of(plan)), SolverSettings())
+
+
+def test_payload_under_gravity_is_worth_its_effort_at_its_price(crane_plan: Plan) -> None:
+    price = PAYLOAD.price(crane_plan.problem, solution_of(crane_plan))
+    problem = FreePayloadProblem(crane_plan.problem, price)
+    found = solve(problem, problem.extend(solution_of(crane_plan)), SolverSettings())
     assert found.converged
-    assert problem.restrict(found.solution)[0] == pytest.approx(mass, rel=1e-6)
+    assert problem.restrict(found.solution)[0] == pytest.approx(crane_plan.task.payload_mass,
+                                                                rel=1e-6)
     assert found.iterations <= 3
 
 
