@@ -47,7 +47,7 @@ def test_dynamics_need_no_optimality_conditions(rigid_arm: Arm) -> None:
 
 def test_dynamics_import_nothing_of_optimal_control() -> None:
     code = ('import sys, flex_planner.dynamics.integration\n'
-            "print([name for name in sys.modules if name.startswith((\n"
+            'print([name for name in sys.modules if name.startswith((\n'
             "    'flex_planner.optimal_control', 'flex_planner.collocation', 'casadi'))])")
     found = subprocess.run([sys.executable, '-c', code], text=True, capture_output=True,
                            check=True)

@@ -103,7 +103,8 @@ def test_search_may_start_with_the_value_asked_and_never_beyond_the_longest(
         rigid_model: ArmModel, paper_task: TaskFactory, parameter: FreeParameter) -> None:
     problem = problem_of(rigid_model, paper_task(rigid_model.arm, 2.0, duration=400.0))
     starts = [parameter.value(start) for start in parameter.starts(problem)]
-    assert starts == {PAYLOAD: [2.0], DURATION: [400.0, 1000.0, 1000.0]}[parameter]
+    assert starts[0] == {PAYLOAD: 2.0, DURATION: 400.0}[parameter]
+    assert max(starts) == {PAYLOAD: 2.0, DURATION: 1000.0}[parameter]
     easiest = parameter.value(parameter.easiest(problem))
     assert not any(parameter.improves(easiest, start) for start in starts)
 
