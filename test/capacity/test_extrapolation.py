@@ -220,8 +220,8 @@ def test_motions_with_other_numbers_of_stages_go_together() -> None:
 def test_kind_of_a_switch_is_the_limit_that_is_met(rigid_arm: Arm,
                                                    paper_task: TaskFactory) -> None:
     found = find_max_payload(paper_task(rigid_arm))
-    stop = found.extremals[-1]
-    motion = SwitchedMotion.of(stop.problem, stop.result.solution,
-                               stop.result.switches)
+    extremal = found.extremals[-1]
+    motion = SwitchedMotion.of(extremal.problem, extremal.result.solution,
+                               extremal.result.switches)
     assert set(motion.kinds) <= {0, 1, 2, 3}
     assert {0, 2} <= set(motion.kinds)

@@ -1,41 +1,34 @@
-"""Maximum payload: physics, bracket, front, gravity, the paper's search, refusals and stops."""
+"""Maximum payload: physics, an independent method, front, gravity, and what is refused."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
-from itertools import count, groupby
 import math
 from typing import Any
 
+from factories import SearchFactory, TaskFactory
 from flex_planner.arms.arm import Arm, Joint, Link, Motor
 from flex_planner.base.errors import InvalidTaskError, InvalidValueError
-from flex_planner.base.progress import Monitor, Progress
-from flex_planner.base.validation import Array
+from flex_planner.base.progress import Monitor
 from flex_planner.capacity.max_payload import find_max_payload
-from flex_planner.capacity.results import MaxPayload, PayloadMethod
+from flex_planner.capacity.results import PayloadMethod
 from flex_planner.collocation import Solver, SolverSettings
 from flex_planner.dynamics.integration import PiecewisePolynomial, simulate
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectResult, DirectSettings
-from flex_planner.optimal_control.task import postures_from_points, Task
+from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import PlanStatus
 from flex_planner.planning.plan_path import plan_path
+from known_limits import G, HEAVIEST, lifted_to, one_link
 import numpy as np
 from numpy.polynomial import legendre
-from plan_checks import problem_of, solution_of
+from payload_searches import assert_stopped, assert_stopped_at, raised
+from plan_checks import problem_of
 import pytest
 
-TaskFactory = Callable[..., Task]
-SearchFactory = Callable[[str], MaxPayload]
-Search = Callable[[Monitor], MaxPayload]
-
 inf, nan = math.inf, math.nan
-# of section 5.3's motion in 1 s, enclosed within 1e-6 kg by prices of 1e4 to 1e5 a kilogram
-LIMITS = {'rigid': 5.855140, 'ei5': 5.741828}
 EXACT = SolverSettings(error_tolerance=1e-8)
-every_arm = pytest.mark.parametrize('name', LIMITS)
-g = 9.81
+every_arm = pytest.mark.parametrize('name', HEAVIEST)
 
 
 def arm_with(arm: Arm, torques: tuple[float, float], no_load_speed: float = 3.5) -> Arm:
@@ -44,61 +37,6 @@ def arm_with(arm: Arm, torques: tuple[float, float], no_load_speed: float = 3.5)
     return replace(arm, joints=tuple(
         Joint(motor=Motor(stall_torque=torque, no_load_speed=speed))
         for torque, speed in zip(torques, speeds, strict=True)))
-
-
-def one_link(duration: float, **changes: Any) -> Task:
-    """Return the motion of a link with u_max = 2 N m and M = 1 kg m^2 + m_p (1 m)^2 by 0.5 rad."""
-    link = Link(length=1.0, linear_density=3.0)
-    arm = Arm(name='one', links=(link,), joints=(Joint(motor=Motor(stall_torque=2.0)),))
-    return Task(arm=arm, start_positions=[0.1], goal_positions=[0.6], duration=duration,
-                **changes)
-
-
-def lifted_to(angle: float, duration: float, **changes: Any) -> Task:
-    """Return the motion of a pendulum of 0.3 kg and 1 m with 6 N m, from -0.5 rad on."""
-    link = Link(length=1.0, linear_density=0.3)
-    arm = Arm(name='pendulum', links=(link,), joints=(Joint(motor=Motor(stall_torque=6.0)),),
-              gravity=[0, -g])
-    return Task(arm=arm, start_positions=[-0.5], goal_positions=[angle], duration=duration,
-                **changes)
-
-
-def raised(task: Task, **options: Any) -> MaxPayload:
-    return find_max_payload(task, method=PayloadMethod.INCREMENTAL, **options)
-
-
-def stopped_after(calls: int, status: PlanStatus) -> Monitor:
-    """Return a monitor that lets work go on so many times, then cancels it or runs out of time."""
-    monitor, seen = Monitor(), count()
-
-    def due() -> bool:
-        late = next(seen) >= calls
-        if late and status is PlanStatus.TIMEOUT:
-            monitor.time_limit = -1.0
-        return late and status is PlanStatus.CANCELED
-
-    monitor.canceled = due
-    return monitor
-
-
-def assert_stopped(found: MaxPayload, status: PlanStatus) -> None:
-    assert (found.status, found.message) == (status, status.value)
-    assert (found.solved, found.payload, found.limiting_joint) == (False, 0.0, None)
-    assert found.plan is None or not found.plan.solved
-
-
-@pytest.fixture(scope='module')
-def search_of(request: pytest.FixtureRequest, paper_task: TaskFactory) -> SearchFactory:
-    """Search the maximum payload of the paper's motion from no payload, once for each arm."""
-    known: dict[str, MaxPayload] = {}
-
-    def search(name: str) -> MaxPayload:
-        if name not in known:
-            model = request.getfixturevalue(f'{name}_model')
-            known[name] = find_max_payload(paper_task(model.arm, 0.0), model=model, accuracy=1e-4)
-        return known[name]
-
-    return search
 
 
 # Physics
@@ -130,7 +68,7 @@ def test_slower_motion_of_motors_as_much_weaker_carries_the_same(rigid_arm: Arm,
                                                                  paper_task: TaskFactory) -> None:
     # time in units of t_f: torques go with 1 / t_f^2, speeds with 1 / t_f
     found = find_max_payload(paper_task(arm_with(rigid_arm, (0.5, 0.5), 0.875), duration=4.0))
-    assert found.payload <= LIMITS['rigid'] <= found.upper
+    assert found.payload <= HEAVIEST['rigid'] <= found.upper
 
 
 def test_heavier_arm_of_motors_as_much_stronger_carries_as_much_more(
@@ -138,7 +76,7 @@ def test_heavier_arm_of_motors_as_much_stronger_carries_as_much_more(
     link = Link(length=0.5, linear_density=18.0)
     arm = replace(arm_with(rigid_arm, (24.0, 24.0)), links=(link, link))
     found = find_max_payload(paper_task(arm))
-    assert found.payload <= 3 * LIMITS['rigid'] <= found.upper
+    assert found.payload <= 3 * HEAVIEST['rigid'] <= found.upper
 
 
 @pytest.mark.parametrize('changes', [
@@ -149,9 +87,9 @@ def test_weights_do_not_matter(rigid_model: ArmModel, paper_task: TaskFactory,
                                changes: dict[str, Any]) -> None:
     found = find_max_payload(paper_task(rigid_model.arm, **changes), model=rigid_model)
     assert found.solved, found.message
-    assert found.payload <= LIMITS['rigid'] <= found.upper
-    # room counts efforts as they weigh
-    assert all(stop.value < LIMITS['rigid'] < stop.value + stop.gap for stop in found.extremals)
+    assert found.payload <= HEAVIEST['rigid'] <= found.upper
+    # the gap counts efforts as they weigh
+    assert all(one.value < HEAVIEST['rigid'] < one.value + one.gap for one in found.extremals)
 
 
 def test_weights_do_not_matter_where_links_bend(ei5_model: ArmModel,
@@ -159,7 +97,7 @@ def test_weights_do_not_matter_where_links_bend(ei5_model: ArmModel,
     task = paper_task(ei5_model.arm, effort_weights=[1.0, 4.0],
                       velocity_weights=[5.0, 5.0, 1.0, 1.0, 1.0, 1.0])
     found = find_max_payload(task, model=ei5_model)
-    assert found.payload <= LIMITS['ei5'] <= found.upper
+    assert found.payload <= HEAVIEST['ei5'] <= found.upper
     assert found.plan is not None
     assert found.plan.task.velocity_weights.tolist() == task.velocity_weights.tolist()
 
@@ -169,7 +107,7 @@ def test_first_payload_does_not_matter(rigid_model: ArmModel, paper_task: TaskFa
                                        payload_mass: float) -> None:
     found = find_max_payload(paper_task(rigid_model.arm, payload_mass), model=rigid_model)
     assert max(found.payload, payload_mass) == found.payload
-    assert found.payload <= LIMITS['rigid'] <= found.upper
+    assert found.payload <= HEAVIEST['rigid'] <= found.upper
 
 
 @pytest.mark.parametrize('duration', [1.01, 1.5, 2.0, 5.0, 50.0])
@@ -186,20 +124,6 @@ def test_payload_inertia_is_carried_too() -> None:
     # M = 1 + J_p + m_p
     found = find_max_payload(one_link(2.0, payload_inertia=0.5))
     assert found.payload <= 2.5 <= found.upper
-
-
-@pytest.mark.parametrize('accuracy', [3e-6, 1e-4, 1.0])
-def test_bracket_is_as_narrow_as_asked(accuracy: float) -> None:
-    found = find_max_payload(one_link(2.0), accuracy=accuracy)
-    assert found.solved, found.message
-    # the motion at the lower end is as exact as the bracket is narrow
-    assert found.payload - accuracy / 10 <= 3 <= found.upper + accuracy / 10
-    assert 0 < found.upper - found.payload <= accuracy
-
-
-def test_accuracy_of_ten_kilograms_needs_no_step() -> None:
-    found = find_max_payload(one_link(20.0), accuracy=10.0)
-    assert found.payload <= 399 <= found.upper
 
 
 def test_first_payload_may_cost_next_to_nothing(rigid_model: ArmModel,
@@ -308,20 +232,6 @@ def test_front_scales_with_the_weights_of_effort(rigid_model: ArmModel,
     np.testing.assert_allclose(ten.efforts, 10 * one.efforts, rtol=1e-3)
 
 
-@every_arm
-def test_room_bounds_the_limit_at_every_stop(search_of: SearchFactory, name: str) -> None:
-    stops = search_of(name).extremals
-    assert all(stop.value < LIMITS[name] < stop.value + stop.gap for stop in stops)
-    assert all(np.diff([stop.gap for stop in stops]) < 0)
-
-
-@pytest.mark.parametrize('duration', [1.05, 2.0, 10.0])
-def test_room_bounds_the_limit_of_one_link(duration: float) -> None:
-    stops = find_max_payload(one_link(duration), accuracy=1e-4).extremals
-    assert len(stops) > 1
-    assert all(stop.value < duration**2 - 1 < stop.value + stop.gap for stop in stops)
-
-
 # Impossible motions
 
 
@@ -345,12 +255,12 @@ def test_payload_that_cannot_be_carried_is_infeasible_with_the_reason(
 
 
 def test_payload_that_the_motor_just_holds_at_the_goal_is_the_limit() -> None:
-    # u_max = (m g / 2 + m_p g) l cos(goal)
+    # u_max = (m / 2 + m_p) G l cos(goal)
     for angle in (0.0, -0.4):
         found = find_max_payload(lifted_to(angle, 2.0))
         assert found.solved, found.message
         assert found.held
-        assert found.upper == pytest.approx(6 / (g * math.cos(angle)) - 0.15, rel=1e-10)
+        assert found.upper == pytest.approx(6 / (G * math.cos(angle)) - 0.15, rel=1e-10)
         assert found.payload == pytest.approx(found.upper, rel=2e-9)
         assert found.payload < found.upper
         assert found.limiting_joint == 0
@@ -374,7 +284,7 @@ def test_payload_of_a_quick_lift_is_less_than_the_motor_holds(angle: float,
     found = find_max_payload(lifted_to(angle, duration))
     assert found.solved, found.message
     assert not found.held
-    assert found.upper < 6 / (g * math.cos(angle)) - 0.15
+    assert found.upper < 6 / (G * math.cos(angle)) - 0.15
     assert found.upper - found.payload <= 1e-3
     assert found.message.split(': ')[1].startswith('the motor of joint 1 is on its limit for 9')
 
@@ -391,166 +301,19 @@ def test_quick_lift_carries_less_than_the_same_motion_without_gravity() -> None:
 def test_joint_that_can_hold_no_more_is_named() -> None:
     # link 2 is level at the goal; the first motor has no limit
     link = Link(length=0.5, linear_density=1.0)
-    arm = Arm(name='two', links=(link, link), gravity=[0, -g],
+    arm = Arm(name='two', links=(link, link), gravity=[0, -G],
               joints=(Joint(), Joint(motor=Motor(stall_torque=4.0))))
     task = Task(arm=arm, start_positions=[-0.7, 0.5], goal_positions=[-0.5, 0.5], duration=0.4)
     found = find_max_payload(task)
     assert found.solved, found.message
     assert (found.held, found.limiting_joint) == (True, 1)
-    assert found.upper == pytest.approx((4 / g - 0.125) / 0.5, rel=1e-9)
+    assert found.upper == pytest.approx((4 / G - 0.125) / 0.5, rel=1e-9)
 
 
 def test_goal_that_the_motor_cannot_hold_with_the_first_payload_is_refused() -> None:
     with pytest.raises(InvalidTaskError, match='joint 1 needs 6.377 N m to hold the arm with its '
                        'payload at the goal, but the stall torque of its motor is 6 N m'):
         find_max_payload(lifted_to(0.0, 2.0, payload_mass=0.5))
-
-
-# A search of a similar task
-
-
-def test_search_from_a_similar_one_needs_fewer_iterations(
-        rigid_model: ArmModel, paper_task: TaskFactory, search_of: SearchFactory) -> None:
-    task = paper_task(rigid_model.arm, duration=1.1)
-    cold = find_max_payload(task, model=rigid_model)
-    warm = find_max_payload(task, model=rigid_model, start_from=search_of('rigid'))
-    assert warm.solved, warm.message
-    assert warm.iterations < 0.9 * cold.iterations
-    # the same limit is in both
-    assert max(cold.payload, warm.payload) <= min(cold.upper, warm.upper)
-
-
-def test_search_of_the_rigid_arm_is_a_start_for_one_that_bends(
-        ei5_model: ArmModel, paper_task: TaskFactory, search_of: SearchFactory) -> None:
-    found = find_max_payload(paper_task(ei5_model.arm), model=ei5_model,
-                             start_from=search_of('rigid'))
-    assert found.payload <= LIMITS['ei5'] <= found.upper
-
-
-def test_search_of_an_arm_that_bends_is_a_start_for_a_rigid_one(
-        rigid_model: ArmModel, paper_task: TaskFactory, search_of: SearchFactory) -> None:
-    found = find_max_payload(paper_task(rigid_model.arm), model=rigid_model,
-                             start_from=search_of('ei5'))
-    assert found.payload <= LIMITS['rigid'] <= found.upper
-
-
-def test_search_that_found_nothing_is_no_start_but_no_harm(rigid_model: ArmModel,
-                                                           paper_task: TaskFactory) -> None:
-    nothing = find_max_payload(paper_task(rigid_model.arm), model=rigid_model,
-                               monitor=Monitor(time_limit=0.0))
-    task = paper_task(rigid_model.arm)
-    found = find_max_payload(task, model=rigid_model, start_from=nothing)
-    assert nothing.restart_point is None
-    assert found.iterations == find_max_payload(task, model=rigid_model).iterations
-
-
-def test_start_for_others_leaves_room(search_of: SearchFactory) -> None:
-    middle = search_of('ei5').restart_point
-    assert middle is not None
-    assert 0.01 < middle.gap / middle.value < 0.1
-
-
-# Progress
-
-
-def test_direct_search_reports_phases_and_payloads(rigid_model: ArmModel,
-                                                   paper_task: TaskFactory) -> None:
-    reports: list[Progress] = []
-    found = find_max_payload(paper_task(rigid_model.arm), model=rigid_model,
-                             monitor=Monitor(report=reports.append))
-    assert list(dict.fromkeys(each.phase for each in reports)) == ['payload at a rising price',
-                                                                   'continuation to the limit']
-    assert [each.iteration for each in reports] == list(range(1, found.iterations + 1))
-    payloads = [each.payload for each in reports]
-    assert payloads == sorted(payloads)
-    assert {stop.value for stop in found.extremals[:-1]} <= set(payloads)
-    assert found.planning_time > 0
-
-
-def test_paper_search_reports_the_payload_tried(rigid_model: ArmModel,
-                                                paper_task: TaskFactory) -> None:
-    reports: list[Progress] = []
-    found = raised(paper_task(rigid_model.arm, 4.0), model=rigid_model, step=0.5, accuracy=0.5,
-                   monitor=Monitor(report=reports.append))
-    tried = dict.fromkeys(each.payload for each in reports if each.phase == 'payload raised')
-    assert list(tried) == [trial.payload for trial in found.trials]
-    assert len(reports) == found.iterations
-
-
-def test_searches_that_share_a_monitor_count_for_themselves(rigid_model: ArmModel,
-                                                            paper_task: TaskFactory) -> None:
-    monitor = Monitor()
-    first, second = (find_max_payload(paper_task(rigid_model.arm), model=rigid_model,
-                                      monitor=monitor) for _ in range(2))
-    assert first.iterations == second.iterations > 0
-    assert monitor.iteration == 2 * first.iterations
-
-
-# The paper's search
-
-
-@pytest.fixture(scope='module')
-def raised_search(rigid_model: ArmModel, paper_task: TaskFactory) -> MaxPayload:
-    return raised(paper_task(rigid_model.arm, 5.0), model=rigid_model, step=0.5, accuracy=0.05)
-
-
-def test_raised_payload_ends_in_a_narrow_bracket(raised_search: MaxPayload) -> None:
-    found = raised_search
-    assert found.solved, found.message
-    assert found.payload <= LIMITS['rigid'] <= found.upper
-    assert 0 < found.upper - found.payload <= 0.05
-    assert found.plan is not None
-    assert found.plan.task.payload_mass == found.payload
-    assert found.method is PayloadMethod.INCREMENTAL
-
-
-def test_steps_are_halved_from_the_first_on(raised_search: MaxPayload) -> None:
-    trials = raised_search.trials
-    steps = np.array([trial.step for trial in trials])
-    assert trials[0].step == 0.5
-    assert trials[0].payload == 5.5
-    assert set(steps[1:] / steps[:-1]) <= {1.0, 0.5}
-    assert not trials[1].solved
-    # the bracket is never wider than the last step
-    assert raised_search.upper - raised_search.payload <= steps[-1]
-
-
-def test_trials_are_recorded_in_order(raised_search: MaxPayload) -> None:
-    carried, failed = 5.0, inf
-    for trial in raised_search.trials:
-        assert trial.payload == carried + trial.step
-        assert trial.payload < failed
-        assert trial.solved is trial.result.converged
-        assert not trial.interrupted
-        carried, failed = (trial.payload, failed) if trial.solved else (carried, trial.payload)
-    # the upper end is the least payload that failed
-    assert (carried, failed) == (raised_search.payload, raised_search.upper)
-
-
-def test_methods_fill_only_what_is_theirs(raised_search: MaxPayload,
-                                          search_of: SearchFactory) -> None:
-    assert (raised_search.front.payloads.size, raised_search.extremals) == (0, ())
-    assert raised_search.restart_point is None
-    direct = search_of('rigid')
-    assert (direct.trials, direct.method) == ((), PayloadMethod.DIRECT)
-    assert direct.front.payloads.size == len(direct.extremals) > 0
-
-
-def test_first_step_may_be_larger_than_the_answer(rigid_model: ArmModel,
-                                                  paper_task: TaskFactory) -> None:
-    found = raised(paper_task(rigid_model.arm), model=rigid_model, step=10.0, accuracy=2.0)
-    assert found.solved, found.message
-    assert [trial.payload for trial in found.trials] == [11.0, 6.0, 3.5, 4.75]
-    assert (found.payload, found.upper) == (4.75, 6.0)
-
-
-def test_raised_payload_that_the_motor_cannot_hold_is_too_much() -> None:
-    found = raised(lifted_to(0.0, 2.0), step=1.0, accuracy=0.05)
-    limit = 6 / g - 0.15
-    assert found.solved, found.message
-    # what cannot be held is no trial, but it is an upper end
-    assert all(trial.payload < limit for trial in found.trials)
-    assert found.payload <= limit <= found.upper <= found.payload + 0.05
 
 
 # Refused
@@ -568,32 +331,6 @@ def test_task_without_a_largest_payload_is_refused(
         changes: dict[str, Any], message: str) -> None:
     with pytest.raises(InvalidTaskError, match=message):
         find_max_payload(paper_task(rigid_model.arm, **changes), model=rigid_model, method=method)
-
-
-@pytest.mark.parametrize(('goal', 'payload'), [
-    ((0.077, -0.128), 9.83847), ((0.179, -0.077), 13.16864), ((-0.436, 0.641), 0.32899)])
-def test_limit_that_is_not_met_by_its_payload_is_met_by_its_price(
-        rigid_model: ArmModel, paper_task: TaskFactory, goal: tuple[float, float],
-        payload: float) -> None:
-    start, there = postures_from_points(rigid_model.arm, (0.5, 0.0), goal, elbow=-1)
-    task = paper_task(rigid_model.arm, 0.0, start_positions=start, goal_positions=there)
-    found = find_max_payload(task, model=rigid_model)
-    assert found.solved, found.message
-    assert found.payload == pytest.approx(payload, abs=1e-3)
-    assert found.payload <= found.upper <= found.payload + 1e-3
-    assert found.plan is not None
-    assert found.plan.certificate.tip_error < 1e-5
-
-
-def test_effort_of_light_payloads_that_is_not_convex_does_not_end_the_search(
-        rigid_model: ArmModel, paper_task: TaskFactory) -> None:
-    start, goal = postures_from_points(rigid_model.arm, (0.5, 0.0), (0.9, -0.231), elbow=-1)
-    task = paper_task(rigid_model.arm, 0.0, start_positions=start, goal_positions=goal)
-    found = find_max_payload(task, model=rigid_model)
-    prices = found.front.prices
-    assert prices[1] < prices[0]  # more payload costs less, at first
-    heavy = find_max_payload(replace(task, payload_mass=3.0), model=rigid_model)
-    assert found.payload == pytest.approx(heavy.payload, abs=1e-3)
 
 
 def test_arm_without_motor_limits_is_refused(rigid_arm: Arm, paper_task: TaskFactory) -> None:
@@ -627,79 +364,12 @@ def test_bad_option_is_named_with_its_bound(rigid_model: ArmModel, paper_task: T
 # Stopped
 
 
-def moments(search: Search) -> dict[tuple[str, bool], int]:
-    """Return the calls of the monitor at which a phase begins, and amid its last re-simulation."""
-    monitor, seen = Monitor(), list[tuple[str, int]]()
-
-    def asked() -> bool:
-        seen.append((monitor.phase, monitor.iteration))
-        return False
-
-    monitor.canceled = asked
-    search(monitor)
-    found, before = dict[tuple[str, bool], int](), 0
-    for (phase, _), calls in groupby(seen):
-        number = len(list(calls))
-        found.setdefault((phase, False), before)
-        if number >= 20:  # once an interval of the mesh; an iteration asks less often
-            found[phase, True] = before + number // 2
-        before += number
-    return found
-
-
-def assert_stopped_at(search: Search, expected: set[tuple[str, bool]]) -> None:
-    calls = moments(search)
-    assert calls.keys() >= expected
-    for moment in expected:
-        for status in (PlanStatus.CANCELED, PlanStatus.TIMEOUT):
-            assert_stopped(search(stopped_after(calls[moment], status)), status)
-
-
-def test_direct_search_is_stopped_wherever_it_is(rigid_model: ArmModel,
-                                                 paper_task: TaskFactory) -> None:
-    task = paper_task(rigid_model.arm)
-    assert_stopped_at(
-        lambda monitor: find_max_payload(task, model=rigid_model, monitor=monitor),
-        {('payload at a rising price', False), ('continuation to the limit', False),
-         ('continuation to the limit', True)})
-
-
-def test_direct_search_is_stopped_at_every_payload(rigid_model: ArmModel,
-                                                   paper_task: TaskFactory) -> None:
-    task = paper_task(rigid_model.arm)
-    for calls in (5, 25, 50, 70):
-        monitor = stopped_after(calls, PlanStatus.CANCELED)
-        found = find_max_payload(task, model=rigid_model, monitor=monitor)
-        assert_stopped(found, PlanStatus.CANCELED)
-        # asked after every iteration at least
-        assert found.iterations <= calls
-        assert monitor.phase == 'payload at a rising price'
-
-
-def test_paper_search_is_stopped_wherever_it_is() -> None:
-    task, phases = lifted_to(0.0, 2.0), ('cold start', 'payload raised',
-                                         'continuation to the limit')
-    assert_stopped_at(
-        lambda monitor: raised(task, step=0.3, accuracy=0.3, monitor=monitor),
-        {(phase, simulating) for phase in phases for simulating in (False, True)})
-
-
 def test_search_for_the_reason_is_stopped(rigid_model: ArmModel, paper_task: TaskFactory) -> None:
     monitor = Monitor()
     monitor.canceled = lambda: monitor.phase == 'continuation in payload'
     found = find_max_payload(paper_task(rigid_model.arm, duration=0.6), model=rigid_model,
                              monitor=monitor)
     assert_stopped(found, PlanStatus.CANCELED)
-
-
-@pytest.mark.parametrize('calls', [20, 120])
-def test_search_of_an_arm_that_bends_is_stopped(ei5_model: ArmModel, paper_task: TaskFactory,
-                                                calls: int) -> None:
-    # with the arm made rigid, and as it is
-    monitor = stopped_after(calls, PlanStatus.CANCELED)
-    found = find_max_payload(paper_task(ei5_model.arm), model=ei5_model, monitor=monitor)
-    assert_stopped(found, PlanStatus.CANCELED)
-    assert found.iterations <= calls
 
 
 def test_search_is_stopped_in_the_plan_with_what_the_motor_holds() -> None:
@@ -714,14 +384,3 @@ def test_time_limit_that_has_passed_leaves_nothing(rigid_model: ArmModel,
                              monitor=Monitor(time_limit=0.0))
     assert_stopped(found, PlanStatus.TIMEOUT)
     assert (found.plan, found.upper, found.extremals) == (None, inf, ())
-
-
-def test_plan_of_a_search_is_a_plan_like_others(rigid_model: ArmModel, paper_task: TaskFactory,
-                                                search_of: SearchFactory) -> None:
-    plan = search_of('rigid').plan
-    assert plan is not None
-    again = plan_path(plan.task, model=rigid_model, start_from=plan)
-    assert again.solved
-    assert again.cost == pytest.approx(plan.cost, rel=1e-6)
-    last: Array = solution_of(plan).nodes[-1, :4]
-    np.testing.assert_allclose(last, plan.problem.goal, atol=1e-12)

@@ -17,6 +17,7 @@ from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectSettings
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import PlanStatus
+from known_limits import HEAVIEST, one_link, SHORTEST
 import numpy as np
 from plan_checks import problem_of, stopped_in
 import pytest
@@ -24,21 +25,9 @@ import pytest
 TaskFactory = Callable[..., Task]
 
 inf, nan = math.inf, math.nan
-# of section 5.3's motion with 1 kg, enclosed within 1e-6 s by prices up to 1e5 a second
-SHORTEST = {'rigid': 0.642097, 'ei5': 0.649512}
 HALF_A_DIGIT = 5e-7
-# of the rigid arm: kg in 1 s
-HEAVIEST = 5.855140
 every_arm = pytest.mark.parametrize('name', SHORTEST)
 both_stops = pytest.mark.parametrize('status', [PlanStatus.CANCELED, PlanStatus.TIMEOUT])
-
-
-def one_link(duration: float, payload_mass: float = 0.0) -> Task:
-    """Return the motion of a link with u_max = 2 N m and M = 1 kg m^2 + m_p (1 m)^2 by 0.5 rad."""
-    link = Link(length=1.0, linear_density=3.0)
-    arm = Arm(name='one', links=(link,), joints=(Joint(motor=Motor(stall_torque=2.0)),))
-    return Task(arm=arm, start_positions=[0.1], goal_positions=[0.6], duration=duration,
-                payload_mass=payload_mass)
 
 
 def assert_encloses(found: MinDuration, duration: float, accuracy: float = 1e-4) -> None:
@@ -83,7 +72,7 @@ def test_accuracy_is_what_is_asked(rigid_model: ArmModel, paper_task: TaskFactor
 @pytest.mark.parametrize('payload_mass', [0.0, 0.5, 3.0, 100.0])
 def test_shortest_duration_of_one_link_has_its_closed_form(payload_mass: float) -> None:
     # bang-bang: u_max T^2 = 4 M d
-    found = find_min_duration(one_link(2.0, payload_mass))
+    found = find_min_duration(one_link(2.0, payload_mass=payload_mass))
     assert_encloses(found, math.sqrt(1 + payload_mass))
 
 
@@ -147,14 +136,14 @@ def test_less_time_is_not_enough_and_a_little_more_is(rigid_model: ArmModel,
 
 
 @every_arm
-def test_room_bounds_the_limit_at_every_stop(request: pytest.FixtureRequest,
-                                             paper_task: TaskFactory, name: str) -> None:
+def test_gap_bounds_the_limit_at_every_extremal(request: pytest.FixtureRequest,
+                                                paper_task: TaskFactory, name: str) -> None:
     model = request.getfixturevalue(f'{name}_model')
-    stops = find_min_duration(paper_task(model.arm), model=model, accuracy=1e-3).extremals
-    assert len(stops) > 1
-    assert all(stop.value - stop.gap < SHORTEST[name] < stop.value for stop in stops)
-    assert all(np.diff([stop.value for stop in stops]) < 0)
-    assert all(np.diff([stop.price for stop in stops]) > 0)
+    extremals = find_min_duration(paper_task(model.arm), model=model, accuracy=1e-3).extremals
+    assert len(extremals) > 1
+    assert all(one.value - one.gap < SHORTEST[name] < one.value for one in extremals)
+    assert all(np.diff([one.value for one in extremals]) < 0)
+    assert all(np.diff([one.price for one in extremals]) > 0)
 
 
 def lift(payload_mass: float, duration: float) -> Task:
@@ -213,7 +202,7 @@ def test_payload_grows_with_the_duration_and_is_that_of_single_searches(
     # each pair of brackets has the limit in it
     assert all(max(one.payload, other.payload) <= min(one.upper, other.upper)
                for one, other in zip(found, alone, strict=True))
-    assert found[3].payload <= HEAVIEST <= found[3].upper
+    assert found[3].payload <= HEAVIEST['rigid'] <= found[3].upper
     # the first has nothing to start from
     assert found[0].iterations == alone[0].iterations
     assert sum(each.iterations for each in found) < sum(each.iterations for each in alone)
@@ -232,7 +221,7 @@ def test_duration_that_is_too_short_is_passed_over(rigid_model: ArmModel,
     short, first, second, third = payload_against_duration(
         paper_task(rigid_model.arm), [0.6, 1.0, 1.05, 1.1], model=rigid_model)
     assert short.status is PlanStatus.INFEASIBLE
-    assert first.payload <= HEAVIEST <= first.upper
+    assert first.payload <= HEAVIEST['rigid'] <= first.upper
     assert second.iterations < first.iterations
     assert third.iterations < first.iterations / 2  # two neighbours tell where the motion goes
 

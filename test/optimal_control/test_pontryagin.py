@@ -229,11 +229,3 @@ def test_motors_without_limit_give_finite_derivatives(uneven_model: ArmModel) ->
     mass = uneven_model.mass_and_energy(z[:, :2 * n_t], parameters(arm).physical)[0]
     free = -np.linalg.solve(mass, z[:, 3 * n_t:, None])[:, :2, 0] / EFFORT
     np.testing.assert_allclose(controls.torque, free, rtol=1e-10)  # rounding
-
-
-def test_parameters_default_to_the_arm_and_effort_alone(workshop_arm: Arm) -> None:
-    p = Parameters.of(workshop_arm)
-    assert (p.payload_mass, p.rigidity.tolist()) == (0.0, [30.0, 12.0])
-    assert (p.stall_torque.tolist(), p.torque_slope.tolist()) == ([9.0, 5.0], [2.25, 5 / 6])
-    assert p.effort_weights.tolist() == [1.0, 1.0]
-    assert p.position_weights.tolist() == p.velocity_weights.tolist() == [0.0] * 5

@@ -99,6 +99,86 @@ def test_monitor_hears_the_name_of_each_strategy(
     assert len(lines) == lines[-1].iteration == plan.iterations
 
 
+def test_no_strategies_are_refused(rigid_model: ArmModel, paper_task: TaskFactory) -> None:
+    monitor = Monitor()
+    for no_strategies in ([], ()):
+        with pytest.raises(ValueError, match='must name at least one way to a solution'):
+            plan_path(paper_task(rigid_model.arm), model=rigid_model, strategies=no_strategies,
+                      monitor=monitor)
+    assert (monitor.iteration, monitor.phase) == (0, '')
+
+
+@pytest.mark.parametrize('time_weight', [0.0, 1.0])
+def test_strategies_that_do_not_apply_leave_the_motion_unsolved(
+        rigid_model: ArmModel, paper_task: TaskFactory, time_weight: float) -> None:
+    plan = planned(rigid_model, paper_task(rigid_model.arm, time_weight=time_weight),
+                   ('first', lambda *rest: None), ('second', lambda *rest: None))
+    assert (plan.status, plan.strategy) == (PlanStatus.NOT_CONVERGED, '')
+    assert plan.message == 'no strategy applies to this motion'
+    assert plan.iterations == 0
+    assert unsolved(plan)
+
+
+# A free duration
+
+
+@pytest.mark.parametrize('quick', [False, True])
+def test_free_duration_is_planned_by_slow_strategies_where_there_are_no_others(
+        rigid_model: ArmModel, paper_task: TaskFactory, quick: bool) -> None:
+    task = paper_task(rigid_model.arm, time_weight=10.0)
+    plan = plan_path(task, model=rigid_model, strategies=[
+        Strategy('alone', cold_start, quick=quick)])
+    assert (plan.solved, plan.strategy) == (True, 'alone'), plan.message
+    expected = plan_path(task, model=rigid_model)
+    assert plan.task.duration == pytest.approx(expected.task.duration, rel=1e-6)
+    assert plan.cost == pytest.approx(expected.cost, rel=SAME_COST)
+
+
+def watched(strategy: Strategy, guesses: list[tuple[str, float]]) -> Strategy:
+    """Return a strategy that notes the durations at which it is asked."""
+    def attempt(problem: MotionProblem, solver: Solver) -> Attempt | None:
+        guesses.append((strategy.name, problem.task.duration))
+        return strategy.attempt(problem, solver)
+
+    return replace(strategy, attempt=attempt)
+
+
+def test_free_duration_comes_to_slow_strategies_after_longer_guesses_by_the_quick(
+        rigid_model: ArmModel, paper_task: TaskFactory, result: CollocationResult) -> None:
+    guesses: list[tuple[str, float]] = []
+    slow, quick = Strategy('slow', cold_start), Strategy('quick', failed(result, 'lost'), True)
+    plan = plan_path(paper_task(rigid_model.arm, time_weight=10.0), model=rigid_model,
+                     strategies=[watched(each, guesses) for each in (slow, quick)])
+    assert (plan.solved, plan.strategy) == (True, 'slow'), plan.message
+    assert guesses == [('quick', factor) for factor in (1.0, 2.0, 4.0, 8.0)] + [('slow', 1.0)]
+
+
+@pytest.mark.parametrize('quick', [False, True])
+def test_free_duration_is_guessed_longer_where_the_first_guess_fails(
+        rigid_model: ArmModel, paper_task: TaskFactory, result: CollocationResult,
+        quick: bool) -> None:
+    guesses: list[tuple[str, float]] = []
+
+    def patient(problem: MotionProblem, solver: Solver) -> Attempt | None:
+        enough = problem.task.duration > 1.5
+        return (cold_start if enough else failed(result, 'too short'))(problem, solver)
+
+    plan = plan_path(paper_task(rigid_model.arm, time_weight=10.0), model=rigid_model,
+                     strategies=[watched(Strategy('alone', patient, quick), guesses)])
+    assert (plan.solved, plan.strategy) == (True, 'alone'), plan.message
+    assert guesses == [('alone', 1.0), ('alone', 2.0)]
+
+
+def test_free_duration_is_never_refused_for_its_guess(
+        rigid_model: ArmModel, paper_task: TaskFactory, result: CollocationResult) -> None:
+    # what the guess forbids is no limit of the task: that strategy is not even asked
+    task = paper_task(rigid_model.arm, time_weight=10.0)
+    plan = plan_path(task, model=rigid_model, strategies=[
+        Strategy('limit', failed(result, '', 'too much'), shows_infeasibility=True)])
+    assert (plan.status, plan.message) == (PlanStatus.NOT_CONVERGED,
+                                           'no strategy applies to this motion')
+
+
 # Stopped, and out of limits
 
 

@@ -66,8 +66,8 @@ class Watched(Monitor):
 @pytest.mark.parametrize('limit', [0.0, 0.5])
 def test_search_stops_in_time(problem: MotionProblem, limit: float) -> None:
     monitor = Watched(time_limit=limit)
-    stops = list(continue_by_ipopt(problem, 300.0, Solver(monitor=monitor), lambda value: 0.0))
-    assert stops[-1].result.status is SolverStatus.TIMEOUT
+    extremals = list(continue_by_ipopt(problem, 300.0, Solver(monitor=monitor), lambda value: 0.0))
+    assert extremals[-1].result.status is SolverStatus.TIMEOUT
     assert monitor.late == 0
 
 

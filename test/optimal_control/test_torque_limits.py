@@ -1,0 +1,113 @@
+"""Limits of the motors, eqs. (13) to (15): the same for numbers and symbols, and derived."""
+
+from __future__ import annotations
+
+import casadi as ca
+from flex_planner.arms.arm import Arm
+from flex_planner.base.validation import Array
+from flex_planner.optimal_control.torque_limits import free_torque, TorqueLimits
+import numpy as np
+import pytest
+
+COUNT = 300
+LIMITS = TorqueLimits(np.array([9.0, 5.0]), np.array([2.25, 5 / 6]))
+WEIGHTS = np.array([0.5, 0.125])
+
+
+@pytest.fixture(scope='module')
+def points() -> tuple[Array, Array]:
+    """Return free torques and speeds; some within the bounds, most beyond one or the other."""
+    rng = np.random.default_rng(3)
+    return rng.normal(size=(COUNT, 2)) * [20.0, 10.0], rng.normal(size=(COUNT, 2)) * 3.0
+
+
+@pytest.fixture(scope='module')
+def by_symbols(points: tuple[Array, Array]) -> list[Array]:
+    """Return lower and upper bounds, bounded torques and multipliers, one point at a time."""
+    free, speeds, stall, slope, weights = (
+        ca.SX.sym(name, 2) for name in ('free', 'speeds', 'stall', 'slope', 'weights'))
+    limits = TorqueLimits(stall, slope)
+    torque = limits.bounded(free, speeds)
+    function = ca.Function('limits', [free, speeds, stall, slope, weights], [
+        *limits.bounds(speeds), torque, limits.multiplier(weights, free, torque)])
+    given = LIMITS.stall, LIMITS.slope, WEIGHTS
+    rows = [function(*point, *given) for point in zip(*points, strict=True)]
+    return [np.hstack([np.array(value) for value in column]).T
+            for column in zip(*rows, strict=True)]
+
+
+def test_numbers_and_symbols_agree(points: tuple[Array, Array], by_symbols: list[Array]) -> None:
+    free, speeds = points
+    torque = LIMITS.bounded(free, speeds)
+    ours = *LIMITS.bounds(speeds), torque, LIMITS.multiplier(WEIGHTS, free, torque)
+    for one, other in zip(ours, by_symbols, strict=True):
+        # rounding: products may be taken in another order
+        np.testing.assert_allclose(one, other, rtol=1e-15, atol=1e-15)
+    # the points tell them apart: free, at the upper and at the lower bound
+    assert all(20 < (torque == bound).sum() for bound in (free, *LIMITS.bounds(speeds)))
+
+
+def test_bounds_fall_with_the_speed_from_the_stall_torque_to_none_at_the_no_load_speed(
+        workshop_arm: Arm) -> None:
+    limits = TorqueLimits.of(workshop_arm)
+    still, fast = limits.bounds(np.zeros(2)), limits.bounds(np.array([4.0, 6.0]))
+    assert [bound.tolist() for bound in still] == [[-9.0, -5.0], [9.0, 5.0]]
+    # rounding of K_1 - K_2 times the no-load speed
+    np.testing.assert_allclose(fast, [[-18.0, -10.0], [0.0, 0.0]], atol=1e-14)
+
+
+def test_distances_change_their_sign_where_a_motor_reaches_or_leaves_its_limit() -> None:
+    speeds = np.tile([1.2, -2.0], (2, 1))
+    for bound, which in zip(LIMITS.bounds(speeds), (1, 0), strict=True):
+        # a billionth to either side of the bound
+        free = bound + 1e-9 * np.array([[-1.0], [1.0]])
+        distance = LIMITS.distances(free, speeds)[which]
+        saturated = LIMITS.bounded(free, speeds) != free
+        assert np.sign(distance).tolist() == [[-1, -1], [1, 1]]
+        # above the upper bound, below the lower one
+        assert np.array_equal(saturated, distance > 0 if which == 0 else distance < 0)
+
+
+def test_distances_have_the_signs_of_saturation_everywhere(points: tuple[Array, Array]) -> None:
+    free, speeds = points
+    above, below = LIMITS.distances(free, speeds)
+    assert np.array_equal((above > 0) | (below < 0), LIMITS.bounded(free, speeds) != free)
+
+
+def test_multiplier_is_the_slope_of_the_hamiltonian_along_a_bound(
+        points: tuple[Array, Array]) -> None:
+    free, speeds = points
+    step = 1e-4
+
+    def share(rates: Array) -> Array:
+        """Return what of H depends on the torque: R u^2 / 2 - R u_free u, for each joint."""
+        torque = LIMITS.bounded(free, rates)
+        found: Array = WEIGHTS * (torque**2 / 2 - free * torque)
+        return found
+
+    clear = (np.abs(LIMITS.distances(free, speeds)) > 10 * step).all(axis=0)
+    slope = (share(speeds + step) - share(speeds - step)) / (2 * step)
+    found = LIMITS.multiplier(WEIGHTS, free, LIMITS.bounded(free, speeds))
+    # a parabola in the speed: rounding of some hundred joules over the step
+    np.testing.assert_allclose(found[clear], -slope[clear], atol=1e-9)
+    assert 100 < np.count_nonzero(found[clear]) < found[clear].size
+
+
+def test_bound_toward_a_torque_is_the_one_that_it_would_reach() -> None:
+    torque, speeds = np.array([[3.0, -3.0], [-3.0, 3.0]]), np.array([[1.0, 1.2], [1.0, 1.2]])
+    # K_1 - K_2 q' forwards, K_1 + K_2 q' backwards
+    np.testing.assert_allclose(LIMITS.toward(torque, speeds), [[6.75, 6.0], [11.25, 4.0]])
+
+
+def test_free_torque_makes_the_hamiltonian_stationary() -> None:
+    y = np.array([0.7, -1.3])
+    torque = free_torque(WEIGHTS, y)
+    # eq. (13): R u + y = 0, exact in powers of two
+    assert (WEIGHTS * torque + y).tolist() == [0.0, 0.0]
+
+
+def test_motors_without_limits_never_saturate() -> None:
+    unlimited = TorqueLimits(np.full(2, np.inf), np.zeros(2))
+    free = np.array([[1e9, -1e9]])
+    assert unlimited.bounded(free, np.array([[50.0, -50.0]])).tolist() == free.tolist()
+    assert not unlimited.multiplier(WEIGHTS, free, free).any()

@@ -1,0 +1,45 @@
+"""The strategies of the catalogue, each of them alone."""
+
+from __future__ import annotations
+
+from factories import PlanFactory, TaskFactory
+from flex_planner.base.progress import Monitor
+from flex_planner.collocation import Solver, SolverStatus
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.totals import integrate_totals
+from flex_planner.planning.strategies.catalogue import CATALOGUE
+from flex_planner.planning.strategies.strategy import Strategy
+from plan_checks import problem_of, SAME_COST
+import pytest
+
+# what adds nothing to a task: the rigid arm does not bend, and makes the motion in time
+NOTHING_TO_ADD = {
+    'rigid': {'rigid motion first', 'homotopy in vibration weights', 'homotopy in stiffness'},
+    'ei5': set[str]()}
+BY_NAME = {strategy.name: strategy for strategy in CATALOGUE}
+each_strategy = pytest.mark.parametrize('strategy', CATALOGUE, ids=list(BY_NAME))
+
+
+@pytest.mark.parametrize('name', ['rigid', 'ei5'])
+@each_strategy
+def test_every_strategy_solves_the_task_of_the_paper_alone(
+        request: pytest.FixtureRequest, plan_of: PlanFactory, paper_task: TaskFactory,
+        strategy: Strategy, name: str) -> None:
+    model = request.getfixturevalue(f'{name}_model')
+    problem, monitor = problem_of(model, paper_task(model.arm, w_2=10.0)), Monitor()
+    attempt = strategy.attempt(problem, Solver(monitor=monitor))
+    if strategy.name in NOTHING_TO_ADD[name]:
+        assert attempt is None
+        return
+    assert attempt is not None
+    assert (attempt.result.status, attempt.evidence) == (SolverStatus.CONVERGED, '')
+    cost = integrate_totals(problem, attempt.result.solution).cost
+    assert cost == pytest.approx(plan_of(name, 1.0, 10.0).cost, rel=SAME_COST)
+    assert monitor.iteration <= 140  # 132 for the continuation in payload of EI = 5
+
+
+@pytest.mark.parametrize('label', ['homotopy in the weights', 'continuation in payload'])
+def test_continuation_in_what_a_task_has_not_adds_nothing(
+        rigid_model: ArmModel, paper_task: TaskFactory, label: str) -> None:
+    problem = problem_of(rigid_model, paper_task(rigid_model.arm, payload_mass=0.0))
+    assert BY_NAME[label].attempt(problem, Solver()) is None
