@@ -9,12 +9,11 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
-import pickle
 from typing import Any, TypeVar
 
 from flex_planner.arms.arm import Arm
 from flex_planner.base.validation import Array
-from flex_planner.dynamics.cache_key import cache_key
+from flex_planner.dynamics.cache_key import cache_key, describe_fields
 from flex_planner.dynamics.compiled_functions import BatchFunction, load_functions
 import numpy as np
 
@@ -25,7 +24,7 @@ RUNGE_KUTTA_STAGES = 12
 _MOST_KEPT = 16
 
 Dynamics = TypeVar('Dynamics', bound='ArmDynamics')
-_kept: OrderedDict[tuple[type, bytes], Any] = OrderedDict()
+_kept: OrderedDict[tuple[type, str], Any] = OrderedDict()
 
 
 class ArmDynamics:
@@ -50,7 +49,7 @@ class ArmDynamics:
     @classmethod
     def of(cls: type[Dynamics], arm: Arm) -> Dynamics:
         """Return the functions of an arm, the same ones for an equal arm: some arms are kept."""
-        key = cls, pickle.dumps(arm)
+        key = cls, describe_fields(arm)
         found: Dynamics = _kept.pop(key, None) or cls(arm)
         _kept[key] = found
         if len(_kept) > _MOST_KEPT:

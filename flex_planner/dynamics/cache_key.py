@@ -35,18 +35,33 @@ def cache_key(arm: Arm, *packages: str) -> str:
         Folders of flex_planner whose sources the functions are derived by, besides ``arms``.
 
     """
-    return content_key(json.dumps(_structure(arm)), *packages,
+    return content_key(describe_fields(arm, FREE_FIELDS), *packages,
                        *map(_sources, ('arms', *packages)))
 
 
-def _structure(value: object) -> object:
+def describe_fields(value: object, left_out: frozenset[str] = frozenset()) -> str:
+    """
+    Return nested dataclasses as text: equal for equal fields, whatever objects they share.
+
+    Parameters
+    ----------
+    value : object
+        A dataclass of numbers, strings, arrays, tuples and dataclasses.
+    left_out : frozenset of str
+        Fields that do not count, such as ``Arm.name``.
+
+    """
+    return json.dumps(_structure(value, left_out))
+
+
+def _structure(value: object, left_out: frozenset[str]) -> object:
     """Return the fields of nested dataclasses by name, as JSON can hold them."""
     if is_dataclass(value):
         own = type(value).__name__
-        return {field.name: _structure(getattr(value, field.name))
-                for field in fields(value) if f'{own}.{field.name}' not in FREE_FIELDS}
+        return {field.name: _structure(getattr(value, field.name), left_out)
+                for field in fields(value) if f'{own}.{field.name}' not in left_out}
     if isinstance(value, tuple):
-        return [_structure(entry) for entry in value]
+        return [_structure(entry, left_out) for entry in value]
     return value.tolist() if isinstance(value, np.ndarray) else value
 
 

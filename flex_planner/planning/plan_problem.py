@@ -71,7 +71,12 @@ def _plan_in_any_time(problem: MotionProblem, solver: Solver,
         strategy, attempt = _solve_first(stretched, solver, quick)
         problem = stretched if attempt.result.converged else problem
     if attempt.result.status is SolverStatus.NEWTON_FAILED and slow:
+        names, failure = strategy, attempt.result.message
         strategy, attempt = _solve_first(problem, solver, slow)
+        if not attempt.decides:
+            strategy = f'{names}, {strategy}'
+            attempt = replace(attempt, result=replace(
+                attempt.result, message=f'{failure}; {attempt.result.message}'))
     if attempt.result.converged:
         solver.monitor.phase = 'duration freed'
         problem, result = free_duration(problem, attempt.result, solver)

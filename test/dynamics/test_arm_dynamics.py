@@ -9,7 +9,7 @@ import subprocess
 import sys
 from typing import Any
 
-from flex_planner.arms.arm import Arm
+from flex_planner.arms.arm import Arm, Joint, Link
 from flex_planner.dynamics import arm_dynamics, compiled_functions
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.cache_key import cache_key
@@ -121,3 +121,13 @@ def test_arms_used_last_are_kept_and_the_oldest_forgotten(
     ArmDynamics.of(arms[2])
     assert ArmDynamics.of(arms[0]) is first
     assert ArmDynamics.of(arms[1]) is not second
+
+
+def test_equal_arm_has_the_same_functions_whether_its_links_are_one_object_or_two() -> None:
+    def link() -> Link:
+        return Link(length=0.5, linear_density=6.0)
+
+    one, joints = link(), (Joint(), Joint())
+    shared, apart = (Arm(name='x', links=links, joints=joints)
+                     for links in ((one, one), (link(), link())))
+    assert ArmDynamics.of(shared) is ArmDynamics.of(apart)

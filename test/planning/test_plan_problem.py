@@ -276,3 +276,13 @@ def test_mesh_too_coarse_for_the_certificate_is_refined(
     plan = plan_path(paper_task(rigid_model.arm), model=rigid_model, solver=Solver(settings))
     assert plan.solved, plan.message
     assert 4 <= plan.mesh_intervals < 60
+
+
+def test_all_failures_of_a_free_duration_are_told(
+        rigid_model: ArmModel, paper_task: TaskFactory, result: CollocationResult) -> None:
+    strategies = [Strategy('fast', failed(result, 'fast lost'), quick=True),
+                  Strategy('slow', failed(result, 'slow lost'))]
+    plan = plan_path(paper_task(rigid_model.arm, time_weight=1.0), model=rigid_model,
+                     strategies=strategies)
+    assert plan.message == 'fast: fast lost; slow: slow lost'
+    assert plan.strategy == 'fast, slow'

@@ -210,8 +210,9 @@ class _Duration(FreeParameter):
         return problem.changed(duration=MAX_DURATION)
 
     def starts(self, problem: MotionProblem) -> Iterator[MotionProblem]:
-        for factor in _LONGER:
-            yield problem.changed(duration=min(factor * problem.task.duration, MAX_DURATION))
+        longer = [min(factor * problem.task.duration, MAX_DURATION) for factor in _LONGER]
+        for duration in dict.fromkeys(longer):
+            yield problem.changed(duration=duration)
 
 
 PAYLOAD: FreeParameter = _Payload()

@@ -211,3 +211,10 @@ def test_gap_of_an_unknown_price_is_infinite(plan_of: PlanFactory,
                                      problem=found.problem)
     assert 0 < known.gap < math.inf
     assert unknown.gap == math.inf
+
+
+def test_search_starts_with_no_duration_twice(rigid_model: ArmModel,
+                                              paper_task: TaskFactory) -> None:
+    problem = problem_of(rigid_model, paper_task(rigid_model.arm, duration=400.0))
+    starts = [DURATION.value(start) for start in DURATION.starts(problem)]
+    assert starts == [400.0, 1000.0]
