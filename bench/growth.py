@@ -15,8 +15,8 @@ from bench.solver import paper_problem
 from flex_planner import Arm, Monitor, Plan, plan_path, Task
 from flex_planner.arms.arm import Motor
 from flex_planner.collocation import Solver, SolverSettings
-from flex_planner.collocation.equations import collocation_residual, factorised, linearised
-from flex_planner.collocation.estimate import estimated
+from flex_planner.collocation.equations import collocation_residual, factorise, linearise
+from flex_planner.collocation.estimate import estimate_error
 from flex_planner.collocation.mesh import defects
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.planning.certificate import certify
@@ -92,15 +92,15 @@ def shares(payload: float = 1.0, repeats: int = 15) -> dict[str, float]:
     problem = paper_problem(payload)
     result = cold_start(problem, Solver()).result
     solution = result.solution.on_mesh(result.solution.mesh, SolverSettings().rule)
-    _, mean = linearised(problem, solution, Monitor())
-    system = factorised(problem, solution, mean)
+    _, mean = linearise(problem, solution, Monitor())
+    system = factorise(problem, solution, mean)
     residual = collocation_residual(problem, solution)
     parts: dict[str, Callable[[], object]] = {
-        "z' and its Jacobian at all stages": lambda: linearised(problem, solution, Monitor()),
-        'stage elimination and banded LU': lambda: factorised(problem, solution, mean),
+        "z' and its Jacobian at all stages": lambda: linearise(problem, solution, Monitor()),
+        'stage elimination and banded LU': lambda: factorise(problem, solution, mean),
         'one correction with a given matrix': lambda: system.correction(residual),
         'residual of a correction': lambda: collocation_residual(problem, solution),
-        'error estimate': lambda: estimated(problem, solution, system),
+        'error estimate': lambda: estimate_error(problem, solution, system),
         'defects for the mesh': lambda: defects(problem, solution),
         'certificate': lambda: certify(problem, result, Monitor()),
     }

@@ -70,7 +70,7 @@ def random_points(arm: Arm) -> tuple[Array, Array]:
     """Return extended states and parameters like those met on a motion."""
     random = np.random.default_rng(0)
     z = 0.1 * random.normal(size=(POINTS, 4 * arm.n_coordinates))
-    p = Parameters.of(arm, payload_mass=1.0).stacked()
+    p = Parameters.of(arm, payload_mass=1.0).stack()
     return z, p
 
 

@@ -23,7 +23,7 @@ def continuation_solver(solver: Solver, accuracy: float) -> Solver:
 
 
 def bracket_width(accuracy: float, value: float) -> float:
-    """Return how wide a bracket may be: motions nearer to their limit are out of reach."""
+    """Return the largest width of a bracket: motions nearer to their limit are out of reach."""
     return max(accuracy, _FINEST * value)
 
 
@@ -52,5 +52,5 @@ def is_near_limit(extremals: Sequence[Extremal], accuracy: float) -> bool:
 
 def restart_point(extremals: Sequence[Extremal]) -> Extremal | None:
     """Return the last motion that leaves some gap: a start for searches of its kind."""
-    roomy = [one for one in extremals if one.gap >= _RESTART * one.value]
-    return roomy[-1] if roomy else next(iter(extremals), None)
+    apart = [one for one in extremals if one.gap >= _RESTART * one.value]
+    return apart[-1] if apart else next(iter(extremals), None)

@@ -23,7 +23,7 @@ from flex_planner.capacity.bracket import (
 )
 from flex_planner.capacity.results import LimitResult
 from flex_planner.collocation import CollocationSolution, Solver
-from flex_planner.collocation.mesh import defects, levelled
+from flex_planner.collocation.mesh import defects, level_mesh
 from flex_planner.optimal_control.motion_problem import Indices, MotionProblem
 from flex_planner.planning.strategies.extremals import Extremal
 from flex_planner.planning.strategies.free_parameters import FreeParameter
@@ -146,9 +146,9 @@ def thin_out(extremal: Extremal, solver: Solver) -> SwitchedMotion:
     solution, result = extremal.result.solution, extremal.result
     error = float(result.errors.max()) / (_MARGIN * solver.settings.error_tolerance)
     growth = float(np.clip(error ** (1 / (2 * solution.rule.stages)), _COARSER, 1.0))
-    mesh = levelled(solution, defects(extremal.problem, solution), growth, result.switches,
-                    fewest=extremal.problem.fewest_intervals(solution.rule.stages),
-                    most=solution.intervals)
+    mesh = level_mesh(solution, defects(extremal.problem, solution), growth, result.switches,
+                      fewest=extremal.problem.fewest_intervals(solution.rule.stages),
+                      most=solution.intervals)
     return SwitchedMotion.of(extremal.problem, solution.on_mesh(mesh), result.switches)
 
 

@@ -106,7 +106,7 @@ def _try_payload(problem: MotionProblem, start: CollocationSolution, payload: fl
     """Try a payload from the motion of a lighter one, then from nothing; None if absurd."""
     solver.monitor.payload = payload
     try:
-        heavier = problem.changed(payload_mass=payload)
+        heavier = problem.with_changes(payload_mass=payload)
     except FlexPlannerError:  # too heavy to hold
         return None
     result: CollocationResult | None = None

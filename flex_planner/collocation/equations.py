@@ -37,8 +37,8 @@ def _residual(problem: BoundaryValueProblem, solution: CollocationSolution,
                     problem.right(solution.nodes[-1])[0])
 
 
-def linearised(problem: BoundaryValueProblem, solution: CollocationSolution,
-               monitor: Monitor) -> tuple[Residual, Array]:
+def linearise(problem: BoundaryValueProblem, solution: CollocationSolution,
+              monitor: Monitor) -> tuple[Residual, Array]:
     """
     Return the residual and the mean of dF/dz over each interval, (N, m, m).
 
@@ -67,8 +67,8 @@ def linearised(problem: BoundaryValueProblem, solution: CollocationSolution,
     return _residual(problem, solution, rate), mean
 
 
-def factorised(problem: BoundaryValueProblem, solution: CollocationSolution,
-               jacobians: Array) -> NewtonSystem:
+def factorise(problem: BoundaryValueProblem, solution: CollocationSolution,
+              jacobians: Array) -> NewtonSystem:
     """Return the linear system at a point, given its Jacobians."""
     return NewtonSystem(solution.rule, solution.steps, jacobians,
                         problem.left(solution.nodes[0])[1], problem.right(solution.nodes[-1])[1],

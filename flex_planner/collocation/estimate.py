@@ -43,8 +43,8 @@ class Estimate:
         return float(self.errors.max())
 
 
-def estimated(problem: BoundaryValueProblem, solution: CollocationSolution,
-              system: NewtonSystem) -> Estimate:
+def estimate_error(problem: BoundaryValueProblem, solution: CollocationSolution,
+                   system: NewtonSystem) -> Estimate:
     """
     Compare with the Gauss rule of one stage more, by a few corrections towards it.
 

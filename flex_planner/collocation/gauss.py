@@ -81,7 +81,7 @@ class GaussRule:
         # Gauss quadrature is exact for the products of Legendre polynomials that this needs
         transform = ((2 * degrees + 1)[:, None] * legendre.legvander(points, stages - 1).T
                      * weights / 2)
-        matrix = _integrated(points, stages) @ transform
+        matrix = _integrate_polynomials(points, stages) @ transform
         return GaussRule(nodes, weights / 2, matrix, transform, _spectrum(points, weights))
 
     def __reduce__(self) -> tuple[Callable[[int], GaussRule], tuple[int]]:
@@ -89,7 +89,7 @@ class GaussRule:
         return GaussRule.of, (self.stages,)
 
     def reconstruction_arguments(self) -> tuple[int]:
-        """Return what `reconstruct` takes."""
+        """Return the arguments of `reconstruct`."""
         return (self.stages,)
 
     @staticmethod
@@ -104,7 +104,7 @@ class GaussRule:
 
     def basis(self, theta: Array) -> Array:
         """Return the integrals of the Lagrange polynomials up to theta, shape (k, s)."""
-        basis: Array = _integrated(2 * theta - 1, self.stages) @ self.transform
+        basis: Array = _integrate_polynomials(2 * theta - 1, self.stages) @ self.transform
         return basis
 
     def basis_rate(self, theta: Array) -> Array:
@@ -113,7 +113,7 @@ class GaussRule:
         return rate
 
 
-def _integrated(x: Array, count: int) -> Array:
+def _integrate_polynomials(x: Array, count: int) -> Array:
     """Return the integrals up to theta = (1 + x) / 2 of the first Legendre polynomials in x."""
     values = legendre.legvander(x, count)
     integrals = np.empty((x.size, count))
@@ -137,7 +137,7 @@ def _spectrum(points: Array, weights: Array) -> Spectrum:
     beside = 1 / (2 * np.sqrt(4 * np.arange(1, count, dtype=np.longdouble)**2 - 1))
     X = (np.diag(beside, -1) - np.diag(beside, 1)).astype(np.longdouble)
     X[0, 0] = 0.5
-    eigenvalues, vectors = _refined(X)
+    eigenvalues, vectors = _refine_eigenvectors(X)
     signed = vectors * (-1.0)**np.arange(count)[:, None]
     rows = (signed / (signed * vectors).sum(axis=0)).T
     vectors = vectors * np.where(eigenvalues.imag > 0, 2, 1)
@@ -147,7 +147,7 @@ def _spectrum(points: Array, weights: Array) -> Spectrum:
         eigenvalues, polynomials @ vectors, rows @ (polynomials.T * weights / 2))))
 
 
-def _refined(X: LongArray) -> tuple[ComplexLongArray, ComplexLongArray]:
+def _refine_eigenvectors(X: LongArray) -> tuple[ComplexLongArray, ComplexLongArray]:
     """
     Return eigenvalues, one of each pair, and eigenvectors whose first component is 1.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from flex_planner.collocation.mesh import coarsened
+from flex_planner.collocation.mesh import coarsen
 from flex_planner.collocation.problem import BoundaryValueProblem
 from flex_planner.collocation.result import CollocationResult, INTERRUPTED
 from flex_planner.collocation.solution import CollocationSolution
@@ -51,16 +51,16 @@ def follow_homotopy(problem_at: Callable[[float], BoundaryValueProblem],
                 return result
             here = there
             fewest = max(settings.intervals, int(_COARSER * result.solution.intervals))
-            point = coarsened(problem, result.solution, _DEFECT, fewest)
+            point = coarsen(problem, result.solution, _DEFECT, fewest)
             step *= 2 if result.iterations <= _EASY else 1
         else:
             step /= 2
-            point = _refined(point, settings.max_intervals)
+            point = _refine_mesh(point, settings.max_intervals)
             if step < _SMALLEST_STEP:
                 return replace(result, message=f'{result.message} at {there:.1%} of the homotopy')
 
 
-def _refined(point: CollocationSolution, most: int) -> CollocationSolution:
+def _refine_mesh(point: CollocationSolution, most: int) -> CollocationSolution:
     """Return the same function on a finer mesh."""
     before = point.intervals
     count = min(int(_FINER * before), max(most, before))

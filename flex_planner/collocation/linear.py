@@ -87,7 +87,7 @@ class NewtonSystem:
         self._lower = left.shape[0] + scale.size - 1
         self._upper = 2 * scale.size - 1 - left.shape[0]
         self._row_scale = np.concatenate([_row_sizes(left * scale), _row_sizes(right * scale)])
-        band = self._assembled(self._stages.transition(), left, right)
+        band = self._assemble(self._stages.transition(), left, right)
         self._factors = BandedFactors(band, self._lower, self._upper)
         if self._factors.singular:
             raise SingularSystemError('the linearised boundary-value problem is singular')
@@ -102,7 +102,7 @@ class NewtonSystem:
         """
         return NewtonSystem(rule, *self._parts)
 
-    def _assembled(self, transition: Array, left: Array, right: Array) -> Array:
+    def _assemble(self, transition: Array, left: Array, right: Array) -> Array:
         """Return the banded matrix of the node equations: left rows, intervals, right rows."""
         count, size, _ = transition.shape
         top, scale = self._left_rows, self._scale
@@ -141,7 +141,7 @@ class NewtonSystem:
                               -residual.right / self._row_scale[top:]])
         nodes = self._factors.solve(rhs).reshape(-1, self._scale.size) * self._scale
         rates = (self._jacobians @ nodes[:-1, :, None])[..., 0]
-        return nodes, stages.joined(stages.solve(stages.constant(rates)) - forced)
+        return nodes, stages.join(stages.solve(stages.constant(rates)) - forced)
 
 
 class _StageSystem:
@@ -173,9 +173,9 @@ class _StageSystem:
         self._down_again = np.ascontiguousarray(self._again[..., inner])
         mu = steps[:, None] * rule.spectrum.eigenvalues
         self._mu: ComplexArray = mu.astype(np.complex128)
-        self._inverse = self._inverted()
+        self._inverse = self._invert()
 
-    def _inverted(self) -> ComplexArray:
+    def _invert(self) -> ComplexArray:
         """Return the inverses of the Schur complements, shape (N, r, i, i)."""
         mu, inner = self._mu[:, :, None, None], self._implicit
         first, second, third = (part[:, None][..., inner] for part in (
@@ -245,11 +245,11 @@ class _StageSystem:
         constant: ComplexArray = values[..., None] * self._rule.spectrum.inverse.sum(axis=1)
         return constant
 
-    def joined(self, x: ComplexArray) -> Array:
+    def join(self, x: ComplexArray) -> Array:
         """Return stage vectors (N, s, m) of their parts in the eigenvectors."""
         vectors = self._rule.spectrum.vectors.T
-        joined: Array = (x.real @ vectors.real - x.imag @ vectors.imag).swapaxes(1, 2)
-        return joined
+        join: Array = (x.real @ vectors.real - x.imag @ vectors.imag).swapaxes(1, 2)
+        return join
 
     def advance(self, x: ComplexArray) -> Array:
         """Return h sum b_i k_i, shape (N, m)."""

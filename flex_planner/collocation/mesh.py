@@ -104,8 +104,8 @@ def _distinct(times: Array, start: float, end: float) -> Array:
     return apart
 
 
-def levelled(solution: CollocationSolution, defect: Array, growth: float, switches: Array, *,
-             fewest: int, most: int) -> Array:
+def level_mesh(solution: CollocationSolution, defect: Array, growth: float, switches: Array, *,
+               fewest: int, most: int) -> Array:
     """
     Return a mesh with nodes on the switches that spreads the error evenly between them.
 
@@ -141,7 +141,7 @@ def levelled(solution: CollocationSolution, defect: Array, growth: float, switch
 
 
 def _density(solution: CollocationSolution, defect: Array, switches: Array) -> Array:
-    """Return how many intervals each interval deserves, the worst one 1."""
+    """Return the share of new intervals that each interval deserves, the worst one 1."""
     finite = np.where(np.isfinite(defect), defect, 1.0)
     density = np.maximum(finite, 1e-300) ** (1 / (solution.rule.stages + 1))
     # a switch inside an interval spoils its defect, but not once there is a node
@@ -157,8 +157,8 @@ def _density(solution: CollocationSolution, defect: Array, switches: Array) -> A
     return graded
 
 
-def coarsened(problem: BoundaryValueProblem, solution: CollocationSolution, defect: float,
-              fewest: int) -> CollocationSolution:
+def coarsen(problem: BoundaryValueProblem, solution: CollocationSolution, defect: float,
+            fewest: int) -> CollocationSolution:
     """
     Return a solution on as few intervals as leave a certain defect, expected to be coarse.
 
@@ -167,6 +167,6 @@ def coarsened(problem: BoundaryValueProblem, solution: CollocationSolution, defe
     """
     found = defects(problem, solution)
     growth = float((found.max() / defect) ** (1 / (solution.rule.stages + 1)))
-    mesh = levelled(solution, found, growth, switching_times(problem, solution),
-                    fewest=fewest, most=solution.intervals)
+    mesh = level_mesh(solution, found, growth, switching_times(problem, solution),
+                      fewest=fewest, most=solution.intervals)
     return solution.on_mesh(mesh)

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from flex_planner.base.progress import Monitor, StoppedError, StopReason
 from flex_planner.collocation.equations import (
     collocation_residual,
-    factorised,
-    linearised,
+    factorise,
+    linearise,
     magnitudes,
 )
 from flex_planner.collocation.linear import NewtonSystem, Residual, SingularSystemError
@@ -124,7 +124,7 @@ class _Run:
 
     def outcome(self, message: str, *, converged: bool = False,
                 stopped: StopReason | None = None) -> NewtonOutcome:
-        """Return where the run stands."""
+        """Return the state of the run."""
         return NewtonOutcome(self._solution, converged, self._norm, self.iterations,
                              self._system, stopped, message, self._coarse)
 
@@ -132,43 +132,43 @@ class _Run:
         """Factorise once and move as far as the matrix is good for; True if converged."""
         self._monitor.check()
         self._scale = magnitudes(self._problem, self._solution)
-        residual, jacobians = linearised(self._problem, self._solution, self._monitor)
-        system = self._system = factorised(self._problem, self._solution, jacobians)
-        full = self._measured(system, residual)
+        residual, jacobians = linearise(self._problem, self._solution, self._monitor)
+        system = self._system = factorise(self._problem, self._solution, jacobians)
+        full = self._measure(system, residual)
         self.iterations += 1
         self._norm = full.norm
         self._monitor.step(full.norm, self._solution.intervals)
         if full.norm <= self._tolerance:
-            self._solution = _moved(self._solution, full, 1.0)
+            self._solution = _move(self._solution, full, 1.0)
             return True
         return self._advance(system, full)
 
     def _advance(self, system: NewtonSystem, full: _Step) -> bool:
         """Take a damped step, then corrections with the same matrix while they converge."""
-        simplified = self._damped(system, full)
+        simplified = self._damp(system, full)
         self._previous = (full, simplified)
         last = full.norm
         while self._step == 1.0 and simplified.norm <= max(_KEPT * last, self._tolerance):
             self._norm, last = simplified.norm, simplified.norm
-            trial = _moved(self._solution, simplified, 1.0)
+            trial = _move(self._solution, simplified, 1.0)
             if last <= self._tolerance:
                 self._solution = trial
                 return True
-            following = self._measured(system, collocation_residual(self._problem, trial))
+            following = self._measure(system, collocation_residual(self._problem, trial))
             if following.norm > last:
                 break
             self._solution, simplified, self._previous = trial, following, None
         return False
 
-    def _damped(self, system: NewtonSystem, full: _Step) -> _Step:
+    def _damp(self, system: NewtonSystem, full: _Step) -> _Step:
         """Move to the first point along the correction that passes the test."""
-        step = self._step = self._predicted(full)
+        step = self._step = self._predict(full)
         bent, tried = 0.0, 1.0
         while step >= _SMALLEST_STEP:
             self._monitor.check()
-            trial = _moved(self._solution, full, step)
+            trial = _move(self._solution, full, step)
             try:
-                simplified = self._measured(system, collocation_residual(self._problem, trial))
+                simplified = self._measure(system, collocation_residual(self._problem, trial))
             except SingularSystemError:
                 step /= 4
                 continue
@@ -181,7 +181,7 @@ class _Run:
         self._coarse = bent > 0.5 * tried * full.norm
         raise SingularSystemError("no step of Newton's method reduces the error")
 
-    def _predicted(self, full: _Step) -> float:
+    def _predict(self, full: _Step) -> float:
         """Return the step that the observed nonlinearity allows."""
         if self._previous is None:
             return 1.0
@@ -192,7 +192,7 @@ class _Run:
         ratio = float(np.linalg.norm(simplified.nodes)) * before.norm / (difference * full.norm)
         return min(1.0, max(self._step * ratio, _SMALLEST_STEP))
 
-    def _measured(self, system: NewtonSystem, residual: Residual) -> _Step:
+    def _measure(self, system: NewtonSystem, residual: Residual) -> _Step:
         nodes, stages = system.correction(residual)
         norm = self._size(nodes)
         if not np.isfinite(norm):
@@ -203,6 +203,6 @@ class _Run:
         return float(np.sqrt(np.mean((nodes / self._scale) ** 2)))
 
 
-def _moved(solution: CollocationSolution, step: _Step, factor: float) -> CollocationSolution:
+def _move(solution: CollocationSolution, step: _Step, factor: float) -> CollocationSolution:
     return CollocationSolution(solution.mesh, solution.nodes + factor * step.nodes,
                                solution.stages + factor * step.stages, solution.rule)

@@ -33,7 +33,7 @@ class SolverSettings:
     Parameters
     ----------
     stages : int
-        Gauss points an interval, 2 to 11; order 2 stages.
+        Gauss points per interval, 2 to 11; order 2 stages.
     intervals : int
         Of the first mesh, 4 to `max_intervals`.
     max_intervals : int

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from flex_planner.base.progress import Monitor, StopReason
 from flex_planner.base.validation import Array
-from flex_planner.collocation.estimate import Estimate, estimated
-from flex_planner.collocation.mesh import defects, levelled, switching_times
+from flex_planner.collocation.estimate import Estimate, estimate_error
+from flex_planner.collocation.mesh import defects, level_mesh, switching_times
 from flex_planner.collocation.newton import newton, NewtonOutcome
 from flex_planner.collocation.problem import BoundaryValueProblem
 from flex_planner.collocation.result import CollocationResult, SolverSettings, SolverStatus
@@ -71,13 +71,13 @@ class _MeshRefinement:
             self._iterations += outcome.iterations
             self._point = outcome.solution
             if not outcome.converged or outcome.system is None:
-                if self._rescued(outcome):
+                if self._rescue(outcome):
                     continue
-                return self._failed(outcome)
+                return self._fail(outcome)
             switches = switching_times(self._problem, self._point)
-            if self._placed(switches):
+            if self._place_nodes(switches):
                 continue
-            estimate = estimated(self._problem, self._point, outcome.system)
+            estimate = estimate_error(self._problem, self._point, outcome.system)
             if tolerance > 3 * self._newton_tolerance(estimate.worst):
                 self._expected = estimate.worst  # the mesh deserves a better solution
                 continue
@@ -87,12 +87,12 @@ class _MeshRefinement:
                 return self._mesh_limit(estimate, switches)
 
     def _newton_tolerance(self, expected: float | None = None) -> float:
-        """Return how far Newton's method has to go where a certain error is expected."""
+        """Return the tolerance of Newton's method where a certain error is expected."""
         error = max(self._expected if expected is None else expected,
                     self._settings.error_tolerance)
         return float(min(_NEWTON_SHARE * error, _LOOSEST_NEWTON))
 
-    def _rescued(self, outcome: NewtonOutcome) -> bool:
+    def _rescue(self, outcome: NewtonOutcome) -> bool:
         """
         Move to a finer mesh where Newton's method failed for want of one; False if there is none.
 
@@ -120,7 +120,7 @@ class _MeshRefinement:
         self._rescues += 1
         self._meshes += 1
         self._expected = 1.0
-        mesh = levelled(self._point, found, 1.0, switches, fewest=count, most=count)
+        mesh = level_mesh(self._point, found, 1.0, switches, fewest=count, most=count)
         self._point = self._point.on_mesh(mesh)
         return True
 
@@ -138,7 +138,7 @@ class _MeshRefinement:
         allowed = np.sqrt(self._settings.error_tolerance) * np.diff(mesh)[right - 1]
         return bool((gaps <= np.maximum(allowed, 1e-9 * (mesh[-1] - mesh[0]))).all())
 
-    def _placed(self, switches: Array) -> bool:
+    def _place_nodes(self, switches: Array) -> bool:
         """Move nodes to the switches of a resolved solution; False if they are there."""
         if (self._expected > _RESOLVED or self._placements >= _MOST_PLACEMENTS
                 or self._on_nodes(switches)):
@@ -146,8 +146,8 @@ class _MeshRefinement:
         self._placements += 1
         count = self._point.intervals
         most = min(count + switches.size, max(count, self._settings.max_intervals))
-        mesh = levelled(self._point, defects(self._problem, self._point), 1.0, switches,
-                        fewest=count, most=most)
+        mesh = level_mesh(self._point, defects(self._problem, self._point), 1.0, switches,
+                          fewest=count, most=most)
         self._point = self._point.on_mesh(mesh)
         return True
 
@@ -163,9 +163,9 @@ class _MeshRefinement:
         if error > 0.5 * self._least:  # the last mesh was no better: prediction fails
             fewest = 1.3 * before
         self._least = min(self._least, error)
-        mesh = levelled(self._point, defects(self._problem, self._point), growth, switches,
-                        fewest=min(max(4, int(np.ceil(fewest))), settings.max_intervals),
-                        most=min(int(_LARGEST_GROWTH * before), settings.max_intervals))
+        mesh = level_mesh(self._point, defects(self._problem, self._point), growth, switches,
+                          fewest=min(max(4, int(np.ceil(fewest))), settings.max_intervals),
+                          most=min(int(_LARGEST_GROWTH * before), settings.max_intervals))
         if before >= settings.max_intervals and mesh.size - 1 >= before:
             return False
         self._expected = min(1.0, error * (before / (mesh.size - 1)) ** order)
@@ -180,7 +180,7 @@ class _MeshRefinement:
             residual=float(defects(self._problem, solution).max()), switches=switches,
             iterations=self._iterations, meshes=self._meshes, message=message or status.value)
 
-    def _failed(self, outcome: NewtonOutcome) -> CollocationResult:
+    def _fail(self, outcome: NewtonOutcome) -> CollocationResult:
         stops = {StopReason.CANCELED: SolverStatus.CANCELED,
                  StopReason.TIMEOUT: SolverStatus.TIMEOUT}
         status = stops[outcome.stopped] if outcome.stopped else SolverStatus.NEWTON_FAILED

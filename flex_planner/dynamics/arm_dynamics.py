@@ -65,7 +65,7 @@ class ArmDynamics:
         self.arm, self._loaded = arm, {}
 
     def reconstruction_arguments(self) -> tuple[Arm]:
-        """Return what `reconstruct` takes."""
+        """Return the arguments of `reconstruct`."""
         return (self.arm,)
 
     @classmethod
@@ -96,7 +96,7 @@ class ArmDynamics:
         """
         x, torque = np.zeros((1, 2 * self.arm.n_coordinates)), np.zeros((1, self.arm.n_joints))
         rate = np.zeros_like(x)
-        run = self._load('forward_dynamics').repeated([x, torque, np.array(physical)], [rate])
+        run = self._load('forward_dynamics').bind_arrays([x, torque, np.array(physical)], [rate])
 
         def evaluate(state: Array, torques: Array) -> Array:
             x[0], torque[0] = state, torques
@@ -118,7 +118,7 @@ class ArmDynamics:
 
         def advance(state: Array, torques: Array, length: float) -> tuple[Array, Array, Array]:
             first = np.broadcast_to(state, (len(torques), state.size))
-            after, fifth, third = function.chained(
+            after, fifth, third = function.evaluate_chain(
                 first, torques, np.full((len(torques), 1), length), physical)
             return after, fifth, third
 
@@ -136,7 +136,7 @@ class ArmDynamics:
         n, size = self.arm.n_joints, 2 * self.arm.n_coordinates
         x, torques, length = np.zeros((1, size)), np.zeros((1, 12, n)), np.zeros((1, 1))
         after, fifth, third = (np.zeros((1, size)) for _ in range(3))
-        run = self._load('runge_kutta_step').repeated(
+        run = self._load('runge_kutta_step').bind_arrays(
             [x, torques.reshape(1, RUNGE_KUTTA_STAGES * n), length, np.array(physical)],
             [after, fifth, third])
 

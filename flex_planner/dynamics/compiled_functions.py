@@ -79,7 +79,7 @@ class BatchFunction(Protocol):
     def __call__(self, *inputs: Array) -> tuple[Array, ...]:
         """Evaluate all points."""
 
-    def chained(self, *inputs: Array) -> tuple[Array, ...]:
+    def evaluate_chain(self, *inputs: Array) -> tuple[Array, ...]:
         """
         Evaluate points one after another, each from the first output of the one before.
 
@@ -87,7 +87,7 @@ class BatchFunction(Protocol):
 
         """
 
-    def repeated(self, inputs: Sequence[Array], outputs: Sequence[Array]) -> Callable[[], None]:
+    def bind_arrays(self, inputs: Sequence[Array], outputs: Sequence[Array]) -> Callable[[], None]:
         """
         Return a call that reads and writes the same arrays every time.
 
@@ -107,18 +107,18 @@ class _NativeFunction:
         self._signature = signature
 
     def __call__(self, *inputs: Array) -> tuple[Array, ...]:
-        return self._evaluated(inputs, chain=False)
+        return self._evaluate(inputs, chain=False)
 
-    def chained(self, *inputs: Array) -> tuple[Array, ...]:
-        return self._evaluated(inputs, chain=True)
+    def evaluate_chain(self, *inputs: Array) -> tuple[Array, ...]:
+        return self._evaluate(inputs, chain=True)
 
-    def _evaluated(self, inputs: Sequence[Array], *, chain: bool) -> tuple[Array, ...]:
+    def _evaluate(self, inputs: Sequence[Array], *, chain: bool) -> tuple[Array, ...]:
         arrays, outputs = self._signature.prepare(inputs)
         if self._call(len(arrays[0]), chain, _pointers(arrays), _pointers(outputs)):
             raise MemoryError('no memory to evaluate a compiled function')
         return tuple(outputs)
 
-    def repeated(self, inputs: Sequence[Array], outputs: Sequence[Array]) -> Callable[[], None]:
+    def bind_arrays(self, inputs: Sequence[Array], outputs: Sequence[Array]) -> Callable[[], None]:
         count = len(inputs[0])
         sources, targets, call = _pointers(inputs), _pointers(outputs), self._call
         kept = (inputs, outputs)  # the addresses are good only while the arrays live
@@ -143,12 +143,12 @@ class _InterpretedFunction:
         self._signature = signature
 
     def __call__(self, *inputs: Array) -> tuple[Array, ...]:
-        return self._evaluated(inputs, chain=False)
+        return self._evaluate(inputs, chain=False)
 
-    def chained(self, *inputs: Array) -> tuple[Array, ...]:
-        return self._evaluated(inputs, chain=True)
+    def evaluate_chain(self, *inputs: Array) -> tuple[Array, ...]:
+        return self._evaluate(inputs, chain=True)
 
-    def _evaluated(self, inputs: Sequence[Array], *, chain: bool) -> tuple[Array, ...]:
+    def _evaluate(self, inputs: Sequence[Array], *, chain: bool) -> tuple[Array, ...]:
         arrays, outputs = self._signature.prepare(inputs)
         batched, arrays[0] = self._signature.batched, arrays[0].copy()
         for point in range(len(arrays[0])):
@@ -160,7 +160,7 @@ class _InterpretedFunction:
                 output[point] = np.asarray(result.T).reshape(output[point].shape)
         return tuple(outputs)
 
-    def repeated(self, inputs: Sequence[Array], outputs: Sequence[Array]) -> Callable[[], None]:
+    def bind_arrays(self, inputs: Sequence[Array], outputs: Sequence[Array]) -> Callable[[], None]:
         def run() -> None:
             for target, result in zip(outputs, self(*inputs), strict=True):
                 target[...] = result
@@ -169,7 +169,7 @@ class _InterpretedFunction:
 
 
 def cache_folder() -> Path:
-    """Return where compiled functions are kept: ``$XDG_CACHE_HOME/flex_planner``."""
+    """Return the folder of compiled functions: ``$XDG_CACHE_HOME/flex_planner``."""
     root = os.environ.get('XDG_CACHE_HOME') or os.path.join(os.path.expanduser('~'), '.cache')
     return Path(root) / 'flex_planner'
 
@@ -187,7 +187,7 @@ def content_key(*parts: str | bytes) -> str:
 
 @cache
 def _processor() -> str:
-    """Return what the code is compiled for: a home folder may serve machines of several kinds."""
+    """Return the kind of processor: a home folder may serve machines of several kinds."""
     try:
         lines = Path('/proc/cpuinfo').read_text().splitlines()
     except OSError:

@@ -45,14 +45,14 @@ def build_dynamics_functions(arm: Arm) -> dict[str, BatchedFunction]:
     M = chain.mass_matrix()
     forces = ca.vertcat(u, ca.SX(arm.n_modes, 1))
     acceleration = solver_of(M)(forces - chain.bias())
-    rate = batched('forward_dynamics', [x, u], p, [ca.vertcat(rates, acceleration)])
+    rate = batch('forward_dynamics', [x, u], p, [ca.vertcat(rates, acceleration)])
     return {
         'forward_dynamics': rate,
         'runge_kutta_step': _runge_kutta_step(rate[0]),
-        'inverse_dynamics': batched('inverse_dynamics', [x, a], p, [chain.inverse_dynamics(a)]),
-        'mass_and_energy': batched('mass_and_energy', [x], p,
-                                   [M, chain.kinetic, chain.potential]),
-        'static_forces': batched('static_forces', [q], p, [
+        'inverse_dynamics': batch('inverse_dynamics', [x, a], p, [chain.inverse_dynamics(a)]),
+        'mass_and_energy': batch('mass_and_energy', [x], p,
+                                 [M, chain.kinetic, chain.potential]),
+        'static_forces': batch('static_forces', [q], p, [
             ca.gradient(chain.potential, q), ca.hessian(chain.potential, q)[0]]),
     }
 
@@ -62,7 +62,7 @@ def physical_symbols(chain: Chain) -> Any:
     return ca.vertcat(chain.payload_mass, chain.payload_inertia, chain.rigidity)
 
 
-def batched(name: str, inputs: Sequence[Any], p: Any, results: Sequence[Any]) -> BatchedFunction:
+def batch(name: str, inputs: Sequence[Any], p: Any, results: Sequence[Any]) -> BatchedFunction:
     """Return a function of points and shared parameters p with dense results."""
     dense = [ca.densify(result) for result in results]
     return ca.Function(name, [*inputs, p], dense), len(inputs)
@@ -82,14 +82,14 @@ def _runge_kutta_step(rate: Any) -> BatchedFunction:
     step, p = ca.MX.sym('h'), ca.MX.sym('p', rate.size1_in(2))
     slopes: list[Any] = []
     for i in range(DOP853.n_stages):
-        slopes.append(rate(x + step * _combined(DOP853.A[i, :i], slopes), u[:, i], p))
-    following = x + step * _combined(DOP853.B, slopes)
+        slopes.append(rate(x + step * _combine(DOP853.A[i, :i], slopes), u[:, i], p))
+    following = x + step * _combine(DOP853.B, slopes)
     # the last stage of the error estimate is at the end of the step, as stage 12 is
     slopes.append(rate(following, u[:, DOP853.n_stages - 1], p))
-    errors = [step * _combined(row, slopes) for row in (DOP853.E5, DOP853.E3)]
+    errors = [step * _combine(row, slopes) for row in (DOP853.E5, DOP853.E3)]
     return ca.Function('runge_kutta_step', [x, ca.vec(u), step, p], [following, *errors]), 3
 
 
-def _combined(weights: Any, vectors: list[Any]) -> Any:
+def _combine(weights: Any, vectors: list[Any]) -> Any:
     """Return the sum of weighted vectors; 0 for none."""
     return sum((float(w) * v for w, v in zip(weights, vectors, strict=True) if w), 0)

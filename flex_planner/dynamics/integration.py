@@ -65,7 +65,7 @@ class PiecewisePolynomial:
         return values
 
     def basis(self, theta: Array) -> Array:
-        """Return what turns coefficients into values at positions (k,), shape (k, d + 1)."""
+        """Return the matrix from coefficients to values at positions (k,), shape (k, d + 1)."""
         basis = legvander(2 * theta - 1, self.coefficients.shape[1] - 1)
         return basis.astype(np.float64, copy=False)
 

@@ -26,14 +26,14 @@ class _Frame:
     gravity: Any
     rate: Any
 
-    def turned(self, angle: Any, rate: Any) -> _Frame:
+    def turn(self, angle: Any, rate: Any) -> _Frame:
         """Return the frame after a rotation by ``angle``, turning ``rate`` faster."""
         c, s = ca.cos(angle), ca.sin(angle)
         inverse = ca.vertcat(ca.horzcat(c, s), ca.horzcat(-s, c))
         return _Frame(inverse @ self.velocity, inverse @ self.position, inverse @ self.gravity,
                       self.rate + rate)
 
-    def moved(self, length: float, deflection: Any, rate: Any) -> _Frame:
+    def move(self, length: float, deflection: Any, rate: Any) -> _Frame:
         """Return the frame shifted to a point of the link that bends."""
         v, w = self.velocity, self.rate
         velocity = ca.vertcat(v[0] - w * deflection, v[1] + w * length + rate)
@@ -58,14 +58,14 @@ def build_chain(arm: Arm) -> Chain:
     frame = _Frame(zero, zero, ca.SX(ca.sparsify(ca.DM(arm.gravity))), ca.SX(1, 1))
     kinetic, potential, slope, slope_rate = ca.SX(0), ca.SX(0), ca.SX(0), ca.SX(0)
     for i, (link, modal) in enumerate(zip(arm.links, arm.modal_slices, strict=True)):
-        frame = frame.turned(q[i] + slope, rates[i] + slope_rate)
+        frame = frame.turn(q[i] + slope, rates[i] + slope_rate)
         bend, bend_rate = q[modal], rates[modal]
         T, V = _link_energies(link, frame, bend, bend_rate, rigidity[i])
         shapes = link.mode_shapes()
         slope, slope_rate = _dot(shapes.tip_slope, bend), _dot(shapes.tip_slope, bend_rate)
         kinetic += T + arm.nodes[i].inertia * frame.rate**2 / 2
-        frame = frame.moved(link.length, _dot(shapes.tip_deflection, bend),
-                            _dot(shapes.tip_deflection, bend_rate))
+        frame = frame.move(link.length, _dot(shapes.tip_deflection, bend),
+                           _dot(shapes.tip_deflection, bend_rate))
         mass = arm.nodes[i + 1].mass + (payload if i == arm.n_joints - 1 else 0)
         kinetic += mass * ca.sumsqr(frame.velocity) / 2
         potential += V - mass * ca.dot(frame.gravity, frame.position)

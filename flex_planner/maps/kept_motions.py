@@ -45,7 +45,7 @@ def signature(task: Task, parameters: Parameters | None = None) -> Array:
     """Return the signature of a motion from rest to rest, shape (k,); see `signature_fields`."""
     parameters = parameters or task_parameters(task)
     return np.concatenate([task.start_positions, task.goal_positions, [task.duration],
-                           parameters.stacked()])
+                           parameters.stack()])
 
 
 def distances(signatures: NDArray[np.floating], own: Array, names: list[str],

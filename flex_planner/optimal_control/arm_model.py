@@ -50,7 +50,7 @@ class ArmModel(ArmDynamics):
     """
     The dynamics and optimality conditions of one arm, compiled as `ArmDynamics` is.
 
-    `p` is `Parameters.stacked` everywhere.
+    `p` is `Parameters.stack` everywhere.
 
     Parameters
     ----------

@@ -76,7 +76,7 @@ class BoundaryConditions:
         residual: Array = self._right_rows @ miss
         return residual, self._right_rows
 
-    def reached(self, end: Array) -> Array:
+    def target_state(self, end: Array) -> Array:
         """Return the state (2 n_t,) that a motion ending in `end` is to reach."""
         return np.where(np.isinf(self.goal_weights), self.goal, end)
 

@@ -95,4 +95,4 @@ class FreeDurationProblem:
 
     def fix(self, duration: float) -> MotionProblem:
         """Return the same motion with its duration given."""
-        return self.motion.changed(duration=duration)
+        return self.motion.with_changes(duration=duration)

@@ -120,7 +120,7 @@ class FreePayloadProblem:
 
     def fix(self, payload: float) -> MotionProblem:
         """Return the same motion with its payload given."""
-        return self.motion.changed(payload_mass=payload)
+        return self.motion.with_changes(payload_mass=payload)
 
     def _at(self, z: Array) -> tuple[MotionProblem, Array]:
         """Return the motion and the parameters with the payload of an iterate."""

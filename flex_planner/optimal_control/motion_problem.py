@@ -56,7 +56,7 @@ class MotionProblem:
 
     def __init__(self, model: ArmModel, task: Task, parameters: Parameters) -> None:
         self.model, self.task, self.parameters = model, task, parameters
-        self.p = parameters.stacked()
+        self.p = parameters.stack()
         n_t = model.arm.n_coordinates
         self.size = 4 * n_t
         self.ends = BoundaryConditions(model, task, parameters)
@@ -75,7 +75,7 @@ class MotionProblem:
         return self.model.optimality_jacobian(z, self.p)
 
     def switches(self, t: Array, z: Array, p: Array | None = None) -> Array:
-        """Return how far the unbounded torque is from each bound of eq. (15), (k, 2 n)."""
+        """Return the distances of the unbounded torque from the bounds of eq. (15), (k, 2 n)."""
         free = self.model.controls(z, self.p if p is None else p).free_torque
         n_t, n = self.model.arm.n_coordinates, self.model.arm.n_joints
         return np.hstack(self.parameters.torque_limits.distances(free, z[:, n_t:n_t + n]))
@@ -88,11 +88,11 @@ class MotionProblem:
         """Return the final conditions of eq. (16), or transversality of eq. (6)."""
         return self.ends.right(z)
 
-    def reached(self, end: Array) -> Array:
+    def target_state(self, end: Array) -> Array:
         """Return the state (2 n_t,) that a motion ending in `end` is to reach."""
-        return self.ends.reached(end)
+        return self.ends.target_state(end)
 
-    def changed(self, **changes: float) -> MotionProblem:
+    def with_changes(self, **changes: float) -> MotionProblem:
         """Return the problem of the same task changed in payload or duration."""
         task = replace(self.task, **changes)  # type: ignore[arg-type]
         parameters = replace(self.parameters, payload_mass=task.payload_mass)

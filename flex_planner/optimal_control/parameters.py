@@ -69,7 +69,7 @@ class Parameters(PhysicalParameters):
         """Return the motors' limits of eq. (15)."""
         return TorqueLimits(self.stall_torque, self.torque_slope)
 
-    def stacked(self) -> Array:
+    def stack(self) -> Array:
         """Return them as one vector, as the compiled optimality conditions take them."""
         return np.concatenate([np.atleast_1d(getattr(self, name)) for name in NAMES])
 
@@ -78,7 +78,7 @@ NAMES = tuple(field.name for field in fields(Parameters))
 
 
 def payload_index() -> int:
-    """Return where the payload's mass is in the vector."""
+    """Return the index of the payload's mass in the vector."""
     return NAMES.index('payload_mass')
 
 
@@ -115,6 +115,6 @@ class ParameterSymbols:
         """Return the motors' limits of eq. (15)."""
         return TorqueLimits(self['stall_torque'], self['torque_slope'])
 
-    def stacked(self) -> list[Any]:
-        """Return the symbols in the order of `Parameters.stacked`."""
+    def stack(self) -> list[Any]:
+        """Return the symbols in the order of `Parameters.stack`."""
         return [self.values[name] for name in NAMES]

@@ -40,7 +40,7 @@ class PlannedTorque:
         """Interpolate the torque of a solution, cut where a motor switches."""
         cuts = switching_times(problem, solution)
         if cuts.size:
-            solution = solution.on_mesh(_merged(solution.mesh, cuts))
+            solution = solution.on_mesh(_merge(solution.mesh, cuts))
         n, n_t = problem.model.arm.n_joints, problem.model.arm.n_coordinates
         theta = np.concatenate([[0.0], solution.rule.nodes, [1.0]])
         z = solution.values_at(theta).reshape(-1, problem.size)
@@ -68,11 +68,11 @@ class PlannedTorque:
 
     def _bounded(self, values: Array) -> Array:
         n = values.shape[-1] // 2
-        torque: Array = self.limits.bounded(values[..., :n], values[..., n:])
+        torque: Array = self.limits.bound(values[..., :n], values[..., n:])
         return torque
 
 
-def _merged(mesh: Array, cuts: Array) -> Array:
+def _merge(mesh: Array, cuts: Array) -> Array:
     """Return a mesh with cuts added, except those at its nodes."""
     distance = np.abs(cuts[:, None] - mesh).min(axis=1)
     new = cuts[distance > _SAME_TIME * (mesh[-1] - mesh[0])]

@@ -17,7 +17,7 @@ from typing import Any
 import casadi as ca
 from flex_planner.arms.arm import Arm
 from flex_planner.dynamics.chain import Chain
-from flex_planner.dynamics.dynamics_functions import batched, BatchedFunction, solver_of
+from flex_planner.dynamics.dynamics_functions import batch, BatchedFunction, solver_of
 from flex_planner.dynamics.planar_chain import build_chain
 from flex_planner.optimal_control.parameters import ParameterSymbols
 from flex_planner.optimal_control.running_cost import running_cost
@@ -58,7 +58,7 @@ def build_optimality_functions(arm: Arm) -> dict[str, BatchedFunction]:
     """
     Derive the functions of the optimality conditions that the numerics evaluate.
 
-    Every function takes `Parameters.stacked` last.
+    Every function takes `Parameters.stack` last.
 
     Parameters
     ----------
@@ -79,17 +79,17 @@ def build_optimality_functions(arm: Arm) -> dict[str, BatchedFunction]:
     """
     chain = build_chain(arm)
     symbols = ParameterSymbols.of(chain)
-    found, p = derive_conditions(chain, symbols), ca.vertcat(*symbols.stacked())
+    found, p = derive_conditions(chain, symbols), ca.vertcat(*symbols.stack())
     z, F, share, payload = found.z, found.rate, found.payload_share, chain.payload_mass
     return {
-        'optimality': batched('optimality', [z], p, [F]),
+        'optimality': batch('optimality', [z], p, [F]),
         # transposed: CasADi stores columns, NumPy rows
-        'optimality_jacobian': batched('optimality_jacobian', [z], p,
-                                       [F, ca.jacobian(F, z).T]),
-        'control': batched('control', [z], p, [
+        'optimality_jacobian': batch('optimality_jacobian', [z], p,
+                                     [F, ca.jacobian(F, z).T]),
+        'control': batch('control', [z], p, [
             found.torque, found.free_torque, found.cost, found.hamiltonian, share,
             found.acceleration]),
-        'payload_sensitivity': batched('payload_sensitivity', [z], p, [
+        'payload_sensitivity': batch('payload_sensitivity', [z], p, [
             ca.jacobian(F, payload), share, ca.jacobian(share, payload)]),
     }
 
@@ -104,7 +104,7 @@ def derive_conditions(chain: Chain, parameters: ParameterSymbols) -> Conditions:
         'effort_weights']
     y_value = solve(psi_2)
     free = free_torque(R, y_value[:n])
-    torque = limits.bounded(free, rates[:n])
+    torque = limits.bound(free, rates[:n])
     acceleration = solve(ca.vertcat(torque, ca.SX(n_t - n, 1)) - chain.bias())
 
     cost = running_cost(parameters, q, rates, u)

@@ -133,10 +133,10 @@ class Task:
         effort = vector('effort_weights', self.effort_weights, (0, n), above=0)
         self._set('effort_weights', effort if effort.size else vector('', np.ones(n), n))
         for name in ('position_weights', 'velocity_weights'):
-            self._set(name, _padded(name, getattr(self, name), n, n_t, 0.0, at_least=0))
+            self._set(name, _pad(name, getattr(self, name), n, n_t, 0.0, at_least=0))
         for name in ('start_velocities', 'goal_velocities'):
-            self._set(name, _padded(name, getattr(self, name), n, n_t, 0.0,
-                                    at_least=-MAX_VELOCITY, at_most=MAX_VELOCITY))
+            self._set(name, _pad(name, getattr(self, name), n, n_t, 0.0,
+                                 at_least=-MAX_VELOCITY, at_most=MAX_VELOCITY))
         for name in ('goal_position_weights', 'goal_velocity_weights'):
             self._set(name, _goal_weights(name, getattr(self, name), n, n_t))
 
@@ -150,8 +150,8 @@ class Task:
         object.__setattr__(self, name, value)
 
 
-def _padded(name: str, values: ArrayLike, n: int, n_t: int, rest: float,
-            **bounds: float) -> Array:
+def _pad(name: str, values: ArrayLike, n: int, n_t: int, rest: float,
+         **bounds: float) -> Array:
     """Return n_t checked entries; those that are not given are `rest`."""
     given = vector(name, values, (0, n, n_t), **bounds)  # type: ignore[arg-type]
     padded: Array = np.concatenate([given, np.full(n_t - given.size, rest)])
@@ -167,11 +167,11 @@ def _goal_weights(name: str, values: ArrayLike, n: int, n_t: int) -> Array:
         given = np.zeros(0)
     hard = np.isposinf(given)
     if given.ndim == 1 and hard.any():
-        checked = _padded(name, np.where(hard, 0.0, given), n, n_t, np.inf, at_least=0)
+        checked = _pad(name, np.where(hard, 0.0, given), n, n_t, np.inf, at_least=0)
         padded = np.where(np.pad(hard, (0, n_t - hard.size)), np.inf, checked)
         padded.setflags(write=False)
         return padded
-    return _padded(name, values, n, n_t, np.inf, at_least=0)
+    return _pad(name, values, n, n_t, np.inf, at_least=0)
 
 
 def postures_from_points(arm: Arm, start: ArrayLike, goal: ArrayLike,

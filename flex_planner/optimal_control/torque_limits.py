@@ -43,7 +43,7 @@ class TorqueLimits:
         lost = self.slope * speeds
         return -self.stall - lost, self.stall - lost
 
-    def bounded(self, free: Any, speeds: Any) -> Any:
+    def bound(self, free: Any, speeds: Any) -> Any:
         """Return the torque of eq. (14): that of eq. (13), within the bounds [N m]."""
         lower, upper = self.bounds(speeds)
         if isinstance(free, np.ndarray):

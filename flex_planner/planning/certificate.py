@@ -116,7 +116,7 @@ def simulate_to_goal(problem: MotionProblem, solution: CollocationSolution, moni
     """
     states = integrate(problem.model, problem.parameters.physical, problem.start,
                        PlannedTorque.of(problem, solution), monitor, rtol=rtol, atol=rtol / 100)
-    return states[-1], problem.reached(solution.nodes[-1, :problem.goal.size])
+    return states[-1], problem.target_state(solution.nodes[-1, :problem.goal.size])
 
 
 def _at_rest(problem: MotionProblem) -> Array:

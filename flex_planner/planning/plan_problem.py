@@ -67,7 +67,7 @@ def _plan_in_any_time(problem: MotionProblem, solver: Solver,
         longer = factor * problem.task.duration
         if attempt.result.status is not SolverStatus.NEWTON_FAILED or longer > MAX_DURATION:
             break
-        stretched = problem.changed(duration=longer)
+        stretched = problem.with_changes(duration=longer)
         strategy, attempt = _solve_first(stretched, solver, quick)
         problem = stretched if attempt.result.converged else problem
     if attempt.result.status is SolverStatus.NEWTON_FAILED and slow:

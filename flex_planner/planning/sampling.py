@@ -131,7 +131,7 @@ def _fitting(plan: Plan, settings: SamplingSettings, watch: Monitor) -> tuple[Ar
 
 
 def _too_long(steps: Array, errors: Array, tolerance: float) -> NDArray[np.bool_]:
-    """Return which steps are to be halved."""
+    """Return the steps to halve."""
     long: NDArray[np.bool_] = steps >= 2 * _SMALLEST_STEP
     halved = long & (errors > tolerance)
     if halved.mean() > _FEW:
@@ -156,7 +156,7 @@ def _first_times(plan: Plan, longest: float) -> Array:
 
 
 def _interpolation_errors(plan: Plan, first: Array, last: Array) -> Array:
-    """Return what linear interpolation from time to time changes in the torques [N m]."""
+    """Return the changes that linear interpolation makes in the torques [N m]."""
     share = np.linspace(0, 1, _PROBES + 1)
     times = first[:, None] + (last - first)[:, None] * share
     torques = plan.sample(times.ravel()).torques.reshape(*times.shape, -1)

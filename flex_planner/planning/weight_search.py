@@ -116,16 +116,16 @@ class _Search:
                  objectives: Objectives, solver: Solver) -> None:
         self._base, self._objectives = problem, objectives
         self._solver = solver
-        self._limited = objectives.limited(problem.model.arm)
+        self._judge_limit = objectives.limited(problem.model.arm)
         self._below: dict[Objective, _Point] = {}
         self._patterns = {objective: objectives.pattern(objective, problem.model.arm)
-                          for objective in self._limited}
-        if Objective.TORQUE_SHARES in self._limited:
+                          for objective in self._judge_limit}
+        if Objective.TORQUE_SHARES in self._judge_limit:
             # where all are raised none of them is: only those whose torque is too large
             over = objectives.shares(Objective.TORQUE_SHARES, problem, solution) > 1
             self._patterns[Objective.TORQUE_SHARES] *= over
         self.trials: list[WeightTrial] = []
-        self.best = self._point(dict.fromkeys(self._limited, 0.0), problem, solution)
+        self.best = self._point(dict.fromkeys(self._judge_limit, 0.0), problem, solution)
 
     def run(self) -> bool:
         """
@@ -138,14 +138,14 @@ class _Search:
         here, idle = self.best, 0
         for _ in range(_MOST_TURNS):
             before = here
-            for objective in self._limited:
+            for objective in self._judge_limit:
                 if here.shares[objective] > 1 or here.weights[objective]:
                     self._solver.monitor.phase = f'weight of {objective.value}'
                     found = self._smallest(objective, here)
                     if found is None:
                         return False
                     here = found
-            if here.worst <= 1 and (here is before or len(self._limited) == 1):
+            if here.worst <= 1 and (here is before or len(self._judge_limit) == 1):
                 self.best = here
                 return True
             excess = here.worst - 1, max(before.worst - 1, 0.0)
@@ -164,7 +164,7 @@ class _Search:
                      if weight and objective in self._below)
 
     def failure(self) -> str:
-        """Return what the closest motion misses."""
+        """Return a sentence about what the closest motion misses."""
         parts = []
         for objective, share in self.best.shares.items():
             if share > 1:
@@ -317,7 +317,7 @@ class _Search:
     def _point(self, weights: dict[Objective, float], problem: MotionProblem,
                solution: CollocationSolution) -> _Point:
         shares = {objective: float(self._objectives.shares(objective, problem, solution).max())
-                  for objective in self._limited}
+                  for objective in self._judge_limit}
         return _Point(weights=weights, problem=problem, solution=solution, shares=shares)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bvp_problems import bratu, Case, CASES, mc_03, mc_20, outcome_on, STEEP
 from flex_planner.collocation import solve, SolverSettings
-from flex_planner.collocation.estimate import Estimate, estimated
+from flex_planner.collocation.estimate import Estimate, estimate_error
 import numpy as np
 import pytest
 
@@ -13,7 +13,7 @@ def estimate_of(case: Case, intervals: int, stages: int) -> tuple[Estimate, floa
     """Return the estimate on a uniform mesh, and the error that it estimates."""
     outcome = outcome_on(case, intervals, stages)
     assert outcome.system is not None
-    estimate = estimated(case.problem, outcome.solution, outcome.system)
+    estimate = estimate_error(case.problem, outcome.solution, outcome.system)
     return estimate, case.error(outcome.solution)
 
 

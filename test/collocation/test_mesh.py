@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bvp_problems import bratu, mc_14, second_order, solved_on, STEEP
 from flex_planner.collocation import CollocationSolution, solve, SolverSettings
-from flex_planner.collocation.mesh import coarsened, defects, levelled
+from flex_planner.collocation.mesh import coarsen, defects, level_mesh
 import numpy as np
 from numpy.typing import NDArray
 import pytest
@@ -53,7 +53,7 @@ def test_defect_is_infinite_where_the_right_hand_side_is_undefined(bad: float) -
 def test_levelled_mesh_puts_nodes_where_the_defect_is() -> None:
     case = mc_14(1e-2)
     solution = solved_on(case, 20, 3)
-    mesh = levelled(solution, defects(case.problem, solution), 10.0, NOWHERE, fewest=25, most=60)
+    mesh = level_mesh(solution, defects(case.problem, solution), 10.0, NOWHERE, fewest=25, most=60)
     assert (mesh[0], mesh[-1]) == case.span
     assert 25 <= mesh.size - 1 <= 60
     steps = np.diff(mesh)
@@ -70,7 +70,7 @@ def test_levelled_mesh_puts_nodes_where_the_defect_is() -> None:
 def test_levelled_mesh_grades_towards_a_steep_interval() -> None:
     solution, defect = solved_on(STEEP, 9, 3), np.full(9, 1e-12)
     defect[4] = 1.0
-    mesh = levelled(solution, defect, 6.0, NOWHERE, fewest=4, most=100)
+    mesh = level_mesh(solution, defect, 6.0, NOWHERE, fewest=4, most=100)
     counts, _ = np.histogram(mesh, bins=solution.mesh)
     # six in the steep interval, half as many beside it, and a tenth everywhere else
     assert counts[4] == pytest.approx(6, abs=1)
@@ -81,14 +81,15 @@ def test_levelled_mesh_grades_towards_a_steep_interval() -> None:
 @pytest.mark.parametrize('growth', [0.5, 1.0, 3.0])
 def test_even_defect_gives_an_even_mesh(growth: float) -> None:
     solution = solved_on(STEEP, 12, 3)
-    mesh = levelled(solution, np.full(12, 1e-3), growth, NOWHERE, fewest=4, most=30)
+    mesh = level_mesh(solution, np.full(12, 1e-3), growth, NOWHERE, fewest=4, most=30)
     np.testing.assert_allclose(mesh, np.linspace(0, 1, 1 + min(30, round(12 * growth))),
                                atol=1e-15)
 
 
 def test_switches_get_nodes_exactly() -> None:
     solution, switches = solved_on(STEEP, 12, 3), np.array([0.1234567, 0.5, 0.51, 0.987654321])
-    mesh = levelled(solution, defects(STEEP.problem, solution), 1.0, switches, fewest=12, most=12)
+    mesh = level_mesh(solution, defects(STEEP.problem, solution), 1.0, switches, fewest=12,
+                      most=12)
     assert np.isin(switches, mesh).all()
     assert (np.diff(mesh) > 0).all()
     assert mesh.size - 1 <= 12 + switches.size
@@ -97,7 +98,7 @@ def test_switches_get_nodes_exactly() -> None:
 def test_defect_spoilt_by_a_switch_does_not_draw_nodes() -> None:
     solution, defect = solved_on(STEEP, 10, 3), np.full(10, 1e-6)
     defect[4] = 1.0
-    mesh = levelled(solution, defect, 1.0, np.array([0.45]), fewest=10, most=10)
+    mesh = level_mesh(solution, defect, 1.0, np.array([0.45]), fewest=10, most=10)
     assert np.isin(0.45, mesh)
     assert np.diff(mesh).min() > 0.03
 
@@ -105,13 +106,13 @@ def test_defect_spoilt_by_a_switch_does_not_draw_nodes() -> None:
 def test_overrefined_mesh_is_coarsened_for_the_next_problem() -> None:
     case = mc_14(1e-4)
     solution = solved_on(case, 200, 4)
-    coarse = coarsened(case.problem, solution, 1e-2, fewest=10)
+    coarse = coarsen(case.problem, solution, 1e-2, fewest=10)
     assert 10 <= coarse.intervals <= 40
     # less than the defect that was asked for, but not much less
     outcome = solve(case.problem, coarse,
                     SolverSettings(stages=4, error_tolerance=1, max_meshes=1))
     assert 1e-4 <= outcome.residual <= 3e-2
-    assert coarsened(case.problem, solution, 1e-30, fewest=10).intervals == 200
+    assert coarsen(case.problem, solution, 1e-30, fewest=10).intervals == 200
 
 
 def test_badly_distributed_mesh_is_coarsened_and_levelled() -> None:

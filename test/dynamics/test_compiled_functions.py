@@ -148,7 +148,7 @@ def test_without_compiler_functions_are_interpreted_with_one_warning(
 def test_interpreted_arm_gives_the_values_of_the_compiled_one(rigid_arm: Arm, cache: Path,
                                                               rigid_model: ArmModel) -> None:
     interpreted, parameters = ArmModel(rigid_arm), Parameters.of(rigid_arm, payload_mass=1.0)
-    p, physical = parameters.stacked(), parameters.physical
+    p, physical = parameters.stack(), parameters.physical
     z = np.random.default_rng(0).normal(size=(5, 8))
     for ours, theirs in zip(interpreted.optimality_jacobian(z, p),
                             rigid_model.optimality_jacobian(z, p), strict=True):
@@ -279,7 +279,7 @@ def test_no_points_give_no_results() -> None:
 def test_repeated_call_reads_and_writes_the_same_arrays() -> None:
     x, p = np.zeros((1, 2)), np.array([0.5])
     column, matrix = np.empty((1, 2)), np.empty((1, 2, 3))
-    run = load_functions(KEY, build)['tiny'].repeated([x, p], [column, matrix])
+    run = load_functions(KEY, build)['tiny'].bind_arrays([x, p], [column, matrix])
     for value in (1.0, 2.0):
         x[:] = value
         run()
@@ -306,7 +306,7 @@ def ticks_during(work: Callable[[], object]) -> tuple[float, int]:
 
 
 def test_calls_release_the_interpreter_lock(ei50_model: ArmModel) -> None:
-    p, z = Parameters.of(ei50_model.arm).stacked(), np.ones((20_000, 24))
+    p, z = Parameters.of(ei50_model.arm).stack(), np.ones((20_000, 24))
     seconds, ticks = ticks_during(lambda: ei50_model.optimality_jacobian(z, p))
     assert seconds > 0.04, 'too quick to tell; raise the number of points'
     # with the lock held there would be none; the call lasts for 20 ticks at the very least

@@ -70,7 +70,7 @@ def test_goal_is_met_where_it_is_hard_and_priced_where_it_is_not(crane_model: Ar
 def test_motion_is_to_reach_its_goal_or_where_it_ends_at_a_price(crane_model: ArmModel,
                                                                  task: Task) -> None:
     ends, end = ends_of(crane_model, task), 100.0 + np.arange(10)
-    reached = ends.reached(end)
+    reached = ends.target_state(end)
     priced = np.isfinite(ends.goal_weights)
     assert np.flatnonzero(priced).tolist() == [1, 5, 7]
     assert np.array_equal(reached, np.where(priced, end, ends.goal))

@@ -30,16 +30,16 @@ def parameters(workshop_arm: Arm) -> Parameters:
 
 def test_no_two_numbers_are_alike(parameters: Parameters) -> None:
     # or the tests below would not see that two are exchanged
-    stacked = parameters.stacked()
-    assert np.unique(stacked).size == stacked.size == 20
+    stack = parameters.stack()
+    assert np.unique(stack).size == stack.size == 20
 
 
 @pytest.mark.parametrize('name', NAMES)
 def test_symbol_of_a_name_takes_the_number_of_that_name(workshop_arm: Arm, name: str,
                                                         parameters: Parameters) -> None:
     symbols = ParameterSymbols.of(build_chain(workshop_arm))
-    pick = ca.Function('pick', [ca.vertcat(*symbols.stacked())], [symbols[name]])
-    found = np.array(pick(parameters.stacked()))[:, 0]
+    pick = ca.Function('pick', [ca.vertcat(*symbols.stack())], [symbols[name]])
+    found = np.array(pick(parameters.stack()))[:, 0]
     assert np.array_equal(found, np.atleast_1d(getattr(parameters, name)))
 
 
@@ -47,15 +47,15 @@ def test_limits_of_the_symbols_are_those_of_the_numbers(workshop_arm: Arm,
                                                         parameters: Parameters) -> None:
     symbols = ParameterSymbols.of(build_chain(workshop_arm))
     limits = symbols.torque_limits
-    pick = ca.Function('pick', [ca.vertcat(*symbols.stacked())], [limits.stall, limits.slope])
-    stall, slope = (np.array(value)[:, 0] for value in pick(parameters.stacked()))
+    pick = ca.Function('pick', [ca.vertcat(*symbols.stack())], [limits.stall, limits.slope])
+    stall, slope = (np.array(value)[:, 0] for value in pick(parameters.stack()))
     assert stall.tolist() == parameters.torque_limits.stall.tolist() == [9.0, 5.0]
     assert slope.tolist() == parameters.torque_limits.slope.tolist() == [2.25, 5 / 6]
 
 
 def test_payload_is_where_its_index_says(parameters: Parameters) -> None:
-    heavier = replace(parameters, payload_mass=2.5).stacked()
-    changed = np.flatnonzero(heavier != parameters.stacked())
+    heavier = replace(parameters, payload_mass=2.5).stack()
+    changed = np.flatnonzero(heavier != parameters.stack())
     assert changed.tolist() == [payload_index()]
     assert heavier[payload_index()] == 2.5
 
@@ -63,16 +63,16 @@ def test_payload_is_where_its_index_says(parameters: Parameters) -> None:
 def test_compiled_conditions_read_the_payload_at_its_index(workshop_model: ArmModel,
                                                            parameters: Parameters) -> None:
     z = np.random.default_rng(0).normal(size=(3, 20))
-    p = parameters.stacked()
+    p = parameters.stack()
     p[payload_index()] = 2.5
-    expected = workshop_model.optimality(z, replace(parameters, payload_mass=2.5).stacked())
+    expected = workshop_model.optimality(z, replace(parameters, payload_mass=2.5).stack())
     assert np.array_equal(workshop_model.optimality(z, p), expected)
-    assert not np.allclose(workshop_model.optimality(z, parameters.stacked()), expected)
+    assert not np.allclose(workshop_model.optimality(z, parameters.stack()), expected)
 
 
 def test_dynamics_take_the_first_of_them_in_the_same_order(parameters: Parameters) -> None:
     physical = parameters.physical
-    assert physical.tolist() == parameters.stacked()[:physical.size].tolist()
+    assert physical.tolist() == parameters.stack()[:physical.size].tolist()
     assert physical.tolist() == [1.3, 0.07, 30.0, 12.0]
 
 

@@ -89,7 +89,7 @@ def assert_close(found: Array, expected: Array, rounding: Array | float) -> None
 @shares
 def test_jacobian_agrees_with_finite_differences(model: ArmModel,
                                                  share: tuple[float, float]) -> None:
-    p = parameters(model.arm).stacked()
+    p = parameters(model.arm).stack()
     z = points(model, p, share)
     rate, jacobian = model.optimality_jacobian(z, p)
     assert np.array_equal(rate, model.optimality(z, p))
@@ -103,7 +103,7 @@ def test_jacobian_agrees_with_finite_differences(model: ArmModel,
 @shares
 def test_state_and_costate_rates_are_derivatives_of_the_minimised_hamiltonian(
         model: ArmModel, share: tuple[float, float]) -> None:
-    p = parameters(model.arm).stacked()
+    p = parameters(model.arm).stack()
     z = points(model, p, share)
     half = z.shape[1] // 2
     steps = step_sizes(model, z)
@@ -118,7 +118,7 @@ def test_state_and_costate_rates_are_derivatives_of_the_minimised_hamiltonian(
 @shares
 def test_jacobian_is_a_hamiltonian_matrix(model: ArmModel, share: tuple[float, float]) -> None:
     # F = (dH/dpsi, -dH/dx): its derivative is made of second derivatives of H, hence symmetries
-    p = parameters(model.arm).stacked()
+    p = parameters(model.arm).stack()
     jacobian = model.optimality_jacobian(points(model, p, share), p)[1]
     half = jacobian.shape[1] // 2
     A, G = jacobian[:, :half, :half], jacobian[:, :half, half:]
@@ -131,7 +131,7 @@ def test_jacobian_is_a_hamiltonian_matrix(model: ArmModel, share: tuple[float, f
 @shares
 def test_torque_is_eq_14_within_the_bounds_of_eq_15(model: ArmModel,
                                                     share: tuple[float, float]) -> None:
-    p = parameters(model.arm).stacked()
+    p = parameters(model.arm).stack()
     z = points(model, p, share)
     n_t = model.arm.n_coordinates
     mass = model.mass_and_energy(z[:, :2 * n_t], parameters(model.arm).physical)[0]
@@ -160,9 +160,9 @@ def hamiltonian(model: ArmModel, z: Array, torque: Array, p: Parameters) -> Arra
 def test_torque_minimises_the_hamiltonian_among_the_admissible_ones(
         model: ArmModel, share: tuple[float, float]) -> None:
     p = parameters(model.arm)
-    z = points(model, p.stacked(), share)
+    z = points(model, p.stack(), share)
     n_t = model.arm.n_coordinates
-    least = model.controls(z, p.stacked()).hamiltonian
+    least = model.controls(z, p.stack()).hamiltonian
     lower, upper = TorqueLimits.of(model.arm).bounds(z[:, n_t:n_t + 2])
     grid = np.stack(np.meshgrid(*2 * [np.linspace(0, 1, 21)]), -1).reshape(-1, 2)
     for k in range(BATCH):
@@ -177,9 +177,9 @@ def test_torque_minimises_the_hamiltonian_among_the_admissible_ones(
 def test_controls_agree_with_the_dynamics_and_the_cost(model: ArmModel,
                                                        share: tuple[float, float]) -> None:
     p = parameters(model.arm)
-    z = points(model, p.stacked(), share)
+    z = points(model, p.stack(), share)
     n_t = model.arm.n_coordinates
-    found = model.controls(z, p.stacked())
+    found = model.controls(z, p.stack())
     rate = model.forward_dynamics(z[:, :2 * n_t], found.torque, p.physical)
     still = np.zeros_like(z)
     still[:, :2 * n_t] = z[:, :2 * n_t]
@@ -194,7 +194,7 @@ def test_controls_agree_with_the_dynamics_and_the_cost(model: ArmModel,
 @shares
 def test_payload_share_is_the_derivative_of_the_hamiltonian_by_the_payload(
         model: ArmModel, share: tuple[float, float]) -> None:
-    p = parameters(model.arm).stacked()
+    p = parameters(model.arm).stack()
     z, step = points(model, p, share), 1e-3
     found = model.controls(z, p).payload_share
     direction = step * np.eye(1, p.size)[0]
@@ -211,7 +211,7 @@ def test_torque_never_leaves_its_bounds(workshop_model: ArmModel, seed: int,
     arm = workshop_model.arm
     z = np.random.default_rng(seed).normal(size=(50, 4 * arm.n_coordinates))
     z[:, 2 * arm.n_coordinates:] *= 10**size
-    torque = workshop_model.controls(z, parameters(arm).stacked()).torque
+    torque = workshop_model.controls(z, parameters(arm).stack()).torque
     lower, upper = TorqueLimits.of(arm).bounds(z[:, arm.n_coordinates:arm.n_coordinates + 2])
     assert (lower <= torque).all()
     assert (torque <= upper).all()
@@ -219,7 +219,7 @@ def test_torque_never_leaves_its_bounds(workshop_model: ArmModel, seed: int,
 
 def test_motors_without_limit_give_finite_derivatives(uneven_model: ArmModel) -> None:
     arm = uneven_model.arm
-    p = parameters(arm).stacked()
+    p = parameters(arm).stack()
     z = 1e3 * np.random.default_rng(2).normal(size=(BATCH, 24)) * 1e-2
     rate, jacobian = uneven_model.optimality_jacobian(z, p)
     controls = uneven_model.controls(z, p)

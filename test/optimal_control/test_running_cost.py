@@ -55,19 +55,19 @@ def test_running_cost_is_half_the_weighted_sum_of_squares(
     chain = build_chain(model.arm)
     symbols, u = ParameterSymbols.of(chain), ca.SX.sym('u', 2)
     x = ca.vertcat(chain.coordinates, chain.rates)
-    function = ca.Function('cost', [x, u, ca.vertcat(*symbols.stacked())],
+    function = ca.Function('cost', [x, u, ca.vertcat(*symbols.stack())],
                            [running_cost(symbols, chain.coordinates, chain.rates, u)])
     torque = np.array([3.0, -7.0])
     for z in points:
         state = z[:z.size // 2]
         # rounding
-        assert float(function(state, torque, parameters.stacked())) == pytest.approx(
+        assert float(function(state, torque, parameters.stack())) == pytest.approx(
             cost_by_hand(parameters, state, torque), rel=1e-14)
 
 
 def test_controls_have_the_cost_of_their_torque(model: ArmModel, parameters: Parameters,
                                                 points: Array) -> None:
-    found = model.controls(points, parameters.stacked())
+    found = model.controls(points, parameters.stack())
     half = points.shape[1] // 2
     expected = [cost_by_hand(parameters, z[:half], u)
                 for z, u in zip(points, found.torque, strict=True)]
@@ -79,8 +79,8 @@ def test_weights_of_the_state_enter_the_costates_by_minus_the_slope_of_the_cost(
     half, h = points.shape[1] // 2, 1e-3
     bare = replace(parameters, position_weights=0 * parameters.position_weights,
                    velocity_weights=0 * parameters.velocity_weights)
-    added = (model.optimality(points, parameters.stacked())
-             - model.optimality(points, bare.stacked()))
+    added = (model.optimality(points, parameters.stack())
+             - model.optimality(points, bare.stack()))
     assert not added[:, :half].any()  # the torque does not know them
     none = np.zeros(2)
     for z, found in zip(points, added[:, half:], strict=True):
@@ -94,7 +94,7 @@ def test_weights_of_the_state_enter_the_costates_by_minus_the_slope_of_the_cost(
 def test_weights_of_the_torque_enter_the_costates_through_the_moving_bound_alone(
         model: ArmModel, parameters: Parameters, points: Array) -> None:
     # free or at a bound, minus the slope of the least Hamiltonian by the speeds
-    p, n_t, h = parameters.stacked(), model.arm.n_coordinates, 1e-5
+    p, n_t, h = parameters.stack(), model.arm.n_coordinates, 1e-5
     found = model.optimality(points, p)[:, 3 * n_t:3 * n_t + 2]
     for joint in range(2):
         step = h * np.eye(4 * n_t)[n_t + joint]
@@ -107,7 +107,7 @@ def test_weights_of_the_torque_enter_the_costates_through_the_moving_bound_alone
 
 def at_all_points(model: ArmModel, parameters: Parameters, z: Array, size: int) -> Array:
     """Return unknowns of the programme with y = (q, q', q'', u + K_2 q') at all six points."""
-    n_t, found = model.arm.n_coordinates, model.controls(z[None], parameters.stacked())
+    n_t, found = model.arm.n_coordinates, model.controls(z[None], parameters.stack())
     y = np.concatenate([z[:2 * n_t], found.acceleration[0], found.torque[0]
                         + parameters.torque_slope * z[n_t:n_t + 2]])
     return np.concatenate([np.tile(y, 6), np.zeros(size - 6 * y.size)])
@@ -118,9 +118,9 @@ def test_programme_has_the_same_cost_at_the_same_point(
     programme, duration = Programme.of(model.arm, Mesh.of(*SCHEME)), 1.7
     x, p, f = (programme.expressions[name] for name in ('x', 'p', 'f'))
     cost, ends = ca.Function('f', [x, p], [f]), np.zeros(4 * model.arm.n_coordinates)
-    expected = model.controls(points, parameters.stacked()).cost_rate
+    expected = model.controls(points, parameters.stack()).cost_rate
     for z, rate in zip(points, expected, strict=True):
         found = cost(at_all_points(model, parameters, z, x.numel()),
-                     np.concatenate([parameters.stacked(), ends, [duration]]))
+                     np.concatenate([parameters.stack(), ends, [duration]]))
         # rounding, of which u + K_2 q' - K_2 q' leaves a little more
         assert float(found) == pytest.approx(duration * rate, rel=1e-12)

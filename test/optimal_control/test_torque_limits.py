@@ -27,7 +27,7 @@ def by_symbols(points: tuple[Array, Array]) -> list[Array]:
     free, speeds, stall, slope, weights = (
         ca.SX.sym(name, 2) for name in ('free', 'speeds', 'stall', 'slope', 'weights'))
     limits = TorqueLimits(stall, slope)
-    torque = limits.bounded(free, speeds)
+    torque = limits.bound(free, speeds)
     function = ca.Function('limits', [free, speeds, stall, slope, weights], [
         *limits.bounds(speeds), torque, limits.multiplier(weights, free, torque)])
     given = LIMITS.stall, LIMITS.slope, WEIGHTS
@@ -38,7 +38,7 @@ def by_symbols(points: tuple[Array, Array]) -> list[Array]:
 
 def test_numbers_and_symbols_agree(points: tuple[Array, Array], by_symbols: list[Array]) -> None:
     free, speeds = points
-    torque = LIMITS.bounded(free, speeds)
+    torque = LIMITS.bound(free, speeds)
     ours = *LIMITS.bounds(speeds), torque, LIMITS.multiplier(WEIGHTS, free, torque)
     for one, other in zip(ours, by_symbols, strict=True):
         # rounding: products may be taken in another order
@@ -62,7 +62,7 @@ def test_distances_change_their_sign_where_a_motor_reaches_or_leaves_its_limit()
         # a billionth to either side of the bound
         free = bound + 1e-9 * np.array([[-1.0], [1.0]])
         distance = LIMITS.distances(free, speeds)[which]
-        saturated = LIMITS.bounded(free, speeds) != free
+        saturated = LIMITS.bound(free, speeds) != free
         assert np.sign(distance).tolist() == [[-1, -1], [1, 1]]
         # above the upper bound, below the lower one
         assert np.array_equal(saturated, distance > 0 if which == 0 else distance < 0)
@@ -71,7 +71,7 @@ def test_distances_change_their_sign_where_a_motor_reaches_or_leaves_its_limit()
 def test_distances_have_the_signs_of_saturation_everywhere(points: tuple[Array, Array]) -> None:
     free, speeds = points
     above, below = LIMITS.distances(free, speeds)
-    assert np.array_equal((above > 0) | (below < 0), LIMITS.bounded(free, speeds) != free)
+    assert np.array_equal((above > 0) | (below < 0), LIMITS.bound(free, speeds) != free)
 
 
 def test_multiplier_is_the_slope_of_the_hamiltonian_along_a_bound(
@@ -81,13 +81,13 @@ def test_multiplier_is_the_slope_of_the_hamiltonian_along_a_bound(
 
     def share(rates: Array) -> Array:
         """Return what of H depends on the torque: R u^2 / 2 - R u_free u, for each joint."""
-        torque = LIMITS.bounded(free, rates)
+        torque = LIMITS.bound(free, rates)
         found: Array = WEIGHTS * (torque**2 / 2 - free * torque)
         return found
 
     clear = (np.abs(LIMITS.distances(free, speeds)) > 10 * step).all(axis=0)
     slope = (share(speeds + step) - share(speeds - step)) / (2 * step)
-    found = LIMITS.multiplier(WEIGHTS, free, LIMITS.bounded(free, speeds))
+    found = LIMITS.multiplier(WEIGHTS, free, LIMITS.bound(free, speeds))
     # a parabola in the speed: rounding of some hundred joules over the step
     np.testing.assert_allclose(found[clear], -slope[clear], atol=1e-9)
     assert 100 < np.count_nonzero(found[clear]) < found[clear].size
@@ -109,5 +109,5 @@ def test_free_torque_makes_the_hamiltonian_stationary() -> None:
 def test_motors_without_limits_never_saturate() -> None:
     unlimited = TorqueLimits(np.full(2, np.inf), np.zeros(2))
     free = np.array([[1e9, -1e9]])
-    assert unlimited.bounded(free, np.array([[50.0, -50.0]])).tolist() == free.tolist()
+    assert unlimited.bound(free, np.array([[50.0, -50.0]])).tolist() == free.tolist()
     assert not unlimited.multiplier(WEIGHTS, free, free).any()

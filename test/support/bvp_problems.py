@@ -30,7 +30,7 @@ def derivatives(f: Callable[[Any], Any], z: Array) -> Array:
     return np.stack([np.imag(f(z + step)) / 1e-30 for step in steps], axis=-1)
 
 
-def stacked(parts: list[Any], shape: tuple[int, ...]) -> Any:
+def stack(parts: list[Any], shape: tuple[int, ...]) -> Any:
     if not parts:
         return np.zeros((*shape, 0))
     return np.stack(np.broadcast_arrays(*parts, np.zeros(shape))[:-1], axis=-1)
@@ -57,23 +57,23 @@ class System:
         return np.ones(self.size)
 
     def rate(self, t: Array, z: Array) -> Array:
-        rate: Array = stacked(self.rate_of(t, z.T), t.shape)
+        rate: Array = stack(self.rate_of(t, z.T), t.shape)
         return rate
 
     def rate_jacobian(self, t: Array, z: Array) -> tuple[Array, Array]:
         return self.rate(t, z), derivatives(lambda values: self.rate(t, values), z)
 
     def switches(self, t: Array, z: Array) -> Array:
-        switches: Array = stacked(self.switches_of(t, z.T), t.shape)
+        switches: Array = stack(self.switches_of(t, z.T), t.shape)
         return switches
 
     def left(self, z: Array) -> tuple[Array, Array]:
-        return (stacked(self.left_of(z), ()),
-                derivatives(lambda values: stacked(self.left_of(values), ()), z))
+        return (stack(self.left_of(z), ()),
+                derivatives(lambda values: stack(self.left_of(values), ()), z))
 
     def right(self, z: Array) -> tuple[Array, Array]:
-        return (stacked(self.right_of(z), ()),
-                derivatives(lambda values: stacked(self.right_of(values), ()), z))
+        return (stack(self.right_of(z), ()),
+                derivatives(lambda values: stack(self.right_of(values), ()), z))
 
 
 def second_order(f: Callable[[Array, Any, Any], Any], start: float, end: float,

@@ -61,7 +61,7 @@ def end_state(plan: Plan, rtol: float = 1e-9) -> Array:
 def tip_miss(plan: Plan, rtol: float = 1e-9) -> float:
     """Return the distance of the tip from the end that was planned, as SciPy has it [m]."""
     n_t = plan.arm.n_coordinates
-    goal = plan.problem.reached(solution_of(plan).nodes[-1, :2 * n_t])
+    goal = plan.problem.target_state(solution_of(plan).nodes[-1, :2 * n_t])
     tips = tip_position(plan.arm, np.stack([end_state(plan, rtol)[:n_t], goal[:n_t]]))
     return float(np.linalg.norm(tips[0] - tips[1]))
 

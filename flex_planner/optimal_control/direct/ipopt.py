@@ -44,7 +44,7 @@ class DirectSettings:
         ``gauss``, which is what the indirect solver uses; ``radau``, which damps fast modes; or
         ``hermite_simpson``.
     degree : int
-        Collocation points an interval of the first two, 1 to 12.
+        Collocation points per interval of the first two, 1 to 12.
     intervals : int
         Of equal length, 2 to 20000.
     max_iterations : int
@@ -212,14 +212,14 @@ class DirectProblem:
         solver, (lower, upper) = self._solver(warm=warm is not None), self._bounds(parameters)
         began = time.perf_counter()
         iterate = warm.iterate if warm else {
-            'x0': self._guessed(guess, parameters, duration) if guess
+            'x0': self._guess_unknowns(guess, parameters, duration) if guess
             else self._straight_line(start, goal, duration)}
         prices = [price] if self.settings.free_payload else []
         if prices and not warm:
             iterate = {'x0': np.append(iterate['x0'], parameters.payload_mass)}
         self._watch.follow(monitor or Monitor())
         found = solver(**iterate, lbx=lower, ubx=upper, lbg=0, ubg=0,
-                       p=np.concatenate([parameters.stacked(), start, goal, [duration], prices]))
+                       p=np.concatenate([parameters.stack(), start, goal, [duration], prices]))
         if self._watch.error is not None:
             raise self._watch.error
         arrays = {name: np.array(found[name])[:, 0] for name in ('x', 'lam_x', 'lam_g')}
@@ -246,12 +246,12 @@ class DirectProblem:
         free = int(self.settings.free_payload)
         return np.append(-both, [0.0] * free), np.append(both, [np.inf] * free)
 
-    def _guessed(self, guess: Guess, parameters: Parameters, duration: float) -> Array:
+    def _guess_unknowns(self, guess: Guess, parameters: Parameters, duration: float) -> Array:
         """Return the unknowns on a motion with costates."""
         n, n_t = self.model.arm.n_joints, self.model.arm.n_coordinates
         times, node_times = self._times(duration)
         z = guess(times)
-        control = self.model.controls(z, parameters.stacked())
+        control = self.model.controls(z, parameters.stack())
         w = control.torque + parameters.torque_slope * z[:, n_t:n_t + n]
         y = np.hstack([z[:, :2 * n_t], control.acceleration, w])
         return np.concatenate([y.ravel(), guess(node_times)[:, :2 * n_t].ravel()])
@@ -277,7 +277,7 @@ class DirectProblem:
 
     def _result(self, arrays: dict[str, Array], cost: float, stats: dict[str, Any],
                 parameters: Parameters, duration: float, seconds: float) -> DirectResult:
-        """Return what IPOPT found, in the terms of the problem."""
+        """Return IPOPT's solution in the terms of the problem."""
         arm, mesh = self.model.arm, self._mesh
         n, n_t, K = arm.n_joints, arm.n_coordinates, mesh.points.size
         y = arrays['x'][:K * (3 * n_t + n)].reshape(K, -1)

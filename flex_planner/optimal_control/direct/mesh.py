@@ -20,8 +20,8 @@ class Mesh:
     A collocation method on N intervals of a unit of time.
 
     The values are x at K points, then at those nodes that are no points. They satisfy
-    ``P x = Q x'``, r rows an interval, of which the last leads to its right node; two more rows of
-    P pick the first and the last node.
+    ``P x = Q x'``, r rows per interval, of which the last leads to its right node; two more rows
+    of P pick the first and the last node.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Mesh:
     @classmethod
     def of(cls, scheme: str, degree: int, intervals: int, breaks: Array | None = None) -> Mesh:
         """
-        Return one of `SCHEMES`; the degree counts the points an interval of the first two.
+        Return one of `SCHEMES`; the degree counts the points per interval of the first two.
 
         On equal intervals, unless their ends from 0 to 1 are given.
 
@@ -92,7 +92,7 @@ def _collocation_points(scheme: str, degree: int) -> Array:
 
 
 def _values(index: Indices, c: Array) -> tuple[Array, Indices, Indices]:
-    """Return where an interval's rows lead, to which values (N, r), and the nodes (N + 1,)."""
+    """Return the ends of an interval's rows, their values (N, r), and the nodes (N + 1,)."""
     N, K = len(index), int(index[-1, -1]) + 1
     shared = int(c[0] == 0)
     first = 0 if shared else K

@@ -2,7 +2,7 @@
 The optimal control problem as a nonlinear programme: discretised first, optimised then.
 
 Every collocation point has the unknowns y = (q, q', q'', w) with w = u + K_2 q', so that eq. (15)
-is -K_1 <= w <= K_1 and eq. (3) one nonlinear row a coordinate. The rows that tie the points
+is -K_1 <= w <= K_1 and eq. (3) one nonlinear row per coordinate. The rows that tie the points
 together are linear; their multipliers give the costates. CasADi is imported only to derive it.
 
 """
@@ -46,7 +46,7 @@ class _Point:
         chain, n, n_t = build_chain(arm), arm.n_joints, arm.n_coordinates
         a, w, s, mu = (ca.SX.sym(*each) for each in (('a', n_t), ('w', n), ('s',), ('mu', n_t)))
         q, v, symbols = chain.coordinates, chain.rates, ParameterSymbols.of(chain)
-        y, p = ca.vertcat(q, v, a, w), ca.vertcat(*symbols.stacked())
+        y, p = ca.vertcat(q, v, a, w), ca.vertcat(*symbols.stack())
         u = w - symbols['torque_slope'] * v[:n]
         L = running_cost(symbols, q, v, u)
         force = chain.inverse_dynamics(a) - ca.vertcat(u, ca.SX(n_t - n, 1))

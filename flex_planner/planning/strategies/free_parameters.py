@@ -134,7 +134,7 @@ class _Payload(FreeParameter):
         return problem.task.payload_mass
 
     def with_value(self, problem: MotionProblem, value: float) -> MotionProblem:
-        return problem.changed(payload_mass=value)
+        return problem.with_changes(payload_mass=value)
 
     def price(self, problem: MotionProblem, solution: CollocationSolution) -> float:
         """Return dJ/dm_p, at least something positive: gravity may help."""
@@ -178,7 +178,7 @@ class _Duration(FreeParameter):
         return problem.task.duration
 
     def with_value(self, problem: MotionProblem, value: float) -> MotionProblem:
-        return problem.changed(duration=value)
+        return problem.with_changes(duration=value)
 
     def price(self, problem: MotionProblem, solution: CollocationSolution) -> float:
         """Return -dJ/dt_f = -H, at least something positive."""
@@ -207,12 +207,12 @@ class _Duration(FreeParameter):
         return False
 
     def easiest(self, problem: MotionProblem) -> MotionProblem:
-        return problem.changed(duration=MAX_DURATION)
+        return problem.with_changes(duration=MAX_DURATION)
 
     def starts(self, problem: MotionProblem) -> Iterator[MotionProblem]:
         longer = [min(factor * problem.task.duration, MAX_DURATION) for factor in _LONGER]
         for duration in dict.fromkeys(longer):
-            yield problem.changed(duration=duration)
+            yield problem.with_changes(duration=duration)
 
 
 PAYLOAD: FreeParameter = _Payload()

@@ -33,7 +33,7 @@ def raise_weights(problem: MotionProblem, solver: Solver) -> Attempt | None:
     """Start without position and velocity weights and raise them tenfold at a time."""
     if not has_weights(problem):
         return None
-    at, first_step = _weighted(problem)
+    at, first_step = _weights_at(problem)
     return _follow_from_line(at, solver, first_step)
 
 
@@ -42,7 +42,7 @@ def raise_weights_from(problem: MotionProblem, solution: CollocationSolution,
     """Start from the motion of the same task without position and velocity weights."""
     if not has_weights(problem):
         return solver.solve(problem, solution)
-    at, first_step = _weighted(problem)
+    at, first_step = _weights_at(problem)
     return follow_homotopy(at, solution, solver, first_step)
 
 
@@ -54,10 +54,10 @@ def has_weights(problem: MotionProblem) -> bool:
 
 def drop_weights(problem: MotionProblem) -> MotionProblem:
     """Return the problem with nothing but effort to count."""
-    return _weighted(problem)[0](0.0)
+    return _weights_at(problem)[0](0.0)
 
 
-def _weighted(problem: MotionProblem) -> tuple[Callable[[float], MotionProblem], float]:
+def _weights_at(problem: MotionProblem) -> tuple[Callable[[float], MotionProblem], float]:
     """Return the problem with its weights raised by a share, and the first share."""
     parameters = problem.parameters
     weights = np.concatenate([parameters.position_weights, parameters.velocity_weights])
@@ -82,27 +82,27 @@ def lower_vibration_price(problem: MotionProblem, solver: Solver) -> Attempt | N
     """
     if not problem.model.arm.n_modes:
         return None
-    return _follow_from_line(_calmed(problem), solver, first_step=1 / _DECADES)
+    return _follow_from_line(_calm(problem), solver, first_step=1 / _DECADES)
 
 
 def soften_links(problem: MotionProblem, solver: Solver) -> Attempt | None:
     """Start with stiffer links and a price on the bending rates; soften, then lower the price."""
     if not problem.model.arm.n_modes:
         return None
-    calmed = _calmed(problem)(0.0)
+    calmed = _calm(problem)(0.0)
 
-    def softened(share: float) -> MotionProblem:
+    def soften(share: float) -> MotionProblem:
         stiffer = _STIFFER ** (1 - share)
         return _with(calmed, rigidity=stiffer * problem.parameters.rigidity)
 
-    soft = _follow_from_line(softened, solver.loose(), first_step=0.25)
+    soft = _follow_from_line(soften, solver.loose(), first_step=0.25)
     if not soft.result.converged:
         return soft
-    return Attempt(result=follow_homotopy(_calmed(problem), soft.result.solution, solver,
+    return Attempt(result=follow_homotopy(_calm(problem), soft.result.solution, solver,
                                           first_step=1 / _DECADES))
 
 
-def _calmed(problem: MotionProblem) -> Callable[[float], MotionProblem]:
+def _calm(problem: MotionProblem) -> Callable[[float], MotionProblem]:
     """Return the problem with a price on the kinetic energy of bending, falling to none."""
     n = problem.model.arm.n_joints
     mass = np.diag(problem.model.mass_and_energy(
@@ -124,7 +124,7 @@ def _with(problem: MotionProblem, **changes: Any) -> MotionProblem:
 
 def _follow_from_line(problem_at: Callable[[float], MotionProblem], solver: Solver,
                       first_step: float) -> Attempt:
-    """Solve the first problem from a straight line and walk from there."""
+    """Solve the first problem from a straight line and follow the homotopy from there."""
     first = problem_at(0.0)
     guess = first.straight_line(min(_FIRST_INTERVALS, solver.settings.max_intervals),
                                 solver.settings.rule)

@@ -57,12 +57,12 @@ def lift(problem: MotionProblem, rigid: CollocationSolution,
     n, n_t = arm.n_joints, arm.n_coordinates
     joints = (np.arange(4)[:, None] * n_t + np.arange(n)).ravel()
 
-    def widened(values: Array) -> Array:
+    def widen(values: Array) -> Array:
         full = np.zeros((*values.shape[:-1], 4 * n_t))
         full[..., joints] = values
         return full
 
-    nodes, stages = widened(coarse.nodes), widened(coarse.stages)
+    nodes, stages = widen(coarse.nodes), widen(coarse.stages)
     bends = problem.start[n:n_t], problem.goal[n:n_t]  # as gravity bends the arm
     share = (mesh / mesh[-1])[:, None]
     nodes[:, n:n_t] = bends[0] + share * (bends[1] - bends[0])

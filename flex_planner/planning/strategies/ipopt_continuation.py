@@ -23,7 +23,7 @@ from flex_planner.collocation import (
     INTERRUPTED,
     Solver,
 )
-from flex_planner.collocation.mesh import defects, levelled, switching_times
+from flex_planner.collocation.mesh import defects, level_mesh, switching_times
 from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectSettings
 from flex_planner.optimal_control.free_payload import FreePayloadProblem
 from flex_planner.optimal_control.motion_problem import MotionProblem
@@ -39,7 +39,7 @@ _ITERATIONS, _TOLERANCE = 150, 1e-7
 # of Newton's method from there; exact, since near the limit little payload has a high price
 _NEWTON, _EXACT = 30, 1e-7
 # the first price, by a rigid arm's; it is raised so much at most, to what leaves this share of
-# the room that is wanted
+# the gap that is wanted
 _FIRST, _DEARER, _SURE, _LEAST_FACTOR = 4.0, 16.0, 0.8, 1.5
 
 
@@ -87,7 +87,7 @@ def continue_by_ipopt(problem: MotionProblem, price: float, solver: Solver,
 
 
 def _factor(extremal: Extremal, largest: float, target_gap: TargetGap) -> float:
-    """Return the factor in price that leaves little enough room, which goes with its inverse."""
+    """Return the factor in price that leaves the gap wanted, which goes with its inverse."""
     wanted = target_gap(extremal.value)
     if not wanted:
         return largest
@@ -127,14 +127,14 @@ def _extremal(ahead: FreePayloadProblem, result: CollocationResult, price: float
 
 def _transcribe(problem: MotionProblem, price: float, mesh: Array,
                 guess: CollocationSolution | None, monitor: Monitor) -> _Transcribed:
-    """Return what IPOPT finds on a mesh, with its multipliers as costates."""
+    """Return IPOPT's motion on a mesh, with its multipliers as costates."""
     duration = problem.task.duration
     direct = DirectProblem(problem.model, DirectSettings(
         scheme='gauss', degree=_STAGES, intervals=mesh.size - 1, tolerance=_TOLERANCE,
         max_iterations=_ITERATIONS, free_payload=True), mesh / duration)
     found = direct.solve(problem.parameters, problem.start, problem.goal, duration, guess=guess,
                          price=price, monitor=monitor)
-    motion = problem.changed(payload_mass=found.payload)
+    motion = problem.with_changes(payload_mass=found.payload)
     points = np.hstack([found.point_states, found.point_costates])
     rates = motion.rate(found.point_times, points).reshape(mesh.size - 1, _STAGES, -1)
     solution = CollocationSolution(mesh, np.hstack([found.states, found.costates]), rates,
@@ -146,5 +146,5 @@ def _level(problem: BoundaryValueProblem, solution: CollocationSolution,
            count: int) -> Array:
     """Return a mesh of so many intervals with nodes on the switches."""
     count = min(count, max(_MOST_INTERVALS, solution.intervals))
-    return levelled(solution, defects(problem, solution), 1.0,
-                    switching_times(problem, solution), fewest=count, most=count)
+    return level_mesh(solution, defects(problem, solution), 1.0,
+                      switching_times(problem, solution), fewest=count, most=count)

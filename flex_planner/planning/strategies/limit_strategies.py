@@ -58,7 +58,7 @@ def continue_in_payload(problem: MotionProblem, solver: Solver) -> Attempt | Non
     if not last.result.converged:
         return Attempt(result=last.result)
     if last.value * (1 + _STEADY) < wanted:
-        return _limited(extremals, (
+        return _judge_limit(extremals, (
             f'the arm carries at most {last.value:.4g} kg from start to goal in '
             f'{problem.task.duration:g} s, and {wanted:g} kg were asked for'))
     return Attempt(result=_reach_payload(problem, extremals, solver))
@@ -96,7 +96,7 @@ def continue_in_duration(problem: MotionProblem, solver: Solver) -> Attempt | No
     if not last.result.converged:
         return Attempt(result=last.result)
     if last.value > wanted * (1 + _STEADY):
-        return _limited(met, (
+        return _judge_limit(met, (
             f'the motion takes at least {last.value:.4g} s with {problem.task.payload_mass:g} kg, '
             f'and {wanted:g} s were asked for'))
     nearest = min(met, key=lambda extremal: abs(extremal.value - wanted))
@@ -108,7 +108,7 @@ def continue_in_duration(problem: MotionProblem, solver: Solver) -> Attempt | No
 
 def collect_until(extremals: Iterable[Extremal],
                   done: Callable[[Extremal], bool]) -> list[Extremal]:
-    """Return the extremals up to one that is enough, or to a limit; at least one."""
+    """Return the extremals up to one that is done, or to a limit; at least one."""
     met: list[Extremal] = []
     for extremal in extremals:
         met.append(extremal)
@@ -125,7 +125,7 @@ def is_steady(extremals: list[Extremal], share: float = _STEADY) -> bool:
     return bool(cheaper) and abs(last.value - cheaper[-1].value) < share * last.value
 
 
-def _limited(extremals: list[Extremal], sentence: str) -> Attempt:
+def _judge_limit(extremals: list[Extremal], sentence: str) -> Attempt:
     """
     Return an attempt with evidence: only if the price shows that the limit is near.
 

@@ -223,7 +223,7 @@ def _optimality(model: ArmModel, motion: RecordedMotion, parameters: Parameters,
     # the last sample holds the arm, it is not of the extremal
     z = np.hstack([motion.coordinates, motion.rates, motion.position_costates,
                    motion.velocity_costates])[:-1]
-    controls = model.controls(z, parameters.stacked())
+    controls = model.controls(z, parameters.stack())
     powers = np.abs(motion.position_costates * motion.rates).max()
     scale = max(float(controls.cost_rate.max()), float(powers), _TINY)
     return [

@@ -142,7 +142,7 @@ def test_unknowns_and_costates_keep_their_shapes(motion: MotionProblem) -> None:
     assert found.point_states.shape == found.point_costates.shape == (K, 4)
     np.testing.assert_allclose(found.states[[0, -1]], [motion.start, motion.goal], atol=1e-9)
     # optimal torques follow from the costates, with the payload found
-    p = replace(motion.parameters, payload_mass=found.payload).stacked()
+    p = replace(motion.parameters, payload_mass=found.payload).stack()
     z = np.hstack([found.point_states, found.point_costates])
     np.testing.assert_allclose(motion.model.controls(z, p).torque, found.torques, atol=1e-3)
 
