@@ -18,6 +18,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from flex_planner.base.version import VERSION
+
 if TYPE_CHECKING:
     from flex_planner.arms.arm import Arm
     from flex_planner.arms.arm_files import load_arm
@@ -30,7 +32,7 @@ if TYPE_CHECKING:
     from flex_planner.planning.plan import Plan
     from flex_planner.planning.plan_path import plan_path
 
-__version__ = '0.1.0'
+__version__ = VERSION
 
 __all__ = ['Arm', 'FlexPlannerError', 'Monitor', 'Objectives', 'Plan', 'Task',
            'find_max_payload', 'find_min_duration', 'load_arm', 'plan_path']

@@ -6,9 +6,9 @@ import argparse
 from collections.abc import Sequence
 import sys
 
-from flex_planner import __version__
 from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.progress import StoppedError, StopReason
+from flex_planner.base.version import VERSION
 from flex_planner.cli.commands import arm, compare, paper, plan, recordings
 from flex_planner.cli.commands import map as maps
 from flex_planner.cli.options import join_lists
@@ -46,7 +46,7 @@ def _parser() -> argparse.ArgumentParser:
     """Return the description of the command line."""
     parser = argparse.ArgumentParser(
         prog='flex-planner', description='Motion planning for flexible-link manipulators.')
-    parser.add_argument('--version', action='version', version=__version__)
+    parser.add_argument('--version', action='version', version=VERSION)
     commands = parser.add_subparsers(required=True, metavar='COMMAND')
     arm.add_command(commands)
     plan.add_commands(commands)

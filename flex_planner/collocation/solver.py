@@ -62,13 +62,14 @@ class Solver:
         """Return the same solver with another monitor, if one is given."""
         return self if monitor is None else replace(self, monitor=monitor)
 
-    def set(self, **changes: Any) -> Solver:
+    def with_settings(self, **changes: Any) -> Solver:
         """Return the same solver with fields of its settings changed."""
         return replace(self, settings=replace(self.settings, **changes))
 
     def loose(self) -> Solver:
         """Return a solver for solutions along a homotopy."""
-        return self.set(error_tolerance=max(_LOOSE_TOLERANCE, self.settings.error_tolerance))
+        return self.with_settings(error_tolerance=max(_LOOSE_TOLERANCE,
+                                                      self.settings.error_tolerance))
 
     def cheap(self) -> Solver:
         """Return a solver for a step along a homotopy that may fail."""
@@ -77,8 +78,8 @@ class Solver:
     def coarse(self, accuracy: float = _COARSE_TOLERANCE) -> Solver:
         """Return a solver for solutions along a continuation, exact to an accuracy."""
         wanted = max(min(accuracy, _COARSE_TOLERANCE), self.settings.error_tolerance)
-        return self.set(error_tolerance=wanted).patient(_COARSE_ITERATIONS)
+        return self.with_settings(error_tolerance=wanted).patient(_COARSE_ITERATIONS)
 
     def patient(self, iterations: int) -> Solver:
         """Return a solver that gives up after so many Newton iterations on a mesh."""
-        return self.set(max_iterations=min(iterations, self.settings.max_iterations))
+        return self.with_settings(max_iterations=min(iterations, self.settings.max_iterations))

@@ -44,7 +44,7 @@ class ArmDynamics:
     def __init__(self, arm: Arm) -> None:
         self.arm = arm
         self._loaded: dict[str, BatchFunction] = {}
-        self.compile()
+        self.prepare()
 
     @classmethod
     def of(cls: type[Dynamics], arm: Arm) -> Dynamics:
@@ -75,7 +75,7 @@ class ArmDynamics:
         made.__setstate__(arm)
         return made
 
-    def compile(self) -> None:
+    def prepare(self) -> None:
         """Load the functions from disk, or compile them, and the libraries that solving takes."""
         import scipy.integrate
         import scipy.linalg  # noqa: F401

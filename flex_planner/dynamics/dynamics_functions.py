@@ -7,8 +7,8 @@ from typing import Any
 
 import casadi as ca
 from flex_planner.arms.arm import Arm
+from flex_planner.dynamics.build_chain import build_chain
 from flex_planner.dynamics.chain import Chain
-from flex_planner.dynamics.planar_chain import build_chain
 
 BatchedFunction = tuple[Any, int]
 """A CasADi function, and how many of its leading inputs differ from point to point."""

@@ -41,7 +41,7 @@ class _Frame:
         return _Frame(velocity, position, self.gravity, w)
 
 
-def build_chain(arm: Arm) -> Chain:
+def build_planar_chain(arm: Arm) -> Chain:
     """
     Return the symbolic dynamics of an arm.
 

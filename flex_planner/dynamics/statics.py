@@ -81,7 +81,7 @@ def natural_modes(dynamics: ArmDynamics, coordinates: Array, parameters: Physica
         Columns are displacements, orthonormal in the mass matrix.
 
     """
-    from scipy.linalg import eigh  # see `ArmDynamics.compile`
+    from scipy.linalg import eigh  # see `ArmDynamics.prepare`
 
     first, p = dynamics.arm.n_joints if locked else 0, parameters.physical
     x = np.concatenate([coordinates, np.zeros_like(coordinates)])[None]

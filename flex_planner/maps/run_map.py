@@ -7,7 +7,7 @@ import time
 
 from distributed import Client
 from distributed.comm import get_address_host
-from flex_planner import __version__
+from flex_planner.base.version import VERSION
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.maps.block_solver import blocks, solve_block
 from flex_planner.maps.cluster import (
@@ -93,15 +93,15 @@ def warm_up(client: Client, study: Study, canceled: Callable[[], bool] = lambda:
         if future.status != 'finished':
             reason = future.exception() if future.done() else f'not ready in {_WARM_UP:g} s'
             raise ClusterError(f'worker {address} cannot compute: {reason}')
-        if future.result() != __version__:
+        if future.result() != VERSION:
             raise ClusterError(f'worker {address} has flex_planner {future.result()}, but this '
-                               f'is {__version__}')
+                               f'is {VERSION}')
 
 
 def _ready(study: Study) -> str:
     """Compile what a study needs; return the version of this package. Runs on a worker."""
     _compile(study)
-    return __version__
+    return VERSION
 
 
 def _compile(study: Study) -> None:

@@ -9,8 +9,8 @@ import reprlib
 from typing import Any, TYPE_CHECKING
 
 from dask import array
-from flex_planner import __version__
 from flex_planner.arms.arm_files import plain_arm
+from flex_planner.base.version import VERSION
 from flex_planner.maps.cell_results import CellCode
 from flex_planner.maps.kept_motions import signature_fields
 from flex_planner.optimal_control.task import Task
@@ -98,7 +98,7 @@ def metadata(study: Study) -> dict[str, str]:
             'arm': yaml.safe_dump(plain_arm(study.arm), sort_keys=False),
             'Conventions': _CONVENTIONS,
             'date_created': datetime.now(timezone.utc).isoformat(timespec='seconds'),
-            'flex_planner_version': __version__,
+            'flex_planner_version': VERSION,
             **{f'{name}_version': version(name) for name in _LIBRARIES}}
 
 

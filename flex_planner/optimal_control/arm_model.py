@@ -59,9 +59,9 @@ class ArmModel(ArmDynamics):
 
     """
 
-    def compile(self) -> None:
+    def prepare(self) -> None:
         """Load the functions from disk, or compile them."""
-        super().compile()
+        super().prepare()
         self._load_optimality('optimality')
 
     def optimality(self, z: Array, p: Array) -> Array:

@@ -16,9 +16,9 @@ from typing import Any
 
 import casadi as ca
 from flex_planner.arms.arm import Arm
+from flex_planner.dynamics.build_chain import build_chain
 from flex_planner.dynamics.chain import Chain
 from flex_planner.dynamics.dynamics_functions import batch, BatchedFunction, solver_of
-from flex_planner.dynamics.planar_chain import build_chain
 from flex_planner.optimal_control.parameters import ParameterSymbols
 from flex_planner.optimal_control.running_cost import running_cost
 from flex_planner.optimal_control.torque_limits import free_torque

@@ -136,7 +136,7 @@ def _certify(plan: Plan, result: CollocationResult, solver: Solver) -> Plan:
         if attempt < _REFINEMENTS:
             solver.monitor.phase = 'mesh refinement'
             reached = min(solver.settings.error_tolerance, float(result.errors.max()))
-            solver = solver.set(error_tolerance=max(reached / _REFINEMENT_FACTOR, 1e-11))
+            solver = solver.with_settings(error_tolerance=max(reached / _REFINEMENT_FACTOR, 1e-11))
             finer = solver.solve(problem, result.solution)
             if finer.status in INTERRUPTED_STATUS:
                 return replace(plan, status=INTERRUPTED_STATUS[finer.status],

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import BinaryIO, Final
 
-from flex_planner import __version__
+from flex_planner.base.version import VERSION
 from flex_planner.recording.definitions import MessageTypes
 from flex_planner.recording.metadata import FileSummary, RecordingMetadata, TopicSummary
 from flex_planner.recording.topics import Topic
@@ -60,7 +60,7 @@ class RecordingFile:
         self._pending = 0
         self._writer = Writer(stream, chunk_size=CHUNK_SIZE, compression=CompressionType.ZSTD,
                               enable_data_crcs=True)
-        self._writer.start('ros2', f'flex_planner/{__version__} {LIBRARY_IDENTIFIER}')
+        self._writer.start('ros2', f'flex_planner/{VERSION} {LIBRARY_IDENTIFIER}')
         self._written = stream.tell()
 
     def size_with(self, data: bytes) -> int:

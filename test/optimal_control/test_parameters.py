@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import casadi as ca
 from flex_planner.arms.arm import Arm
-from flex_planner.dynamics.planar_chain import build_chain
+from flex_planner.dynamics.build_chain import build_chain
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.parameters import (
     NAMES,

@@ -91,7 +91,7 @@ def test_monitor_hears_the_name_of_each_strategy(
     lines: list[Progress] = []
 
     def hasty(problem: MotionProblem, solver: Solver) -> Attempt:
-        return cold_start(problem, solver.set(max_iterations=1))
+        return cold_start(problem, solver.with_settings(max_iterations=1))
 
     plan = planned(rigid_model, paper_task(rigid_model.arm, 5.8), ('first', hasty),
                    ('second', hasty), ('third', cold_start), monitor=Monitor(report=lines.append))

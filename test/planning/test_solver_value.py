@@ -32,7 +32,8 @@ VARIANTS: dict[str, tuple[Variant, dict[str, Any]]] = {
     'coarse to 1e-9': (lambda solver: solver.coarse(1e-9), {'max_iterations': 25}),
     'patient': (lambda solver: solver.patient(7), {'max_iterations': 7}),
     'patient beyond its limit': (lambda solver: solver.patient(50), {}),
-    'set': (lambda solver: solver.set(stages=4, max_meshes=3), {'stages': 4, 'max_meshes': 3})}
+    'with_settings': (lambda solver: solver.with_settings(stages=4, max_meshes=3),
+                      {'stages': 4, 'max_meshes': 3})}
 every_variant = pytest.mark.parametrize(('variant', 'changes'), VARIANTS.values(), ids=VARIANTS)
 
 
@@ -87,7 +88,7 @@ def test_settings_out_of_bounds_are_refused_however_they_are_set() -> None:
     with pytest.raises(InvalidValueError, match='max_iterations is 0'):
         Solver().patient(0)
     with pytest.raises(InvalidValueError, match='error_tolerance is 2'):
-        Solver().set(error_tolerance=2.0)
+        Solver().with_settings(error_tolerance=2.0)
 
 
 # Other methods

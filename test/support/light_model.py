@@ -13,7 +13,7 @@ from collections.abc import Callable
 import casadi as ca
 from flex_planner.arms.arm import Arm
 from flex_planner.base.validation import Array
-from flex_planner.dynamics.planar_chain import build_chain
+from flex_planner.dynamics.build_chain import build_chain
 import numpy as np
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import platform
 import sys
 
-from flex_planner import __version__
 from flex_planner.base.validation import integer
+from flex_planner.base.version import VERSION
 from flex_planner.cli.options import Commands
 from flex_planner.cli.outputs import check_folder
 from flex_planner.cli.progress_line import Display, interruptible
@@ -60,7 +60,7 @@ def _paper(options: argparse.Namespace) -> int:
                     f'section {key} is done, {done} of {count}')).values())
     finally:
         display.close()
-    remark = (f'Computed in {display.elapsed:.0f} s by flex_planner {__version__} on '
+    remark = (f'Computed in {display.elapsed:.0f} s by flex_planner {VERSION} on '
               f'{processes} processors ({platform.machine()}).')
     page.write_text(document(sections, _PICTURES, remark))
     print(summary(sections))

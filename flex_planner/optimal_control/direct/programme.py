@@ -40,7 +40,7 @@ class _Point:
     def of(cls, arm: Arm) -> _Point:
         """Derive them."""
         import casadi as ca
-        from flex_planner.dynamics.planar_chain import build_chain
+        from flex_planner.dynamics.build_chain import build_chain
         from flex_planner.optimal_control.running_cost import running_cost
 
         chain, n, n_t = build_chain(arm), arm.n_joints, arm.n_coordinates

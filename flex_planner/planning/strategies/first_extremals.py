@@ -134,7 +134,7 @@ def solve_first(problem: MotionProblem, solver: Solver) -> CollocationResult:
     """Return the first solution that strategies find, or the last failure: soon."""
     settings = solver.settings
     most = max(_FIRST_MESHES * problem.fewest_intervals(settings.stages), _FIRST_INTERVALS)
-    quick = solver.patient(_FIRST_ITERATIONS).set(
+    quick = solver.patient(_FIRST_ITERATIONS).with_settings(
         max_intervals=min(most, settings.max_intervals), intervals=min(most, settings.intervals))
     result = cold_start(problem, quick).result
     for attempt in (lift_rigid_motion, raise_weights):

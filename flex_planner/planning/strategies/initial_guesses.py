@@ -78,7 +78,7 @@ def coarse_mesh(problem: MotionProblem, solver: Solver) -> Attempt:
     rings is nearly linear on top of that.
 
     """
-    few = solver.set(stages=_COARSE_STAGES, max_meshes=1, error_tolerance=1.0)
+    few = solver.with_settings(stages=_COARSE_STAGES, max_meshes=1, error_tolerance=1.0)
     for intervals in (min(count, solver.settings.max_intervals) for count in _COARSE_INTERVALS):
         guess = problem.straight_line(intervals, few.settings.rule)
         result = few.solve(problem, guess)

@@ -113,7 +113,7 @@ def _solve_at_price(problem: MotionProblem, price: float, mesh: Array,
 
 def _exact(solver: Solver) -> Solver:
     """Return a solver for Newton's method from a motion of IPOPT, with its own rule."""
-    return solver.set(stages=_STAGES, error_tolerance=_EXACT).patient(_NEWTON)
+    return solver.with_settings(stages=_STAGES, error_tolerance=_EXACT).patient(_NEWTON)
 
 
 def _extremal(ahead: FreePayloadProblem, result: CollocationResult, price: float) -> Extremal:

@@ -6,10 +6,10 @@ from datetime import datetime, timezone
 import itertools
 from pathlib import Path
 
-from flex_planner import __version__
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import plain_arm
 from flex_planner.base.errors import RecordingError
+from flex_planner.base.version import VERSION
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.sampling import SampledPlan
 from flex_planner.recording import (
@@ -86,7 +86,7 @@ class OutcomeRecorder:
         path = settings.output_folder() / self._name(stamp, outcome.search)
         report.recording = str(path)
         with Recording.create(path.parent, path.name, self._types,
-                              custom_data={'flex_planner': __version__},
+                              custom_data={'flex_planner': VERSION},
                               max_bytes=settings.max_recording_size or None) as recording:
             recording.attach('scenario.yaml', self._scenario(settings).encode(),
                              media_type='application/yaml', time_ns=stamp)
