@@ -19,7 +19,7 @@ from flex_planner.base.errors import (
     UnreachableError,
 )
 from flex_planner.base.progress import Monitor
-from flex_planner.collocation import SolverSettings
+from flex_planner.collocation import Solver, SolverSettings
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_path import plan_path
@@ -158,7 +158,8 @@ def test_every_status_has_its_code() -> None:
 def test_report_of_a_failed_plan_is_infinite_and_says_why(rigid_arm: Arm, rigid_model: ArmModel,
                                                           paper_task: Any) -> None:
     settings = SolverSettings(stages=2, intervals=4, max_intervals=4, error_tolerance=1e-11)
-    failed = plan_path(paper_task(rigid_arm), model=rigid_model, settings=settings)
+    failed = plan_path(paper_task(rigid_arm), model=rigid_model,
+                       solver=Solver(settings))
     report = report_from_plan(failed)
     assert report.error_code == PlanReport.NOT_CONVERGED
     assert report.error_msg.startswith('not converged, which does not show that the motion is ')
