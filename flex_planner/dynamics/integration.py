@@ -248,14 +248,18 @@ def step_error(states: Array, fifth: Array, third: Array,
     return worst if np.isfinite(worst) else np.inf
 
 
-@cache
 def _stage_shares(count: int) -> Array:
     """Return the times of the stages of equal steps, as shares of the interval they cross."""
+    shares: Array = ((np.arange(count)[:, None] + _stages()) / count).ravel()
+    return shares
+
+
+@cache
+def _stages() -> Array:
+    """Return the times of the stages of one step, as shares of it."""
     from scipy.integrate import DOP853
 
-    stages = np.array(DOP853.C[:RUNGE_KUTTA_STAGES], dtype=float)
-    shares: Array = ((np.arange(count)[:, None] + stages) / count).ravel()
-    return shares
+    return np.array(DOP853.C[:RUNGE_KUTTA_STAGES], dtype=float)
 
 
 def simulate(dynamics: ArmDynamics, physical: Array, state: Array,
