@@ -15,10 +15,12 @@ from enum import Enum
 import json
 import os
 from pathlib import Path
+import threading
 from typing import Any
 import zipfile
+import zlib
 
-from flex_planner.base.errors import ValueFileError
+from flex_planner.base.errors import FlexPlannerError, ValueFileError
 from flex_planner.base.validation import Array
 import numpy as np
 
@@ -39,6 +41,8 @@ def save_value(path: str | os.PathLike[str], value: object) -> None:
 
     Raises
     ------
+    TypeError
+        If a value is of no such kind.
     OSError
         If the file cannot be written.
 
@@ -48,7 +52,7 @@ def save_value(path: str | os.PathLike[str], value: object) -> None:
     header = {'format': _FORMAT, 'objects': writer.objects, 'root': root}
     parts: dict[str, Any] = {_HEADER: np.array(json.dumps(header)), **writer.arrays}
     target = Path(path)
-    partial = target.with_name(f'.{target.name}.{os.getpid()}.partial')
+    partial = target.with_name(f'.{target.name}.{os.getpid()}.{threading.get_ident()}.partial')
     try:
         with partial.open('wb') as file:
             np.savez(file, **parts)
@@ -84,8 +88,11 @@ def load_value(path: str | os.PathLike[str], classes: Iterable[type]) -> object:
             raise ValueFileError(f'{path} has format {header["format"]}, but must have {_FORMAT}')
         reader = _Reader({one.__name__: one for one in classes}, header['objects'], arrays)
         return reader.decode(header['root'])
-    except (ValueError, KeyError, TypeError, AttributeError, IndexError, EOFError,
-            zipfile.BadZipFile) as error:
+    except ValueFileError:
+        raise
+    except (ArithmeticError, AttributeError, EOFError, FlexPlannerError, LookupError, MemoryError,
+            NotImplementedError, RuntimeError, TypeError, ValueError, zipfile.BadZipFile,
+            zlib.error) as error:
         raise ValueFileError(f'{path} is damaged or no file of saved values: {error}') from error
 
 
@@ -107,6 +114,8 @@ class _Writer:
         if isinstance(value, Enum):
             return {'enum': type(value).__name__, 'name': value.name}
         if isinstance(value, np.ndarray):
+            if value.dtype.hasobject:
+                raise TypeError('an array of objects cannot be saved: only numbers can')
             name = f'array_{len(self.arrays)}'
             self.arrays[name] = value
             return {'array': name}

@@ -6,10 +6,9 @@ from collections.abc import Iterable, Sequence
 
 from flex_planner.collocation import Solver
 from flex_planner.planning.strategies.extremals import Extremal
-from flex_planner.planning.strategies.limit_strategies import is_steady
+from flex_planner.planning.strategies.limit_strategies import collect_until, is_steady
 import numpy as np
 
-_MOST_EXTREMALS = 100
 _FINEST = 1e-6
 # of motions along the continuation, by accuracy of the value [1/kg, 1/s]
 _EXACTNESS = 10.0
@@ -29,13 +28,7 @@ def bracket_width(accuracy: float, value: float) -> float:
 
 def collect_to_limit(extremals: Iterable[Extremal], accuracy: float) -> list[Extremal]:
     """Return the extremals up to one that is near the limit, or fails, or the last."""
-    met: list[Extremal] = []
-    for extremal in extremals:
-        met.append(extremal)
-        if (not extremal.result.converged or len(met) == _MOST_EXTREMALS
-                or is_near_limit(met, accuracy)):
-            break
-    return met
+    return collect_until(extremals, lambda met: is_near_limit(met, accuracy))
 
 
 def is_near_limit(extremals: Sequence[Extremal], accuracy: float) -> bool:

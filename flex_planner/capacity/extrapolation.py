@@ -13,7 +13,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import chain
 
-from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.validation import Array, number
 from flex_planner.capacity.bracket import (
     bracket_width,
@@ -68,7 +67,7 @@ class Neighbours:
     @property
     def extremals(self) -> tuple[Extremal, Extremal] | None:
         """Return the motions nearest to both limits, the farther task's first."""
-        if self.near is None or self.far is None:
+        if self.near is None or type(self.near) is not type(self.far):
             return None
         if not (self.near.extremals and self.far.extremals):
             return None
@@ -129,16 +128,12 @@ def extrapolate_extremal(parameter: FreeParameter, problem: MotionProblem,
     if not before.result.solution.nodes.shape[1] == here.problem.size == problem.size:
         return None
     value = max(here.value + ratio * (here.value - before.value), 0.0)
-    try:
-        near = parameter.with_value(problem, value)
-        guess = extrapolate(thin_out(before, solver), thin_out(here, solver), ratio,
-                            near.task.duration)
-        found = parameter.solve_at_price(near, guess, here.price, solver.patient(_FEW))
-    except FlexPlannerError:  # too heavy to hold, or no duration
-        return None
-    if found is None or found.interrupted:
-        return found
-    return found if parameter.improves(found.value, parameter.value(problem)) else None
+
+    def guess(near: MotionProblem) -> CollocationSolution:
+        return extrapolate(thin_out(before, solver), thin_out(here, solver), ratio,
+                           near.task.duration)
+
+    return parameter.solve_beyond(problem, value, guess, here.price, solver.patient(_FEW))
 
 
 def thin_out(extremal: Extremal, solver: Solver) -> SwitchedMotion:

@@ -17,10 +17,10 @@ from flex_planner.collocation import CollocationSolution, Solver
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_problem import INTERRUPTED_STATUS, plan_problem
-from flex_planner.planning.strategies.catalogue import QUICK
+from flex_planner.planning.strategies.catalogue import CATALOGUE, QUICK
 from flex_planner.planning.strategies.extremals import Extremal, SearchStart
 from flex_planner.planning.strategies.first_extremals import approach_limit, transfer_extremal
-from flex_planner.planning.strategies.free_parameters import FreeParameter
+from flex_planner.planning.strategies.free_parameters import FreeParameter, PAYLOAD
 from flex_planner.planning.strategies.homotopies import (
     drop_weights,
     has_weights,
@@ -145,7 +145,10 @@ class LimitSearch:
     def _approach_from_plan(self) -> Failure | None:
         """Collect extremals from a motion that takes all strategies to find."""
         bare = drop_weights(self._problem)
-        plan = plan_problem(bare, self._solver)
+        # a duration is only a first guess: what it forbids is no limit of the search
+        strategies = [one for one in CATALOGUE
+                      if self._parameter is PAYLOAD or not one.shows_infeasibility]
+        plan = plan_problem(bare, self._solver, strategies)
         if plan.solution is None or not plan.solved:
             return Failure(plan.status, plan.message)
         solver = continuation_solver(self._solver, self._accuracy)

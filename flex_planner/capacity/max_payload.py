@@ -87,7 +87,7 @@ def find_max_payload(task: Task, *, model: ArmModel | None = None, solver: Solve
     step = max(_STEP, accuracy) if step is None else step
     number('step', step, at_least=accuracy, at_most=MAX_PAYLOAD, unit='kg')
     _check(task)
-    model = model or ArmModel.of(task.arm)  # before a clock starts
+    model = ArmModel.for_arm(task.arm, model)  # before a clock starts
     solver = (solver or Solver()).watched_by(monitor)
     began = solver.monitor.iteration, solver.monitor.elapsed
     problem = MotionProblem(model, task, task_parameters(task))

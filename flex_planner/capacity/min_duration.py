@@ -69,7 +69,7 @@ def find_min_duration(task: Task, *, model: ArmModel | None = None,
                                'shortest')
     if not task.ends_at_rest:
         raise InvalidTaskError('the shortest duration is that of a motion which ends at rest')
-    model = model or ArmModel.of(task.arm)  # before a clock starts
+    model = ArmModel.for_arm(task.arm, model)  # before a clock starts
     solver = (solver or Solver()).watched_by(monitor)
     began = solver.monitor.iteration, solver.monitor.elapsed
     fixed = replace(task, time_weight=0.0)
@@ -130,7 +130,7 @@ def payload_against_duration(task: Task, durations: ArrayLike, *, model: ArmMode
     checked: Sequence[float] = vector('durations', durations, np.size(durations), above=0,
                                       at_most=MAX_DURATION, unit='s').tolist()
     tasks = [replace(task, duration=duration) for duration in checked]
-    return _against_duration(tasks, model or ArmModel.of(task.arm),
+    return _against_duration(tasks, ArmModel.for_arm(task.arm, model),
                              (solver or Solver()).watched_by(monitor), accuracy)
 
 

@@ -32,6 +32,10 @@ class Backend(Protocol):
         """Solve it from a guess, see :func:`flex_planner.collocation.solve.solve`."""
 
 
+class _NobodyWatches(Monitor):
+    """Stands for a monitor that was not given."""
+
+
 @dataclass(frozen=True, slots=True)
 class Solver:
     """
@@ -49,7 +53,7 @@ class Solver:
     """
 
     settings: SolverSettings = SolverSettings()
-    monitor: Monitor = field(default_factory=Monitor)
+    monitor: Monitor = field(default_factory=lambda: _NobodyWatches())
     backend: Backend = solve
 
     def solve(self, problem: BoundaryValueProblem, guess: CollocationSolution, *,
@@ -59,7 +63,14 @@ class Solver:
                             expected_error=expected_error)
 
     def watched_by(self, monitor: Monitor | None) -> Solver:
-        """Return the same solver with another monitor, if one is given."""
+        """
+        Return the same solver with another monitor, if one is given.
+
+        Where none was ever given, one begins to count here: a solver may be used many times.
+
+        """
+        if monitor is None and isinstance(self.monitor, _NobodyWatches):
+            monitor = Monitor()
         return self if monitor is None else replace(self, monitor=monitor)
 
     def with_settings(self, **changes: Any) -> Solver:

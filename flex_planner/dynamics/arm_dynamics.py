@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
+import threading
 from typing import Any, TypeVar
 
 from flex_planner.arms.arm import Arm
@@ -24,6 +25,7 @@ RUNGE_KUTTA_STAGES = 12
 _MOST_KEPT = 16
 
 Dynamics = TypeVar('Dynamics', bound='ArmDynamics')
+_lock = threading.Lock()
 _kept: OrderedDict[tuple[type, str], Any] = OrderedDict()
 
 
@@ -50,10 +52,11 @@ class ArmDynamics:
     def of(cls: type[Dynamics], arm: Arm) -> Dynamics:
         """Return the functions of an arm, the same ones for an equal arm: some arms are kept."""
         key = cls, describe_fields(arm)
-        found: Dynamics = _kept.pop(key, None) or cls(arm)
-        _kept[key] = found
-        if len(_kept) > _MOST_KEPT:
-            _kept.popitem(last=False)
+        with _lock:
+            found: Dynamics = _kept.pop(key, None) or cls(arm)
+            _kept[key] = found
+            if len(_kept) > _MOST_KEPT:
+                _kept.popitem(last=False)
         return found
 
     def __getstate__(self) -> Arm:
@@ -134,7 +137,8 @@ class ArmDynamics:
 
         """
         n, size = self.arm.n_joints, 2 * self.arm.n_coordinates
-        x, torques, length = np.zeros((1, size)), np.zeros((1, 12, n)), np.zeros((1, 1))
+        x, torques, length = np.zeros((1, size)), np.zeros((1, RUNGE_KUTTA_STAGES,
+                                                            n)), np.zeros((1, 1))
         after, fifth, third = (np.zeros((1, size)) for _ in range(3))
         run = self._load('runge_kutta_step').bind_arrays(
             [x, torques.reshape(1, RUNGE_KUTTA_STAGES * n), length, np.array(physical)],

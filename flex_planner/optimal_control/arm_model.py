@@ -12,9 +12,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from flex_planner.arms.arm import Arm
+from flex_planner.base.errors import InvalidTaskError
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
-from flex_planner.dynamics.cache_key import cache_key
+from flex_planner.dynamics.cache_key import cache_key, describe_fields, FREE_FIELDS
 from flex_planner.dynamics.compiled_functions import BatchFunction, load_functions
 
 
@@ -58,6 +60,25 @@ class ArmModel(ArmDynamics):
         n joints, n_t coordinates.
 
     """
+
+    @classmethod
+    def for_arm(cls, arm: Arm, given: ArmModel | None = None) -> ArmModel:
+        """
+        Return the functions of an arm: those given, if they are its own.
+
+        Raises
+        ------
+        InvalidTaskError
+            If they are of another arm.
+
+        """
+        if given is None:
+            return cls.of(arm)
+        if given.arm is not arm and (describe_fields(given.arm, FREE_FIELDS)
+                                     != describe_fields(arm, FREE_FIELDS)):
+            raise InvalidTaskError(f'model is of another arm ({given.arm.name}) than the task '
+                                   f'({arm.name})')
+        return given
 
     def prepare(self) -> None:
         """Load the functions from disk, or compile them."""

@@ -224,7 +224,12 @@ class Plan:
     def _within(self, times: ArrayLike) -> Array:
         """Return times (k,) after a check that the motion lasts so long."""
         end = self.task.duration
-        given = np.atleast_1d(np.asarray(times, dtype=float))
+        try:
+            given = np.atleast_1d(np.asarray(times, dtype=float))
+        except (TypeError, ValueError):
+            given = np.zeros((0, 0))
+        if given.ndim != 1:
+            raise InvalidValueError('times', times, 'a list of numbers')
         outside = np.flatnonzero(~(np.abs(given - end / 2) <= end * (0.5 + _ROUNDING)))
         if outside.size:
             k = int(outside[0])
@@ -271,7 +276,7 @@ def peaks(plan: Plan, samples: Samples) -> Peaks:
     n = plan.arm.n_joints
     speeds = np.abs(samples.rates[:, :n])
     no_load = np.array([joint.motor.no_load_speed for joint in plan.arm.joints])
-    bounds = np.where(samples.torques >= 0, samples.upper_bounds, -samples.lower_bounds)
+    bounds = TorqueLimits.of(plan.arm).toward(samples.torques, samples.rates[:, :n])
     torques = np.abs(samples.torques)
     return Peaks(speeds=speeds.max(axis=0), speed_shares=(speeds / no_load).max(axis=0),
                  torques=torques.max(axis=0), torque_shares=(torques / bounds).max(axis=0))

@@ -58,15 +58,15 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
     Raises
     ------
     InvalidTaskError
-        If a motor is too weak to hold the arm at the goal, or an objective does not go with the
-        task.
+        If a motor is too weak to hold the arm at the goal, or an objective or the model does
+        not go with the task.
     ValueError
         If there are no strategies.
 
     """
     if not strategies:
         raise ValueError('strategies must name at least one way to a solution')
-    model = model or ArmModel.of(task.arm)  # before a clock starts
+    model = ArmModel.for_arm(task.arm, model)  # before a clock starts
     solver = (solver or Solver()).watched_by(monitor)
     problem = MotionProblem(model, task, task_parameters(task))
     start = start_from.solution if isinstance(start_from, Plan) else start_from

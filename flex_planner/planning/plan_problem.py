@@ -118,12 +118,12 @@ def _solve_first(problem: MotionProblem, solver: Solver,
 def _certify(plan: Plan, result: CollocationResult, solver: Solver) -> Plan:
     """Certify a solution; where the certificate fails, solve more exactly."""
     limits = CertificateLimits(boundary_error=plan.task.tolerance)
-    problem, reasons = plan.problem, ['']
-    for attempt in range(_REFINEMENTS + 1):
+    problem = plan.problem
+    for refinements in range(_REFINEMENTS + 1):
         # an arm that stands up magnifies the integrator's errors as it does those of the mesh
         try:
             certificate = certify(problem, result, solver.monitor,
-                                  rtol=1e-8 / _STRICTER**attempt)
+                                  rtol=1e-8 / _STRICTER**refinements)
         except StoppedError as error:
             return replace(plan, status=STOP_STATUS[error.reason], message=str(error))
         total = integrate_totals(problem, result.solution)
@@ -133,7 +133,7 @@ def _certify(plan: Plan, result: CollocationResult, solver: Solver) -> Plan:
         reasons = limits.violations(certificate)
         if not reasons:
             return replace(plan, status=PlanStatus.SOLVED, message=PlanStatus.SOLVED.value)
-        if attempt < _REFINEMENTS:
+        if refinements < _REFINEMENTS:
             solver.monitor.phase = 'mesh refinement'
             reached = min(solver.settings.error_tolerance, float(result.errors.max()))
             solver = solver.with_settings(error_tolerance=max(reached / _REFINEMENT_FACTOR, 1e-11))

@@ -95,7 +95,7 @@ def adapt_weights(plan: Plan, objectives: Objectives, solver: Solver) -> Plan:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Point:
+class _Trial:
     """A motion and how it meets the objectives: the largest share of each."""
 
     weights: dict[Objective, float]
@@ -116,16 +116,16 @@ class _Search:
                  objectives: Objectives, solver: Solver) -> None:
         self._base, self._objectives = problem, objectives
         self._solver = solver
-        self._judge_limit = objectives.limited(problem.model.arm)
-        self._below: dict[Objective, _Point] = {}
+        self._limited = objectives.limited(problem.model.arm)
+        self._below: dict[Objective, _Trial] = {}
         self._patterns = {objective: objectives.pattern(objective, problem.model.arm)
-                          for objective in self._judge_limit}
-        if Objective.TORQUE_SHARES in self._judge_limit:
+                          for objective in self._limited}
+        if Objective.TORQUE_SHARES in self._limited:
             # where all are raised none of them is: only those whose torque is too large
             over = objectives.shares(Objective.TORQUE_SHARES, problem, solution) > 1
             self._patterns[Objective.TORQUE_SHARES] *= over
         self.trials: list[WeightTrial] = []
-        self.best = self._point(dict.fromkeys(self._judge_limit, 0.0), problem, solution)
+        self.best = self._point(dict.fromkeys(self._limited, 0.0), problem, solution)
 
     def run(self) -> bool:
         """
@@ -138,14 +138,14 @@ class _Search:
         here, idle = self.best, 0
         for _ in range(_MOST_TURNS):
             before = here
-            for objective in self._judge_limit:
+            for objective in self._limited:
                 if here.shares[objective] > 1 or here.weights[objective]:
                     self._solver.monitor.phase = f'weight of {objective.value}'
                     found = self._smallest(objective, here)
                     if found is None:
                         return False
                     here = found
-            if here.worst <= 1 and (here is before or len(self._judge_limit) == 1):
+            if here.worst <= 1 and (here is before or len(self._limited) == 1):
                 self.best = here
                 return True
             excess = here.worst - 1, max(before.worst - 1, 0.0)
@@ -177,7 +177,7 @@ class _Search:
                              f'{shares[i] * limits[i]:.4g}, but must be <= {limits[i]:.4g}')
         return f'{PlanStatus.OBJECTIVE_NOT_MET.value}; {"; ".join(parts)}'
 
-    def _smallest(self, objective: Objective, here: _Point) -> _Point | None:
+    def _smallest(self, objective: Objective, here: _Trial) -> _Trial | None:
         """Return the motion with the smallest adequate weight, None if there is none."""
         tolerance = 1 + self._objectives.weight_tolerance
         below, above = self._bracket(objective, here)
@@ -197,7 +197,7 @@ class _Search:
         return above
 
     def _bracket(self, objective: Objective,
-                 here: _Point) -> tuple[_Point | None, _Point | None]:
+                 here: _Trial) -> tuple[_Trial | None, _Trial | None]:
         """Return motions that violate and that meet an objective; None for one that is not."""
         first = self._first_weight(objective)
         if here.shares[objective] > 1:
@@ -211,8 +211,8 @@ class _Search:
             above, factor = found, _FACTOR
         return None, above
 
-    def _raise(self, objective: Objective, here: _Point,
-               first: float) -> tuple[_Point, _Point | None]:
+    def _raise(self, objective: Objective, here: _Trial,
+               first: float) -> tuple[_Trial, _Trial | None]:
         """
         Raise a weight until its objective is met, or given up.
 
@@ -238,9 +238,9 @@ class _Search:
         return below, None
 
     def _find_between(self, objective: Objective, low: float, high: float,
-                      near: _Point) -> _Point | None:
+                      near: _Trial) -> _Trial | None:
         """Return a motion that meets an objective with a weight between two, if there is one."""
-        ends, known = [np.log(low), np.log(high)], dict[float, _Point | None]()
+        ends, known = [np.log(low), np.log(high)], dict[float, _Trial | None]()
         while ends[1] - ends[0] > np.log(_FINEST_FACTOR):
             inner = [ends[0] + part * (ends[1] - ends[0]) for part in (1 - _GOLDEN, _GOLDEN)]
             for at in inner:
@@ -265,7 +265,7 @@ class _Search:
         added = integrate_totals(trial, self.best.solution).cost - cost
         return _FIRST_SHARE * cost / max(added, 1e-12)
 
-    def _at(self, objective: Objective, weight: float, near: _Point) -> _Point | None:
+    def _at(self, objective: Objective, weight: float, near: _Trial) -> _Trial | None:
         """Solve with a weight, from a motion with another; None if that fails."""
         weights = {**near.weights, objective: weight}
         problem = self._with_weights(weights)
@@ -283,7 +283,7 @@ class _Search:
                                        met=share <= 1))
         return point
 
-    def _solve(self, problem: MotionProblem, near: _Point) -> CollocationResult:
+    def _solve(self, problem: MotionProblem, near: _Trial) -> CollocationResult:
         """Solve from a motion with other weights, at once or step by step."""
         result = self._solver.solve(problem, near.solution)
         if result.converged or result.status in INTERRUPTED:
@@ -315,10 +315,10 @@ class _Search:
         return MotionProblem(self._base.model, heavier, task_parameters(heavier))
 
     def _point(self, weights: dict[Objective, float], problem: MotionProblem,
-               solution: CollocationSolution) -> _Point:
+               solution: CollocationSolution) -> _Trial:
         shares = {objective: float(self._objectives.shares(objective, problem, solution).max())
-                  for objective in self._judge_limit}
-        return _Point(weights=weights, problem=problem, solution=solution, shares=shares)
+                  for objective in self._limited}
+        return _Trial(weights=weights, problem=problem, solution=solution, shares=shares)
 
 
 def _blend(first: Array, last: Array, share: float) -> Array:
@@ -329,7 +329,7 @@ def _blend(first: Array, last: Array, share: float) -> Array:
     return blend
 
 
-def _between(objective: Objective, below: _Point, above: _Point, tolerance: float) -> float:
+def _between(objective: Objective, below: _Trial, above: _Trial, tolerance: float) -> float:
     """Return the weight to try next: where the share should be 1, or what ends the search."""
     low, high = below.weights[objective], above.weights[objective]
     if not low:

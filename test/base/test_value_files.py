@@ -97,3 +97,9 @@ def test_failed_write_leaves_the_old_file_alone(tree: Tree, tmp_path: Path) -> N
         save_value(tmp_path / 'tree', Branch((), 1.0, {1: object()}))  # type: ignore[arg-type]
     assert isinstance(load_value(tmp_path / 'tree', CLASSES), Tree)
     assert [path.name for path in tmp_path.iterdir()] == ['tree']
+
+
+def test_array_of_objects_is_refused_before_anything_is_written(tmp_path: Path) -> None:
+    with pytest.raises(TypeError, match='only numbers can'):
+        save_value(tmp_path / 'leaf', Leaf(Colour.RED, np.array([object()])))
+    assert list(tmp_path.iterdir()) == []

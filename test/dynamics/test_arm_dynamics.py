@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 import pickle
 import subprocess
 import sys
+import time
 from typing import Any
 
 from flex_planner.arms.arm import Arm, Joint, Link
@@ -131,3 +133,20 @@ def test_equal_arm_has_the_same_functions_whether_its_links_are_one_object_or_tw
     shared, apart = (Arm(name='x', links=links, joints=joints)
                      for links in ((one, one), (link(), link())))
     assert ArmDynamics.of(shared) is ArmDynamics.of(apart)
+
+
+def test_threads_that_ask_at_once_share_one_set_of_functions(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    arm = Arm(name='asked at once', links=(Link(length=0.5, linear_density=6.1),),
+              joints=(Joint(),))
+    made: list[Arm] = []
+
+    def prepare(self: ArmDynamics) -> None:
+        made.append(self.arm)
+        time.sleep(0.05)  # the others come meanwhile
+
+    monkeypatch.setattr(ArmDynamics, 'prepare', prepare)
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(ArmDynamics.of, [arm] * 4))
+    assert made == [arm]
+    assert len({id(one) for one in found}) == 1

@@ -130,3 +130,10 @@ def test_rounding_at_the_ends_is_none(plan_of: PlanFactory) -> None:
     plan = plan_of('rigid')
     found, exact = plan.sample([-1e-16, 1 + 2e-16]), plan.sample([0, 1])
     np.testing.assert_array_equal(found.torques, exact.torques)
+
+
+@pytest.mark.parametrize('times', ['soon', [[0.1]], {}, [None, 'x']])
+def test_times_that_are_no_list_of_numbers_are_an_error(plan_of: PlanFactory,
+                                                        times: object) -> None:
+    with pytest.raises(InvalidValueError, match='times is .*, but must be a list of numbers'):
+        plan_of('rigid').sample(times)  # type: ignore[arg-type]

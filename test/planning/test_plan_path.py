@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from flex_planner.arms.arm import Arm, Joint, Link, Motor
 from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.errors import InvalidTaskError
+from flex_planner.capacity.max_payload import find_max_payload
+from flex_planner.capacity.min_duration import find_min_duration
 from flex_planner.collocation import Solver, SolverSettings
 from flex_planner.dynamics.integration import simulate
 from flex_planner.dynamics.statics import residual_vibration
@@ -300,3 +303,24 @@ def test_motor_too_weak_to_hold_the_goal_is_refused_in_words(workshop_arm: Arm) 
                 duration=1.0, payload_mass=0.3)
     with pytest.raises(InvalidTaskError, match='needs .* at the goal, but the stall torque'):
         plan_path(task)
+
+
+def test_solver_without_a_monitor_counts_anew_in_every_plan(rigid_model: ArmModel,
+                                                            paper_task: TaskFactory) -> None:
+    task, solver = paper_task(rigid_model.arm), Solver()
+    first, second = (plan_path(task, model=rigid_model, solver=solver) for _ in range(2))
+    assert first.iterations == second.iterations > 0
+
+
+def test_functions_of_another_arm_are_refused(rigid_model: ArmModel, ei50_model: ArmModel,
+                                              paper_task: TaskFactory) -> None:
+    for search in (plan_path, find_max_payload, find_min_duration):
+        with pytest.raises(InvalidTaskError, match='model is of another arm'):
+            search(paper_task(ei50_model.arm), model=rigid_model)
+
+
+def test_functions_do_for_an_arm_with_other_motors_and_stiffness(ei50_model: ArmModel,
+                                                                 paper_task: TaskFactory) -> None:
+    arm = ei50_model.arm
+    softer = tuple(replace(link, flexural_rigidity=20.0) for link in arm.links)
+    assert plan_path(paper_task(replace(arm, links=softer)), model=ei50_model).solved

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from flex_planner.base.errors import FlexPlannerError
+from flex_planner.base.errors import InvalidTaskError
 from flex_planner.collocation import (
     CollocationResult,
     CollocationSolution,
@@ -67,9 +67,12 @@ def approach_limit(parameter: FreeParameter, problem: MotionProblem, solver: Sol
 def _rigid_extremals(parameter: FreeParameter, problem: MotionProblem,
                      solver: Solver) -> list[Extremal]:
     """Return the motions of the same arm made rigid up to one that is near its limit."""
-    rigid = rigid_problem(problem)
-    first = cold_start(rigid, solver).result
     extremals: list[Extremal] = []
+    try:
+        rigid = rigid_problem(problem)
+    except InvalidTaskError:  # motors that hold the bent arm may be too weak for the straight one
+        return extremals
+    first = cold_start(rigid, solver).result
     if not first.converged:
         return extremals
     for extremal in continue_in_price(parameter, rigid, first, solver,
@@ -113,14 +116,8 @@ def transfer_extremal(parameter: FreeParameter, problem: MotionProblem, start: S
     solution = start.solution
     if solution.nodes.shape[1] not in (problem.size, 4 * problem.model.arm.n_joints):
         return None  # of an arm with other modes
-    try:
-        near = parameter.with_value(problem, start.value)
-        found = parameter.solve_at_price(near, _fit(near, solution, solver), start.price, solver)
-    except FlexPlannerError:  # too heavy to hold
-        return None
-    if found is None or found.interrupted:
-        return found
-    return found if parameter.improves(found.value, parameter.value(problem)) else None
+    return parameter.solve_beyond(problem, start.value,
+                                  lambda near: _fit(near, solution, solver), start.price, solver)
 
 
 def _fit(problem: MotionProblem, solution: CollocationSolution,

@@ -10,9 +10,10 @@ without bound the payload comes to the most that the arm carries. So with the du
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
+from flex_planner.base.errors import FlexPlannerError
 from flex_planner.collocation import (
     CollocationResult,
     CollocationSolution,
@@ -123,6 +124,36 @@ class FreeParameter(ABC):
             return None
         return Extremal(value=value, price=price, result=ahead.restrict_result(found),
                         problem=ahead.fix(value))
+
+
+    def solve_beyond(self, problem: MotionProblem, value: float,
+                     make_guess: Callable[[MotionProblem], CollocationSolution], price: float,
+                     solver: Solver) -> Extremal | None:
+        """
+        Return the motion at a price that is nearer to the limit than a problem; None without one.
+
+        Parameters
+        ----------
+        problem : MotionProblem
+            With the least demanding value that is of interest.
+        value : float
+            Near the one that is sought.
+        make_guess : callable
+            From the motion with that value to a guess.
+        price : float
+            Of the value.
+        solver : Solver
+            If its monitor interrupts it, the extremal says so.
+
+        """
+        try:
+            near = self.with_value(problem, value)
+            found = self.solve_at_price(near, make_guess(near), price, solver)
+        except FlexPlannerError:  # too heavy to hold, or no duration
+            return None
+        if found is None or found.interrupted:
+            return found
+        return found if self.improves(found.value, self.value(problem)) else None
 
 
 class _Payload(FreeParameter):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from flex_planner.base.errors import InvalidTaskError
 from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationSolution, GaussRule, Solver, SolverStatus
 from flex_planner.optimal_control.arm_model import ArmModel
@@ -41,7 +42,10 @@ def lift_rigid_motion(problem: MotionProblem, solver: Solver) -> Attempt | None:
     """Start from the motion of the same arm made rigid, bent as gravity bends the ends."""
     if not problem.task.arm.n_modes:
         return None
-    rigid = cold_start(rigid_problem(problem), solver).result
+    try:
+        rigid = cold_start(rigid_problem(problem), solver).result
+    except InvalidTaskError:  # motors that hold the bent arm may be too weak for the straight one
+        return None
     if not rigid.converged:
         return Attempt(result=rigid)
     guess = lift(problem, rigid.solution, solver)
@@ -95,7 +99,15 @@ def coarse_mesh(problem: MotionProblem, solver: Solver) -> Attempt:
 
 
 def rigid_problem(problem: MotionProblem) -> MotionProblem:
-    """Return the task for the same arm made rigid, with the weights of the joints."""
+    """
+    Return the task for the same arm made rigid, with the weights of the joints.
+
+    Raises
+    ------
+    InvalidTaskError
+        If a motor is too weak to hold the rigid arm at the goal.
+
+    """
     task, n = problem.task, problem.task.arm.n_joints
     entries = ('position_weights', 'velocity_weights', 'start_velocities', 'goal_velocities',
                'goal_position_weights', 'goal_velocity_weights')
@@ -104,7 +116,7 @@ def rigid_problem(problem: MotionProblem) -> MotionProblem:
     parameters = replace(problem.parameters, rigidity=np.zeros(n),
                          position_weights=problem.parameters.position_weights[:n],
                          velocity_weights=problem.parameters.velocity_weights[:n])
-    return MotionProblem(ArmModel(rigid_task.arm), rigid_task, parameters)
+    return MotionProblem(ArmModel.of(rigid_task.arm), rigid_task, parameters)
 
 
 def direct_collocation(problem: MotionProblem, solver: Solver) -> Attempt | None:

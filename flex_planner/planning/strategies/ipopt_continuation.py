@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
 from flex_planner.collocation import (
@@ -98,12 +99,15 @@ def _solve_at_price(problem: MotionProblem, price: float, mesh: Array,
                     guess: CollocationSolution | None, solver: Solver) -> Extremal | None:
     """Return the motion whose payload is worth a price, on better and better meshes; or None."""
     for _ in range(_MESHES):
-        found = _transcribe(problem, price, mesh, guess, solver.monitor)
-        ahead = FreePayloadProblem(found.problem, price)
-        start = ahead.extend(found.solution)
-        result = _exact(solver).solve(ahead, start)
-        if result.converged or result.status in INTERRUPTED:
-            return _extremal(ahead, result, price)
+        try:
+            found = _transcribe(problem, price, mesh, guess, solver.monitor)
+            ahead = FreePayloadProblem(found.problem, price)
+            start = ahead.extend(found.solution)
+            result = _exact(solver).solve(ahead, start)
+            if result.converged or result.status in INTERRUPTED:
+                return _extremal(ahead, result, price)
+        except FlexPlannerError:  # a payload of an iterate: too heavy to hold, or below none
+            return None
         if not found.converged:
             return None
         problem, guess = found.problem, found.solution
@@ -134,7 +138,7 @@ def _transcribe(problem: MotionProblem, price: float, mesh: Array,
         max_iterations=_ITERATIONS, free_payload=True), mesh / duration)
     found = direct.solve(problem.parameters, problem.start, problem.goal, duration, guess=guess,
                          price=price, monitor=monitor)
-    motion = problem.with_changes(payload_mass=found.payload)
+    motion = problem.with_changes(payload_mass=max(found.payload, 0.0))
     points = np.hstack([found.point_states, found.point_costates])
     rates = motion.rate(found.point_times, points).reshape(mesh.size - 1, _STAGES, -1)
     solution = CollocationSolution(mesh, np.hstack([found.states, found.costates]), rates,

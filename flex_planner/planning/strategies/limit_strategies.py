@@ -53,7 +53,7 @@ def continue_in_payload(problem: MotionProblem, solver: Solver) -> Attempt | Non
         return None
     light = drop_weights(PAYLOAD.with_value(problem, 0.0))
     extremals = collect_until(approach_limit(PAYLOAD, light, solver.coarse()),
-                              lambda extremal: extremal.value >= wanted)
+                              lambda met: met[-1].value >= wanted or is_steady(met))
     last = extremals[-1]
     if not last.result.converged:
         return Attempt(result=last.result)
@@ -87,7 +87,7 @@ def continue_in_duration(problem: MotionProblem, solver: Solver) -> Attempt | No
     for factor in (factor for factor in _LONGER if wanted * factor <= MAX_DURATION):
         slow = DURATION.with_value(bare, wanted * factor)
         met = collect_until(approach_limit(DURATION, slow, solver.coarse()),
-                            lambda extremal: extremal.value <= wanted)
+                            lambda met: met[-1].value <= wanted or is_steady(met))
         if met[0].result.converged or met[0].interrupted:
             break
     if not met:
@@ -107,13 +107,12 @@ def continue_in_duration(problem: MotionProblem, solver: Solver) -> Attempt | No
 
 
 def collect_until(extremals: Iterable[Extremal],
-                  done: Callable[[Extremal], bool]) -> list[Extremal]:
-    """Return the extremals up to one that is done, or to a limit; at least one."""
+                  done: Callable[[list[Extremal]], bool]) -> list[Extremal]:
+    """Return the extremals up to those that are enough, or one that fails, or the last."""
     met: list[Extremal] = []
     for extremal in extremals:
         met.append(extremal)
-        if (not extremal.result.converged or done(extremal) or len(met) == _MOST_EXTREMALS
-                or is_steady(met)):
+        if not extremal.result.converged or len(met) == _MOST_EXTREMALS or done(met):
             break
     return met
 
