@@ -6,7 +6,6 @@ from dataclasses import replace
 
 from flex_planner.base.errors import InvalidTaskError, NoEquilibriumError
 from flex_planner.base.validation import Array
-from flex_planner.collocation.linear import SingularSystemError
 from flex_planner.dynamics.statics import equilibrium
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.parameters import Parameters
@@ -116,12 +115,14 @@ def holding_limit(model: ArmModel, task: Task, parameters: Parameters) -> tuple[
         share: Array = np.abs(torque) / parameters.stall_torque
         return share
 
-    heavy = 1.0
+    # that of the task can be held, though none may be too much where it is a counterweight
+    light = parameters.payload_mass
+    heavy = light + 1.0
     while load(heavy).max() < 1:
-        heavy *= 2
+        heavy = light + 2 * (heavy - light)
         if heavy > MAX_PAYLOAD:
             return np.inf, 0
-    limit = float(brentq(lambda payload: load(payload).max() - 1, 0.0, heavy, xtol=1e-12))
+    limit = float(brentq(lambda payload: load(payload).max() - 1, light, heavy, xtol=1e-12))
     return limit, int(load(limit).argmax())
 
 
@@ -150,17 +151,14 @@ class PayloadEnds:
 
         Raises
         ------
-        SingularSystemError
-            If the arm does not come to rest: the payload of an iterate may be absurd.
+        NoEquilibriumError
+            If the arm does not come to rest with that payload, or a little more or less.
 
         """
         given = self._given[end]
         if not self._bent:
             return given, np.zeros_like(given)
-        try:
-            states = [self._state(end, payload + change) for change in (0.0, -_NUDGE, _NUDGE)]
-        except NoEquilibriumError as error:
-            raise SingularSystemError(str(error)) from None
+        states = [self._state(end, payload + change) for change in (0.0, -_NUDGE, _NUDGE)]
         change: Array = (states[2] - states[1]) / (2 * _NUDGE)
         return states[0], change
 

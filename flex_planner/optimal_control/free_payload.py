@@ -10,8 +10,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from flex_planner.base.errors import NoEquilibriumError
 from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationResult, CollocationSolution
+from flex_planner.collocation.linear import SingularSystemError
 from flex_planner.optimal_control.boundary_conditions import PayloadEnds
 from flex_planner.optimal_control.free_problem import append_zeros
 from flex_planner.optimal_control.motion_problem import Indices, MotionProblem
@@ -76,7 +78,7 @@ class FreePayloadProblem:
     def left(self, z: Array) -> tuple[Array, Array]:
         """Return the initial conditions."""
         half, size = self.motion.goal.size, self.motion.size
-        state, change = self._ends.at(0, float(z[-2]))
+        state, change = self._rest(0, z)
         rows = np.zeros((half + 1, self.size))
         rows[:half, :half], rows[:half, -2] = np.eye(half), -change
         rows[half, half:size], rows[half, -1] = change, 1
@@ -85,7 +87,7 @@ class FreePayloadProblem:
     def right(self, z: Array) -> tuple[Array, Array]:
         """Return the final conditions."""
         half, size = self.motion.goal.size, self.motion.size
-        state, change = self._ends.at(1, float(z[-2]))
+        state, change = self._rest(1, z)
         _, inner = self.motion.right(z[:-2])
         rows = np.zeros((half + 1, self.size))
         rows[:half, :size], rows[:half, -2] = inner, -inner[:, :half] @ change
@@ -122,6 +124,13 @@ class FreePayloadProblem:
         """Return the same motion with its payload given."""
         return self.motion.with_changes(payload_mass=payload)
 
+    def _rest(self, end: int, z: Array) -> tuple[Array, Array]:
+        """Return the state at an end and its derivative by the payload of an iterate."""
+        try:
+            return self._ends.at(end, float(z[-2]))
+        except NoEquilibriumError as error:  # it may be absurd: Newton's step is too long
+            raise SingularSystemError(str(error)) from None
+
     def _at(self, z: Array) -> tuple[MotionProblem, Array]:
         """Return the motion and the parameters with the payload of an iterate."""
         self._p[payload_index()] = z[0, -2]
@@ -129,7 +138,15 @@ class FreePayloadProblem:
 
 
 def payload_price(motion: MotionProblem, solution: CollocationSolution) -> float:
-    """Return dJ/dm_p of a motion: the integral of dH/dm_p, and what the bent ends add."""
+    """
+    Return dJ/dm_p of a motion: the integral of dH/dm_p, and what the bent ends add.
+
+    Raises
+    ------
+    NoEquilibriumError
+        If the links buckle at an end with hardly more payload.
+
+    """
     z = solution.stage_values().reshape(-1, motion.size)
     share = motion.model.controls(z, motion.p).payload_share.reshape(solution.stages.shape[:2])
     ends, half = _ends(motion), motion.goal.size

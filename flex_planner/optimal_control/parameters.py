@@ -8,7 +8,7 @@ that compiled functions take. Symbols with the same names stand for them in expr
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, TYPE_CHECKING
 
 from flex_planner.arms.arm import Arm
@@ -68,6 +68,22 @@ class Parameters(PhysicalParameters):
     def torque_limits(self) -> TorqueLimits:
         """Return the motors' limits of eq. (15)."""
         return TorqueLimits(self.stall_torque, self.torque_slope)
+
+    @property
+    def path_weights(self) -> Array:
+        """Return the weights of all that counts on the way besides effort."""
+        return np.concatenate([self.position_weights, self.velocity_weights])
+
+    def scale_path_weights(self, factor: float) -> Parameters:
+        """Return the same parameters with those weights multiplied by a factor."""
+        return replace(self, position_weights=factor * self.position_weights,
+                       velocity_weights=factor * self.velocity_weights)
+
+    def drop_modes(self) -> Parameters:
+        """Return the parameters of the same arm made rigid."""
+        n = self.stall_torque.size
+        return replace(self, rigidity=np.zeros(n), position_weights=self.position_weights[:n],
+                       velocity_weights=self.velocity_weights[:n])
 
     def stack(self) -> Array:
         """Return them as one vector, as the compiled optimality conditions take them."""

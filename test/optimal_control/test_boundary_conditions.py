@@ -8,7 +8,7 @@ import math
 from typing import Any
 
 from flex_planner.arms.arm import Arm, Joint, Link, Motor
-from flex_planner.base.errors import InvalidTaskError
+from flex_planner.base.errors import InvalidTaskError, NoEquilibriumError
 from flex_planner.base.validation import Array
 from flex_planner.collocation.linear import SingularSystemError
 from flex_planner.optimal_control.arm_model import ArmModel
@@ -24,6 +24,7 @@ from flex_planner.planning.plan import Plan
 from free_problems import extended
 from known_limits import G, lifted_to
 import numpy as np
+from plan_checks import problem_of
 import pytest
 
 inf = math.inf
@@ -152,6 +153,12 @@ def test_ends_are_those_of_the_task_with_that_payload(crane_model: ArmModel, tas
 
 def test_payload_that_buckles_the_links_leaves_no_ends(crane_model: ArmModel,
                                                        task: Task) -> None:
-    # Newton's method is told, so that it takes a smaller step
-    with pytest.raises(SingularSystemError, match='no static equilibrium'):
+    with pytest.raises(NoEquilibriumError, match='no static equilibrium'):
         payload_ends(crane_model, task).at(1, 100.0)
+    # Newton's method is told, so that it takes a smaller step
+    problem = FreePayloadProblem(problem_of(crane_model, task), price=1.0)
+    z = np.zeros(problem.size)
+    z[-2] = 100.0
+    for rows in (problem.left, problem.right):
+        with pytest.raises(SingularSystemError, match='no static equilibrium'):
+            rows(z)

@@ -48,8 +48,7 @@ def raise_weights_from(problem: MotionProblem, solution: CollocationSolution,
 
 def has_weights(problem: MotionProblem) -> bool:
     """Return whether anything but effort counts."""
-    parameters = problem.parameters
-    return bool(parameters.position_weights.any() or parameters.velocity_weights.any())
+    return bool(problem.parameters.path_weights.any())
 
 
 def drop_weights(problem: MotionProblem) -> MotionProblem:
@@ -60,13 +59,11 @@ def drop_weights(problem: MotionProblem) -> MotionProblem:
 def _weights_at(problem: MotionProblem) -> tuple[Callable[[float], MotionProblem], float]:
     """Return the problem with its weights raised by a share, and the first share."""
     parameters = problem.parameters
-    weights = np.concatenate([parameters.position_weights, parameters.velocity_weights])
-    decades = np.log10(max(float(weights.max()) / _FIRST_WEIGHT, 1.0))
+    decades = np.log10(max(float(parameters.path_weights.max()) / _FIRST_WEIGHT, 1.0))
 
     def at(share: float) -> MotionProblem:
         scale = 10.0 ** (decades * (share - 1)) if share else 0.0
-        return _with(problem, position_weights=scale * parameters.position_weights,
-                     velocity_weights=scale * parameters.velocity_weights)
+        return MotionProblem(problem.model, problem.task, parameters.scale_path_weights(scale))
 
     return at, 1 / (1 + decades)
 

@@ -113,10 +113,8 @@ def rigid_problem(problem: MotionProblem) -> MotionProblem:
                'goal_position_weights', 'goal_velocity_weights')
     rigid_task = replace(task, arm=task.arm.rigid(), **{
         name: getattr(task, name)[:n] for name in entries})
-    parameters = replace(problem.parameters, rigidity=np.zeros(n),
-                         position_weights=problem.parameters.position_weights[:n],
-                         velocity_weights=problem.parameters.velocity_weights[:n])
-    return MotionProblem(ArmModel.of(rigid_task.arm), rigid_task, parameters)
+    return MotionProblem(ArmModel.of(rigid_task.arm), rigid_task,
+                         problem.parameters.drop_modes())
 
 
 def direct_collocation(problem: MotionProblem, solver: Solver) -> Attempt | None:

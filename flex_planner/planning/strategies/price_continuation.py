@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
-from flex_planner.base.errors import FlexPlannerError
+from flex_planner.base.errors import FlexPlannerError, NoEquilibriumError
 from flex_planner.collocation import CollocationResult, INTERRUPTED, Solver, SolverStatus
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import MAX_DURATION
@@ -66,8 +66,11 @@ def continue_in_price(parameter: FreeParameter, problem: MotionProblem,
         is.
 
     """
-    here = Extremal(value=parameter.value(problem), result=first, problem=problem,
-                    price=parameter.price(problem, first.solution))
+    try:
+        price = parameter.price(problem, first.solution)
+    except NoEquilibriumError:  # the links buckle with hardly more payload
+        return
+    here = Extremal(value=parameter.value(problem), result=first, problem=problem, price=price)
     factor = _FACTOR if problem.model.arm.n_modes else _LARGEST_FACTOR
     while factor > _SMALLEST_FACTOR:
         solver.monitor.payload = here.problem.task.payload_mass

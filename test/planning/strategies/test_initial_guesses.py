@@ -6,6 +6,8 @@ import math
 from typing import Any
 
 from factories import PlanFactory, TaskFactory
+from flex_planner.arms.arm import Arm, Joint, Link, Motor
+from flex_planner.base.errors import InvalidTaskError
 from flex_planner.base.progress import Monitor
 from flex_planner.collocation import (
     CollocationResult,
@@ -18,7 +20,14 @@ from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan_path import plan_path
-from flex_planner.planning.strategies.initial_guesses import lift_rigid_motion, warm_start
+from flex_planner.planning.strategies.extremals import Extremal
+from flex_planner.planning.strategies.first_extremals import approach_limit
+from flex_planner.planning.strategies.free_parameters import PAYLOAD
+from flex_planner.planning.strategies.initial_guesses import (
+    lift_rigid_motion,
+    rigid_problem,
+    warm_start,
+)
 import numpy as np
 from plan_checks import problem_of, SAME_COST, solution_of
 import pytest
@@ -109,3 +118,19 @@ def test_plan_without_solution_is_no_start(rigid_model: ArmModel,
     canceled = plan_path(task, model=rigid_model, monitor=Monitor(canceled=lambda: True))
     plan = plan_path(task, model=rigid_model, start_from=canceled)
     assert (plan.solved, plan.strategy) == (True, 'cold start')
+
+
+def test_arm_that_only_its_bending_lets_the_motor_hold_is_planned_without_a_rigid_twin() -> None:
+    # at -0.6 rad the bent link needs 5.6 N m, and the straight one 6.5 N m
+    link = Link(length=1.0, linear_density=1.0, flexural_rigidity=8.0, modes=2,
+                mode_family='clamped_free', damping_ratio=0.02)
+    arm = Arm(name='drooping', links=(link,), joints=(Joint(motor=Motor(stall_torque=6.0)),),
+              gravity=[0.0, -9.81])
+    task = Task(arm=arm, start_positions=[-0.9], goal_positions=[-0.6], duration=2.0,
+                payload_mass=0.3)
+    problem = problem_of(ArmModel.of(arm), task)
+    with pytest.raises(InvalidTaskError, match='joint 1 needs'):
+        rigid_problem(problem)
+    assert lift_rigid_motion(problem, Solver()) is None
+    found = next(approach_limit(PAYLOAD, problem, Solver()))
+    assert isinstance(found, Extremal)
