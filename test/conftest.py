@@ -8,10 +8,12 @@ the compiled functions stay in the user's cache folder.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import os
 from pathlib import Path
 from typing import Any
 
+from applied_torques import Case, crane_plan
 from factories import PlanFactory, TaskFactory
 from flex_planner.arms.arm import Arm, Joint, Link, Motor, Node
 from flex_planner.arms.arm_files import load_arm
@@ -74,7 +76,7 @@ def ei5_arm() -> Arm:
 
 @pytest.fixture(scope='session')
 def single_mode_arm(ei50_arm: Arm) -> Arm:
-    """Return the arm of the paper with one mode a link."""
+    """Return the arm of the paper with one mode per link."""
     link = Link(length=0.5, linear_density=6.0, flexural_rigidity=50.0, modes=1)
     return Arm(name='single mode', links=(link, link), joints=ei50_arm.joints)
 
@@ -177,3 +179,9 @@ def plan_of(request: pytest.FixtureRequest, paper_task: TaskFactory) -> PlanFact
         return known[key]
 
     return plan
+
+
+@pytest.fixture(scope='session')
+def any_plan(plan_of: PlanFactory, crane_model: ArmModel) -> Callable[[Case], Plan]:
+    """Return plans of the paper's arms, and one under gravity; motors saturate in most."""
+    return lambda case: crane_plan(crane_model) if isinstance(case, str) else plan_of(*case)

@@ -1,5 +1,5 @@
 """
-The dynamics of an arm as symbols: the seam between a kind of arm and everything above it.
+The dynamics of an arm as symbols: what a kind of arm gives to all that is built on it.
 
 Whatever derives a `Chain` (see `planar_chain`) gets its compiled functions, statics, optimality
 conditions and direct transcription from it.

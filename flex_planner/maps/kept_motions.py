@@ -115,7 +115,7 @@ class KeptMotion:
 
     @classmethod
     def unpack(cls, own: Array, packed: Packed) -> KeptMotion:
-        """Return the motion of a signature and what `packed` made of it."""
+        """Return the motion of a signature and what `pack` made of it."""
         head, values = packed[:_HEAD].tolist(), packed[_HEAD:].astype(np.float64)
         payload, price, count = head[0], head[1], int(head[2])
         return cls(signature=own, payload=payload, price=price, mesh=values[:count],

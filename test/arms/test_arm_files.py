@@ -25,7 +25,7 @@ COMPLETE: dict[str, Any] = {
 }
 
 # Korayem et al. 2009, Table I: L = 0.5 m, m = 3 kg, tau_s = 8 N m, omega_s = 3.5 rad/s; E I of
-# Table V; two modes a link, section 5.1
+# Table V; two modes per link, section 5.1
 PRESETS = [('korayem_rigid', 0, math.inf), ('korayem_ei50', 2, 50.0), ('korayem_ei5', 2, 5.0)]
 
 REMOVE = object()

@@ -22,8 +22,8 @@ SearchFactory = Callable[..., MaxPayload]
 
 # eps and e of section 5.3
 EPS, E = 1e-3, 0.05
-# E I [N m^2] and modes a link: m_pmax of table V, ours to three digits, and what prices of 1e4 to
-# 1e5 a kilogram enclose within 1e-6 kg
+# E I [N m^2] and modes per link: m_pmax of table V, ours to three digits, and what prices of 1e4
+# to 1e5 a kilogram enclose within 1e-6 kg
 TABLE_5 = {(math.inf, 0): (5.85, 5.855, 5.855140), (50.0, 2): (5.8, 5.850, 5.850612),
            (50.0, 1): (5.8, 5.8507, 5.850763), (5.0, 2): (5.75, 5.742, 5.741828),
            (5.0, 1): (5.75, 5.746, 5.745623)}

@@ -12,6 +12,7 @@ from flex_planner.cli import main
 import pytest
 
 PRESETS = sorted(preset_files())
+MOTION = ['--from', '0.5,0', '--to', '0.5,0.5', '--duration', '1']
 
 
 def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
@@ -159,7 +160,9 @@ def test_version_is_that_of_the_package(capsys: pytest.CaptureFixture[str]) -> N
     assert capsys.readouterr().out.strip() == __version__
 
 
-@pytest.mark.parametrize('arguments', [[], ['arms'], ['arm'], ['arm', 'x', '--payload', 'heavy']])
+@pytest.mark.parametrize('arguments', [
+    [], ['arms'], ['arm'], ['arm', 'x', '--payload', 'heavy'], ['plan'], ['plan', 'x'],
+    ['plan', 'x', *MOTION, '--payload', 'heavy'], ['payload', 'x', *MOTION, '--method', 'guess']])
 def test_wrong_usage_is_told(capsys: pytest.CaptureFixture[str], arguments: list[str]) -> None:
     with pytest.raises(SystemExit) as caught:
         main(arguments)

@@ -266,16 +266,6 @@ def test_bad_option_of_the_search_is_named(arguments: list[str], message: str) -
     assert message in outcome.reason
 
 
-@pytest.mark.parametrize('arguments', [
-    ['plan'], ['plan', 'korayem_rigid'], ['plan', 'korayem_rigid', *MOTION, '--payload', 'heavy'],
-    ['payload', 'korayem_rigid', *MOTION, '--method', 'guess']])
-def test_wrong_usage_is_told(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as caught:
-        main(arguments)
-    assert caught.value.code == 2
-    assert 'usage: flex-planner' in capsys.readouterr().err
-
-
 def test_folder_that_cannot_be_written_is_told_before_anything_is_solved(tmp_path: Path) -> None:
     (tmp_path / 'file').write_text('')
     outcome = run('plan', 'korayem_rigid', *MOTION, '--output', str(tmp_path / 'file' / 'new'))

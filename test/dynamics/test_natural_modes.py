@@ -58,7 +58,7 @@ def loaded_arm() -> Arm:
 
 
 @pytest.mark.parametrize(('family', 'expected'), [
-    # two modes a link, no payload, joints free
+    # two modes per link, no payload, joints free
     ('pinned_pinned', [19.69, 28.38]), ('clamped_free', [19.87, 28.37])])
 def test_families_give_the_arm_of_the_paper_nearly_the_same_frequencies(
         paper: Arm, family: str, expected: list[float]) -> None:

@@ -383,7 +383,7 @@ def test_pendulum_obeys_its_closed_form(pendulum: Arm) -> None:
 
 @pytest.fixture(scope='module')
 def hanging_arm() -> Arm:
-    """Return the arm of section 5.1's model verification, with one mode a link."""
+    """Return the arm of section 5.1's model verification, with one mode per link."""
     link = Link(length=0.5, linear_density=6.0, flexural_rigidity=100.0, modes=1)
     return Arm(name='hanging', links=(link, link), joints=(Joint(), Joint()),
                gravity=[0.0, -9.81])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from applied_torques import Case, crane_plan
 from factories import PlanFactory
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.task import Task
@@ -28,9 +27,3 @@ def saturated(crane_model: ArmModel, plan_of: PlanFactory,
     crane = plan_path(crane_task, model=crane_model)
     assert crane.solved, crane.message
     return lambda name: crane if name == 'crane' else plan_of(name, 5.5)
-
-
-@pytest.fixture(scope='session')
-def any_plan(plan_of: PlanFactory, crane_model: ArmModel) -> Callable[[Case], Plan]:
-    """Return plans of the paper's arms, and one under gravity; motors saturate in most."""
-    return lambda case: crane_plan(crane_model) if isinstance(case, str) else plan_of(*case)

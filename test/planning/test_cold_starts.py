@@ -1,7 +1,7 @@
 """
 Arms and tasks that must be solved without any help.
 
-The paper's arm with clamped shapes and two modes a link takes 10 to 80 s and is not run here;
+The paper's arm with clamped shapes and two modes per link takes 10 to 80 s and is not run here;
 it converges to J = 0.648966 (EI = 50) and 0.70984 (EI = 5).
 
 """

@@ -23,7 +23,7 @@ from flex_planner.planning.objectives import (
 )
 from flex_planner.planning.plan_path import plan_path
 import numpy as np
-from objective_checks import modal_peaks, RUNG, seen, within
+from objective_checks import modal_peaks, RINGING, seen, within
 from plan_checks import solution_of
 import pytest
 from scipy.integrate import simpson
@@ -44,7 +44,7 @@ def test_shares_are_peaks_by_their_limits(plan_of: PlanFactory) -> None:
             (Objective.JOINT_SPEEDS, found.speeds / [0.5, 2.0]),
             (Objective.TORQUE_SHARES, found.torque_shares / [0.5, inf]),
             (Objective.MODAL_RATES, modal_peaks(plan) / [0.1, inf, 0.2, 0.3])):
-        np.testing.assert_allclose(objectives.shares(objective, *data), expected, rtol=RUNG)
+        np.testing.assert_allclose(objectives.shares(objective, *data), expected, rtol=RINGING)
     assert objectives.limited(plan.arm) == tuple(Objective)
     assert Objectives(max_torque_shares=[inf, 0.5]).limited(plan.arm) == (
         Objective.TORQUE_SHARES,)
@@ -140,8 +140,8 @@ def test_minimum_vibration_vibrates_less_for_more_effort(ei5_model: ArmModel,
     plans = [plan_path(each, model=ei5_model) for each in (minimum_effort(task), calm_task)]
     assert all(plan.solved for plan in plans)
     samples = [plan.uniform_samples(2001) for plan in plans]
-    rung = [simpson((each.rates[:, 2:]**2).sum(axis=1), x=each.times) for each in samples]
-    assert rung[1] < rung[0] / 2
+    ringing = [simpson((each.rates[:, 2:]**2).sum(axis=1), x=each.times) for each in samples]
+    assert ringing[1] < ringing[0] / 2
     assert plans[1].effort > plans[0].effort
 
 

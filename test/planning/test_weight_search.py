@@ -13,7 +13,7 @@ from flex_planner.planning.objectives import Objective
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_path import plan_path
 import numpy as np
-from objective_checks import modal_peaks, RUNG, search_of, SEEN, seen, within
+from objective_checks import modal_peaks, RINGING, search_of, SEEN, seen, within
 from plan_checks import stopped_in
 import pytest
 
@@ -248,7 +248,7 @@ def test_modal_rate_is_met_by_the_weight_of_its_mode(ei5_model: ArmModel, paper_
     (margin,) = search_of(plan).margins
     assert plan.solved, plan.message
     assert margin.objective is Objective.MODAL_RATES
-    assert modal_peaks(plan)[0] <= limit * (1 + RUNG)
+    assert modal_peaks(plan)[0] <= limit * (1 + RINGING)
     assert plan.task.velocity_weights.tolist() == [0, 0, margin.weight, 0, 0, 0]
 
 
@@ -259,7 +259,7 @@ def test_modal_rates_are_met_by_the_weights_of_all_modes(ei5_model: ArmModel,
     plan = within(ei5_model, paper_task(ei5_model.arm), max_modal_rates=limits)
     (margin,), weights = search_of(plan).margins, plan.task.velocity_weights
     assert plan.solved, plan.message
-    assert (modal_peaks(plan) <= limits * (1 + RUNG)).all()
+    assert (modal_peaks(plan) <= limits * (1 + RINGING)).all()
     assert not weights[:2].any()
     np.testing.assert_allclose(weights[2:], margin.weight * (limits.min() / limits)**2)
 
@@ -287,7 +287,7 @@ def calm(ei5_model: ArmModel, paper_task: TaskFactory, plan_of: PlanFactory) -> 
 def test_speeds_and_vibration_are_met_together(calm: Plan, plan_of: PlanFactory) -> None:
     assert calm.solved, calm.message
     assert seen(calm).speeds.max() <= 1.0
-    assert modal_peaks(calm)[0] <= 0.9 * modal_peaks(plan_of('ei5'))[0] * (1 + RUNG)
+    assert modal_peaks(calm)[0] <= 0.9 * modal_peaks(plan_of('ei5'))[0] * (1 + RINGING)
     speed, rate = search_of(calm).margins
     assert calm.task.velocity_weights.tolist() == [speed.weight, speed.weight, rate.weight,
                                                    0, 0, 0]
@@ -303,7 +303,7 @@ def test_each_of_two_weights_is_needed_with_the_other_as_it_is(
                       start_from=calm)
     limit = 0.9 * modal_peaks(plan_of('ei5'))[0]
     reached = modal_peaks(again)[0] / limit if which else seen(again).speeds.max()
-    assert reached == pytest.approx(margin.relaxed_share, rel=RUNG)
+    assert reached == pytest.approx(margin.relaxed_share, rel=RINGING)
     assert reached > 1
 
 

@@ -2,7 +2,7 @@
 The dynamics of an arm without a compiler, for tests that use many arms once.
 
 Building takes milliseconds instead of seconds. What is under test is the same:
-:func:`flex_planner.dynamics.planar_chain.build_chain`.
+:func:`flex_planner.dynamics.build_chain.build_chain`.
 
 """
 

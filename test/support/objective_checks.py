@@ -14,7 +14,7 @@ from flex_planner.planning.plan_path import plan_path
 import numpy as np
 
 # of a peak, by the points between which it is: 1.2e-6 and 2.4e-4 where links ring
-SEEN, RUNG = 5e-6, 5e-4
+SEEN, RINGING = 5e-6, 5e-4
 
 
 def within(model: ArmModel, task: Task, monitor: Monitor | None = None, **limits: Any) -> Plan:

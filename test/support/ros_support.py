@@ -120,7 +120,7 @@ class Client:
             self._executor.spin_once(timeout_sec=0.02)
 
     def last_words(self) -> str:
-        """Return what helps to understand a wait that was in vain."""
+        """Return what helps to understand why something did not come in time."""
         return ''
 
     def spin(self, seconds: float) -> None:

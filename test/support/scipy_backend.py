@@ -18,6 +18,9 @@ from flex_planner.collocation import (
 import numpy as np
 from scipy.integrate import solve_bvp
 
+# no two entries are those of the default, or beyond what a variant sets
+FINE = SolverSettings(stages=5, intervals=30, max_intervals=1000, max_iterations=40,
+                      error_tolerance=1e-7, max_meshes=10)
 # a cubic has a quadratic for its derivative, which three points hold exactly
 _CUBIC = GaussRule.of(3)
 _MAX_NODES = 20000

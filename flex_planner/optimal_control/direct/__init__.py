@@ -1,1 +1,6 @@
-"""."""
+"""
+The optimal control problem by direct collocation and IPOPT: a start where others fail, a check.
+
+Read `ipopt` first; `programme` is the nonlinear programme, `mesh` its collocation methods.
+
+"""

@@ -48,7 +48,7 @@ SMOOTH = [
     ('gauss', 3, (6e-9, 6.0), (5e-6, 3.7)), ('radau', 1, (0.12, 1.0), (0.1, 1.0)),
     ('radau', 2, (8e-5, 3.1), (4e-3, 2.0)), ('radau', 3, (2e-7, 5.0), (2e-4, 2.9)),
     ('hermite_simpson', 3, (1e-5, 3.9), (2e-3, 2.0))]
-# the same of the arm with one mode a link, whose modes ring at up to 140 rad/s: at the nodes of
+# the same of the arm with one mode per link, whose modes ring at up to 140 rad/s: at the nodes of
 # 80 and of 160 intervals
 RINGING = [('gauss', 2e-2, 4e-4), ('radau', 0.15, 6e-3), ('hermite_simpson', 0.7, 6e-2)]
 # of the rigid arm, 5.5 kg, with both motors saturated: switches inside intervals leave no order

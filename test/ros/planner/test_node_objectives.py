@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 import math
-from pathlib import Path
 from typing import Any
 
-from flex_planner.arms.arm import Arm
-from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.ros.planner.outcome import Outcome
-from flex_planner.ros.planner.recorder import OutcomeRecorder
 from flex_planner.ros.planner.request_planner import RequestPlanner
 from flex_planner.ros.planner.request_state import RequestState
 from flex_planner.ros.settings.planner import PlannerSettings
@@ -19,16 +14,6 @@ import pytest
 from ros_support import search_request, task
 
 inf = math.inf
-
-
-@pytest.fixture
-def settings(rigid_arm: Arm, tmp_path: Path) -> PlannerSettings:
-    return replace(PlannerSettings.for_arm(rigid_arm), recording_folder=str(tmp_path))
-
-
-@pytest.fixture
-def worker(rigid_arm: Arm, rigid_model: ArmModel) -> RequestPlanner:
-    return RequestPlanner(rigid_model, OutcomeRecorder(rigid_arm, '/flex_planner'))
 
 
 def plan_task(worker: RequestPlanner, settings: PlannerSettings, **fields: Any) -> Outcome:

@@ -22,16 +22,6 @@ import pytest
 from ros_support import search_request, task
 
 
-@pytest.fixture
-def worker(rigid_arm: Arm, rigid_model: ArmModel) -> RequestPlanner:
-    return RequestPlanner(rigid_model, OutcomeRecorder(rigid_arm, '/flex_planner'))
-
-
-@pytest.fixture
-def settings(rigid_arm: Arm, tmp_path: Path) -> PlannerSettings:
-    return replace(PlannerSettings.for_arm(rigid_arm), recording_folder=str(tmp_path))
-
-
 @pytest.mark.parametrize(('reason', 'code'), [
     (StopReason.TIMEOUT, PlanReport.TIMEOUT), (StopReason.CANCELED, PlanReport.CANCELED)])
 def test_stop_after_the_solve_is_reported_without_a_trajectory(

@@ -1,0 +1,66 @@
+"""Plans by another method than ours: each of their problems is solved by it."""
+
+from __future__ import annotations
+
+from factories import PlanFactory, TaskFactory
+from flex_planner.base.progress import Monitor
+from flex_planner.collocation import Solver
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.planning.plan_path import plan_path
+from flex_planner.planning.strategies.catalogue import CATALOGUE
+from flex_planner.planning.strategies.strategy import Strategy
+import pytest
+from scipy_backend import CountingBackend, FINE, solve_by_scipy
+
+
+@pytest.mark.parametrize('strategy', [
+    each for each in CATALOGUE if each.name != 'direct collocation'], ids=lambda each: each.name)
+def test_every_iteration_of_a_plan_is_made_by_its_backend(
+        ei5_model: ArmModel, paper_task: TaskFactory, strategy: Strategy) -> None:
+    backend, monitor = CountingBackend(), Monitor()
+    plan = plan_path(paper_task(ei5_model.arm, w_2=10.0), model=ei5_model, monitor=monitor,
+                     strategies=[strategy], solver=Solver(FINE, backend=backend))
+    assert plan.solved, plan.message
+    # a solve that went past it would count in the monitor alone
+    assert backend.iterations == monitor.iteration == plan.iterations > 0
+    assert all(watch is monitor for watch in backend.monitors)
+    assert backend.settings[-1] == FINE  # whatever the way to it was
+
+
+def test_weights_are_adapted_and_durations_freed_by_the_backend(
+        rigid_model: ArmModel, paper_task: TaskFactory) -> None:
+    for changes in ({'time_weight': 10.0}, {'payload_mass': 5.8, 'w_2': 200.0}):
+        backend = CountingBackend()
+        plan = plan_path(paper_task(rigid_model.arm, **changes), model=rigid_model,
+                         solver=Solver(backend=backend))
+        assert plan.solved, plan.message
+        assert backend.iterations == plan.iterations
+
+
+def test_only_a_warm_start_promises_its_error_to_the_backend(
+        rigid_model: ArmModel, paper_task: TaskFactory, plan_of: PlanFactory) -> None:
+    cold, warm = CountingBackend(), CountingBackend()
+    task = paper_task(rigid_model.arm)
+    plan_path(task, model=rigid_model, solver=Solver(FINE, backend=cold))
+    plan_path(task, model=rigid_model, solver=Solver(FINE, backend=warm),
+              start_from=plan_of('rigid'))
+    assert (cold.expected_errors[0], warm.expected_errors[0]) == (1.0, FINE.error_tolerance)
+
+
+@pytest.mark.parametrize('w_2', [0.0, 10.0])
+def test_solve_bvp_plans_the_rigid_arm_end_to_end(
+        rigid_model: ArmModel, paper_task: TaskFactory, plan_of: PlanFactory, w_2: float) -> None:
+    plan = plan_path(paper_task(rigid_model.arm, w_2=w_2), model=rigid_model,
+                     solver=Solver(backend=solve_by_scipy))
+    assert (plan.solved, plan.strategy) == (True, 'cold start'), plan.message
+    # its tolerance of 1e-6 holds for the residual
+    assert plan.cost == pytest.approx(plan_of('rigid', 1.0, w_2).cost, rel=1e-6)
+    # nobody counted iterations, so none of ours were made
+    assert plan.iterations == 0
+
+
+def test_solve_bvp_is_stopped_by_the_monitor(rigid_model: ArmModel,
+                                             paper_task: TaskFactory) -> None:
+    plan = plan_path(paper_task(rigid_model.arm), model=rigid_model,
+                     solver=Solver(backend=solve_by_scipy, monitor=Monitor(canceled=lambda: True)))
+    assert (plan.message, plan.solution) == ('canceled', None)
