@@ -12,10 +12,8 @@ from collections.abc import Callable
 import ctypes
 from functools import cache
 
+from flex_planner.base.validation import Array
 import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
 
 
 @cache

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from flex_planner.base.progress import Monitor
+from flex_planner.base.validation import Array
 from flex_planner.collocation.linear import NewtonSystem, Residual, SingularSystemError
 from flex_planner.collocation.problem import BoundaryValueProblem
 from flex_planner.collocation.solution import CollocationSolution
 import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
 
 # Jacobian entries evaluated between two looks at the monitor: some milliseconds, some MB
 _CHUNK = 400_000

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from flex_planner.base.validation import Array
 from flex_planner.collocation.equations import collocation_residual, magnitudes
 from flex_planner.collocation.gauss import GaussRule
 from flex_planner.collocation.linear import NewtonSystem, SingularSystemError
 from flex_planner.collocation.problem import BoundaryValueProblem
 from flex_planner.collocation.solution import CollocationSolution
 import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
 
 # where dF/dz changes inside an interval, its mean is wrong by as much as the error itself: the
 # first correction finds the order, the next ones the factor

@@ -12,11 +12,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
+from flex_planner.base.validation import Array
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 LongArray = NDArray[np.longdouble]
 ComplexLongArray = NDArray[np.clongdouble]

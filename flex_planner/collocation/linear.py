@@ -16,12 +16,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from flex_planner.base.validation import Array
 from flex_planner.collocation.banded import BandedFactors
 from flex_planner.collocation.gauss import ComplexArray, GaussRule
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 _SINGULAR_STAGES = 'the stage equations of an interval are singular'

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from functools import cache
 
+from flex_planner.base.validation import Array
 from flex_planner.collocation.equations import magnitudes
 from flex_planner.collocation.problem import BoundaryValueProblem
 from flex_planner.collocation.solution import CollocationSolution
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
 
 # density of nodes: at least this share of the largest, so that nothing is overlooked
 _LEAST_DENSITY = 0.1

@@ -14,6 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from flex_planner.base.progress import Monitor, StoppedError, StopReason
+from flex_planner.base.validation import Array
 from flex_planner.collocation.equations import (
     collocation_residual,
     factorise,
@@ -24,9 +25,6 @@ from flex_planner.collocation.linear import NewtonSystem, Residual, SingularSyst
 from flex_planner.collocation.problem import BoundaryValueProblem
 from flex_planner.collocation.solution import CollocationSolution
 import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
 
 _SMALLEST_STEP = 1e-4
 # an old matrix is kept while it shrinks the correction at least this much

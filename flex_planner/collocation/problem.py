@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from flex_planner.base.validation import Array
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 

@@ -24,10 +24,9 @@ import subprocess
 import tempfile
 from typing import Any, Protocol
 
+from flex_planner.base.validation import Array
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
 Builder = Callable[[], Mapping[str, tuple[Any, int]]]
 
 _LOG = logging.getLogger(__name__)

@@ -27,6 +27,8 @@ _REACH = {
     'payload_mass': (0.1, 0.1), 'payload_inertia': (1e-3, 0.1), 'rigidity': (0.0, 0.5),
     'stall_torque': (0.0, 0.1), 'torque_slope': (0.0, 0.1), 'effort_weights': (0.0, 0.5),
     'position_weights': (0.1, 0.5), 'velocity_weights': (0.1, 0.5)}
+# of a quantity that nobody has given a reach
+_SAME = (1e-6, 1e-6)  # single precision
 # what the largest payload is, or does not depend on
 _NOT_SEARCHED = ('payload_mass', 'position_weights', 'velocity_weights')
 _HEAD = 3  # payload, price, number of nodes
@@ -65,7 +67,7 @@ def distances(signatures: NDArray[np.floating], own: Array, names: list[str],
     """
     counted = [k for k, name in enumerate(names) if not (searched and name in _NOT_SEARCHED)]
     there, here = signatures[:, counted].astype(np.float64), own[counted]
-    least, share = np.array([_REACH[names[k]] for k in counted]).T
+    least, share = np.array([_REACH.get(names[k], _SAME) for k in counted]).T
     with np.errstate(invalid='ignore', divide='ignore'):
         reach = least + share * np.maximum(np.abs(there), np.abs(here))
         apart = np.where(there == here, 0.0, np.abs(there - here) / reach)
