@@ -125,7 +125,6 @@ class FreeParameter(ABC):
         return Extremal(value=value, price=price, result=ahead.restrict_result(found),
                         problem=ahead.fix(value))
 
-
     def solve_beyond(self, problem: MotionProblem, value: float,
                      make_guess: Callable[[MotionProblem], CollocationSolution], price: float,
                      solver: Solver) -> Extremal | None:
