@@ -11,8 +11,9 @@ from geometry_msgs.msg import Point
 import numpy as np
 from ros_support import Planner
 
-REQUESTS, SETTLED = 500, 100
-GROWTH = 5.0  # [MB], over all but the first hundred
+# a busy machine has one more thread allocate, which costs 12 MB once, within the first hundreds
+REQUESTS, SETTLED = 500, 250
+GROWTH = 3.0  # [MB], over the second half
 
 
 def memory(pid: int) -> float:
@@ -62,6 +63,6 @@ def test_five_hundred_requests_of_all_kinds_are_answered_and_cost_no_memory(
         recorded = len(list(planner.recordings.glob('*/*.mcap')))
         assert REQUESTS * 9 // 10 <= recorded <= REQUESTS
         assert 'Traceback' not in planner.log()
-    # what a planner needs once is there after a hundred
+    # what a planner needs once is there after the first half
     grown = np.median(sizes[-20:]) - np.median(sizes[SETTLED - 10:SETTLED + 10])
     assert grown < GROWTH, sizes[::20]
