@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
-from flex_planner.arms.arm import Arm
+from flex_planner.arms.arm import Arm, Joint, Link, Motor
 from flex_planner.base.progress import Monitor, StopReason
 from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.collocation import Solver, SolverStatus
 from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.direct.ipopt import DirectProblem
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import PlanStatus
@@ -80,3 +83,24 @@ def test_search_for_the_largest_payload_can_be_cancelled(problem: MotionProblem,
     assert found.status is PlanStatus.CANCELED
     assert not found.payload
     assert monitor.late == 0
+
+
+@pytest.mark.parametrize('payload', [1e7, 1e5])
+def test_absurd_payload_of_an_iterate_ends_the_continuation_and_raises_nothing(
+        monkeypatch: pytest.MonkeyPatch, payload: float) -> None:
+    # 1e7 kg are more than a task may have, and 1e5 kg more than the links bear
+    link = Link(length=1.0, linear_density=1.0, flexural_rigidity=40.0, modes=1,
+                mode_family='clamped_free')
+    arm = Arm(name='weak', links=(link,), joints=(Joint(motor=Motor(stall_torque=8.0)),),
+              gravity=[0.0, -9.81])
+    problem = problem_of(ArmModel.of(arm), Task(arm=arm, start_positions=[-1.5],
+                                                goal_positions=[-0.5], duration=1.0))
+    asked: list[float] = []
+
+    def solve(direct: DirectProblem, *data: Any, **options: Any) -> SimpleNamespace:
+        asked.append(options['price'])
+        return SimpleNamespace(payload=payload)
+
+    monkeypatch.setattr(DirectProblem, 'solve', solve)
+    assert list(continue_by_ipopt(problem, 1.0, Solver(), lambda value: 0.0)) == []
+    assert len(asked) == 1
