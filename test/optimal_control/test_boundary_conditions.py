@@ -162,3 +162,15 @@ def test_payload_that_buckles_the_links_leaves_no_ends(crane_model: ArmModel,
     for rows in (problem.left, problem.right):
         with pytest.raises(SingularSystemError, match='no static equilibrium'):
             rows(z)
+
+
+def test_counterweight_that_can_be_held_has_a_limit_though_nothing_cannot() -> None:
+    # link 1 weighs 2 kg, link 2 is balanced over joint 1 and carries the payload on the other side
+    links = (Link(length=1.0, linear_density=2.0), Link(length=2.0, linear_density=1.0))
+    joints = (Joint(motor=Motor(stall_torque=2.0)), Joint())
+    arm = Arm(name='balance', links=links, joints=joints, gravity=[0.0, -9.81])
+    task = Task(arm=arm, start_positions=[0.1, np.pi], goal_positions=[0.0, np.pi], duration=2.0,
+                payload_mass=1.0)
+    limit, joint = holding_limit(ArmModel.of(arm), task, task_parameters(task))
+    assert limit == pytest.approx(1 + 2.0 / 9.81, rel=1e-9)
+    assert joint == 0

@@ -8,6 +8,7 @@ import math
 
 from factories import model_of, TaskFactory
 from flex_planner.arms.arm import Arm, Joint, Link
+from flex_planner.base.errors import NoEquilibriumError
 from flex_planner.base.progress import Monitor
 from flex_planner.collocation import solve, Solver, SolverSettings, SolverStatus
 from flex_planner.optimal_control.arm_model import ArmModel
@@ -201,3 +202,14 @@ def test_stopped_search_says_so_and_ends(rigid_model: ArmModel, paper_task: Task
     assert extremals[-1].result.status is SolverStatus.CANCELED
     assert all(one.result.converged for one in extremals[:-1])
     assert len(extremals) > 1
+
+
+def test_links_that_buckle_with_hardly_more_payload_end_the_continuation(
+        monkeypatch: pytest.MonkeyPatch, rigid_model: ArmModel, paper_task: TaskFactory) -> None:
+    def price(*motion: object) -> float:
+        raise NoEquilibriumError('no static equilibrium')
+
+    problem = problem_of(rigid_model, paper_task(rigid_model.arm))
+    first = cold_start(problem, Solver()).result
+    monkeypatch.setattr(PAYLOAD, 'price', price)
+    assert list(continue_in_price(PAYLOAD, problem, first, Solver())) == []
