@@ -59,13 +59,9 @@ class ArmDynamics:
                 _kept.popitem(last=False)
         return found
 
-    def __getstate__(self) -> Arm:
+    def __reduce__(self) -> tuple[Callable[[Arm], ArmDynamics], tuple[Arm]]:
         """Leave the machine code behind: it is loaded again when it is needed."""
-        return self.arm
-
-    def __setstate__(self, arm: Arm) -> None:
-        """Wait with loading until a function is needed."""
-        self.arm, self._loaded = arm, {}
+        return type(self).reconstruct, self.reconstruction_arguments()
 
     def reconstruction_arguments(self) -> tuple[Arm]:
         """Return the arguments of `reconstruct`."""
@@ -75,7 +71,7 @@ class ArmDynamics:
     def reconstruct(cls: type[Dynamics], arm: Arm) -> Dynamics:
         """Return the functions of an arm, loaded or compiled when they are needed."""
         made = cls.__new__(cls)
-        made.__setstate__(arm)
+        made.arm, made._loaded = arm, {}
         return made
 
     def prepare(self) -> None:
