@@ -73,7 +73,7 @@ class _BlockRun:
                 self._results[index] = self._add(index)
         # what did not converge may do so from the neighbours on the other sides
         for index in reversed(self._cells):
-            if self._results[index].code is CellCode.NOT_CONVERGED:
+            if self._results[index].code in (CellCode.NOT_CONVERGED, CellCode.NOT_FOUND):
                 self._try_again(index)
         return [self._results[index] for index in self._cells]
 

@@ -22,6 +22,9 @@ class CellCode(IntEnum):
     TIMEOUT = 6
     INVALID = 7
     FAILED = 8
+    NOT_FOUND = 9
+    LIMIT_VIOLATED = 10
+    BENT_TOO_FAR = 11
 
     @property
     def meaning(self) -> str:
@@ -38,16 +41,22 @@ _MEANINGS = {
     CellCode.PENDING: 'not computed yet',
     CellCode.SOLVED: 'solved and certified',
     CellCode.UNREACHABLE: 'start or goal cannot be reached, or is singular',
-    CellCode.INFEASIBLE: 'impossible within the limits of the motors',
+    CellCode.INFEASIBLE: 'impossible: a proof that holds for all motions is named',
     CellCode.NOT_CONVERGED: 'not converged, which does not show that it is impossible',
     CellCode.CERTIFICATE_FAILED: 'converged, but the re-simulated motion misses its tolerances',
     CellCode.TIMEOUT: 'time limit of a cell reached',
     CellCode.INVALID: 'a value of the cell is out of its bounds',
     CellCode.FAILED: 'an error of the program, see the message',
+    CellCode.NOT_FOUND: 'no motion found, which does not show that there is none',
+    CellCode.LIMIT_VIOLATED: 'a joint leaves its limits, or is faster than it may be, on the way',
+    CellCode.BENT_TOO_FAR: 'links bend further than the model of the arm holds',
 }
 _OF_STATUS = {
     PlanStatus.SOLVED: CellCode.SOLVED,
     PlanStatus.INFEASIBLE: CellCode.INFEASIBLE,
+    PlanStatus.NOT_FOUND: CellCode.NOT_FOUND,
+    PlanStatus.LIMIT_VIOLATED: CellCode.LIMIT_VIOLATED,
+    PlanStatus.BENT_TOO_FAR: CellCode.BENT_TOO_FAR,
     PlanStatus.NOT_CONVERGED: CellCode.NOT_CONVERGED,
     PlanStatus.CERTIFICATE_FAILED: CellCode.CERTIFICATE_FAILED,
     PlanStatus.OBJECTIVE_NOT_MET: CellCode.NOT_CONVERGED,

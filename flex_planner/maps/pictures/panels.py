@@ -29,7 +29,9 @@ _LOOKS = {CellCode.PENDING: ('white', '', ''), CellCode.UNREACHABLE: ('#dcdcdc',
           CellCode.NOT_CONVERGED: ('#fbeccb', '....', 'o'),
           CellCode.CERTIFICATE_FAILED: ('#e6dcf2', '\\\\\\\\', 's'),
           CellCode.TIMEOUT: ('#d8e6f3', '----', 'v'), CellCode.INVALID: ('#ececec', '++++', '+'),
-          CellCode.FAILED: ('#f4b6b6', 'xxxx', 'D')}
+          CellCode.FAILED: ('#f4b6b6', 'xxxx', 'D'), CellCode.NOT_FOUND: ('#f3e3bd', '..', '.'),
+          CellCode.LIMIT_VIOLATED: ('#d5ece0', '||||', '|'),
+          CellCode.BENT_TOO_FAR: ('#e3e3f7', '**', '*')}
 MARKERS = {kind: marker for kind, (_, _, marker) in _LOOKS.items() if marker}
 _HATCH = '#8a8a8a'
 # diagrams of a picture; of its title [1/in]; of its legend [in]

@@ -45,7 +45,10 @@ ERROR_CODES: tuple[tuple[type[FlexPlannerError], int], ...] = (
 STATUS_CODES = {
     PlanStatus.SOLVED: PlanReport.NONE,
     PlanStatus.NOT_CONVERGED: PlanReport.NOT_CONVERGED,
+    PlanStatus.NOT_FOUND: PlanReport.NOT_FOUND,
     PlanStatus.INFEASIBLE: PlanReport.INFEASIBLE,
+    PlanStatus.LIMIT_VIOLATED: PlanReport.LIMIT_VIOLATED,
+    PlanStatus.BENT_TOO_FAR: PlanReport.BENT_TOO_FAR,
     PlanStatus.CERTIFICATE_FAILED: PlanReport.CERTIFICATE_FAILED,
     PlanStatus.OBJECTIVE_NOT_MET: PlanReport.OBJECTIVE_NOT_MET,
     PlanStatus.TIMEOUT: PlanReport.TIMEOUT,
