@@ -20,6 +20,7 @@ from flex_planner.arms.kinematics import tip_position
 from flex_planner.capacity.results import PayloadMethod
 from flex_planner.dynamics.integration import PiecewisePolynomial, simulate
 from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectResult, DirectSettings
+from flex_planner.optimal_control.direct.unknowns import Free
 from flex_planner.optimal_control.direct.mesh import Mesh
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.planning.certificate import CertificateLimits
@@ -73,7 +74,7 @@ def measure(arm: str, repeats: int = 7) -> list[Row]:
     """Return the rows of one arm."""
     problem = paper_problem(0.0, arm)
     exact = find_max_payload(problem.task, model=problem.model, accuracy=_EXACT)
-    limit, rows = (exact.payload + exact.upper) / 2, []
+    limit, rows = (exact.payload + exact.local_upper) / 2, []
     for accuracy in ACCURACIES:
         print(f'payload: {arm}, {accuracy:g} kg', flush=True)
         rows.append(_ours(arm, problem, limit, PayloadMethod.DIRECT, accuracy, repeats))
@@ -103,10 +104,11 @@ def _rival(arm: str, problem: MotionProblem, limit: float, name: str, accuracy: 
     monitor, row, (scheme, degree) = Monitor(time_limit=SEARCH_SECONDS), None, SCHEMES[name]
     for intervals in INTERVALS:
         direct = DirectProblem(problem.model, DirectSettings(
-            scheme=scheme, degree=degree, intervals=intervals, free_payload=True))
+            scheme=scheme, degree=degree, intervals=intervals))
         began = time.perf_counter()
         found = direct.solve(problem.parameters, problem.start, problem.goal,
-                             problem.task.duration, price=_PRICES[accuracy], monitor=monitor)
+                             problem.task.duration, free=Free.PAYLOAD,
+                             price=_PRICES[accuracy], monitor=monitor)
         seconds = time.perf_counter() - began
         if not found.converged:
             break

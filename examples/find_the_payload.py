@@ -31,7 +31,7 @@ def main() -> None:
     if not found.solved or found.plan is None:
         sys.exit(found.message)
 
-    print(f'between {found.payload:.4f} kg and {found.upper:.4f} kg, in '
+    print(f'between {found.payload:.4f} kg and {found.local_upper:.4f} kg, in '
           f'{found.planning_time:.1f} s')
     for joint, share in enumerate(found.plan.saturation, 1):
         print(f'with it the motor of joint {joint} is on its limit for {share:.1%} of the time')

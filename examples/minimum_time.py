@@ -29,7 +29,7 @@ def main() -> None:
     shortest = find_min_duration(task)
     if not shortest.solved:
         sys.exit(shortest.message)
-    print(f'shortest time with 1 kg: {shortest.lower:.5f} to {shortest.duration:.5f} s')
+    print(f'shortest time with 1 kg: {shortest.local_lower:.5f} to {shortest.duration:.5f} s')
 
     # at a price: the duration is free, and every second adds to the cost
     for price in (1.0, 10.0, 100.0):

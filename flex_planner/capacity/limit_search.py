@@ -15,6 +15,10 @@ from flex_planner.capacity.bracket import (
 from flex_planner.capacity.extrapolation import extrapolate_to_limit, Neighbours
 from flex_planner.collocation import CollocationSolution, Solver
 from flex_planner.optimal_control.motion_problem import MotionProblem
+from flex_planner.planning.kinds.clusters import KindOfMotion
+from flex_planner.planning.kinds.effort import SearchEffort
+from flex_planner.planning.kinds.lift import solve_best_kind
+from flex_planner.planning.kinds.search import find_kinds
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_problem import INTERRUPTED_STATUS, plan_problem
 from flex_planner.planning.strategies.catalogue import CATALOGUE, QUICK
@@ -28,6 +32,9 @@ from flex_planner.planning.strategies.homotopies import (
 )
 from flex_planner.planning.strategies.price_continuation import continue_in_price
 from flex_planner.planning.strategies.strategy import Attempt, Strategy
+
+# a search has finished a kind of motion if it comes to this share of its value
+_KEPT = 0.01
 
 
 class Failure(NamedTuple):
@@ -51,6 +58,8 @@ class LimitSearch:
         Its monitor may interrupt the search.
     accuracy : float
         To which the limit is wanted [kg, s].
+    effort : SearchEffort
+        How many kinds of motion are looked for, unless a given motion leads on.
 
     Attributes
     ----------
@@ -60,13 +69,19 @@ class LimitSearch:
         Whether the last one follows from searches of two neighbours, as exact as a plan.
     warm : bool
         Whether the search went on from the motion that it was given.
+    kinds : list of KindOfMotion
+        Kinds of motion of the arm made rigid, the best first; empty if it looked for none.
+    starts : int
+        How many starts were explored for them.
 
     """
 
     def __init__(self, parameter: FreeParameter, problem: MotionProblem, solver: Solver,
-                 accuracy: float) -> None:
+                 accuracy: float, effort: SearchEffort = SearchEffort.FAST) -> None:
         self._parameter, self._problem, self._solver = parameter, problem, solver
-        self._accuracy = accuracy
+        self._accuracy, self._effort = accuracy, effort
+        self.kinds: list[KindOfMotion] = []
+        self.starts = 0
         self.extremals: list[Extremal] = []
         self.extrapolated = self.warm = False
 
@@ -129,26 +144,56 @@ class LimitSearch:
             return replace(found, message=f'{plan.message}; {found.message}')
         return found
 
+    @property
+    def certifiable(self) -> list[Extremal]:
+        """Return the motions that were solved, the one nearest to the limit last."""
+        return [one for one in self.extremals if one.result.converged]
+
+    @property
+    def explored_best(self) -> KindOfMotion | None:
+        """Return the best kind if the search ended worse than it: it was not finished."""
+        if not self.kinds or not self.extremals or self._problem.model.arm.n_modes:
+            return None
+        best, worse = self.kinds[0], (1 - _KEPT) if self._parameter is PAYLOAD else (1 + _KEPT)
+        return best if self._parameter.improves(worse * best.value, self.last.value) else None
+
     def _approach(self, start: SearchStart | None) -> None:
         """Collect extremals from the first start that leads to a motion."""
         solver = continuation_solver(self._solver, self._accuracy)
-        for problem in self._parameter.starts(drop_weights(self._problem)):
-            known = None if start is None else transfer_extremal(self._parameter, problem, start,
-                                                                 solver)
-            self.warm = known is not None
+        bare = drop_weights(self._problem)
+        known = None if start is None else self._transfer(bare, start, solver)
+        self.warm = known is not None
+        if known is None:
+            known = self._explore(bare, solver)
+        for problem in self._parameter.starts(bare):
             self.extremals = collect_to_limit(
                 approach_limit(self._parameter, problem, solver, first=known,
                                target_gap=self._target_gap), self._accuracy)
             if self.extremals[0].result.converged or self.extremals[0].interrupted:
                 return
 
+    def _transfer(self, bare: MotionProblem, start: SearchStart,
+                  solver: Solver) -> Extremal | None:
+        """Return the motion that a given one leads to."""
+        for problem in self._parameter.starts(bare):
+            known = transfer_extremal(self._parameter, problem, start, solver)
+            if known is not None:
+                return known
+        return None
+
+    def _explore(self, bare: MotionProblem, solver: Solver) -> Extremal | None:
+        """Look for kinds of motion, and return the motion that the best one leads to."""
+        self.starts = self._effort.starts
+        self.kinds = find_kinds(bare, self._parameter.unknown, self.starts,
+                                self._solver.monitor)
+        self._announce()
+        easiest = self._parameter.easiest(bare)
+        return solve_best_kind(self._parameter, easiest, self.kinds, solver)
+
     def _approach_from_plan(self) -> Failure | None:
         """Collect extremals from a motion that takes all strategies to find."""
         bare = drop_weights(self._problem)
-        # a duration is only a first guess: what it forbids is no limit of the search
-        strategies = [one for one in CATALOGUE
-                      if self._parameter is PAYLOAD or not one.shows_infeasibility]
-        plan = plan_problem(bare, self._solver, strategies)
+        plan = plan_problem(bare, self._solver, CATALOGUE)
         if plan.solution is None or not plan.solved:
             return Failure(plan.status, plan.message)
         solver = continuation_solver(self._solver, self._accuracy)

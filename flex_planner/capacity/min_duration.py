@@ -10,19 +10,22 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from flex_planner.base.errors import InvalidTaskError
+from flex_planner.base.errors import FlexPlannerError, InvalidTaskError
 from flex_planner.base.progress import Monitor, StoppedError
 from flex_planner.base.validation import number, vector
 from flex_planner.capacity.extrapolation import Neighbours, step_ratio
 from flex_planner.capacity.limit_search import LimitSearch
 from flex_planner.capacity.max_payload import find_max_payload
-from flex_planner.capacity.results import MaxPayload, MinDuration
+from flex_planner.capacity.results import describe_kinds, MaxPayload, MinDuration
 from flex_planner.collocation import Solver
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
 from flex_planner.optimal_control.task import MAX_DURATION, Task
+from flex_planner.planning.kinds.clusters import MOST_KINDS
+from flex_planner.planning.kinds.effort import SearchEffort
 from flex_planner.planning.plan import PlanStatus
 from flex_planner.planning.plan_problem import STOP_STATUS
+from flex_planner.planning.proofs import bound_duration
 from flex_planner.planning.strategies.extremals import SearchStart
 from flex_planner.planning.strategies.free_parameters import DURATION
 import numpy as np
@@ -34,7 +37,8 @@ _MIN_ACCURACY, _MAX_ACCURACY = 1e-7, 100.0
 def find_min_duration(task: Task, *, model: ArmModel | None = None,
                       solver: Solver | None = None, monitor: Monitor | None = None,
                       accuracy: float = 1e-4,
-                      start_from: MinDuration | Neighbours | None = None) -> MinDuration:
+                      start_from: MinDuration | Neighbours | None = None,
+                      search: SearchEffort | str = SearchEffort.NORMAL) -> MinDuration:
     """
     Find the shortest duration in which the arm can make a motion with the payload of the task.
 
@@ -49,6 +53,8 @@ def find_min_duration(task: Task, *, model: ArmModel | None = None,
         [s].
     start_from : MinDuration or Neighbours, optional
         A search of a similar task, tried first, or of two on a line, see `find_max_payload`.
+    search : SearchEffort or str
+        How many kinds of motion it looks for, see `find_max_payload`.
 
     Returns
     -------
@@ -63,6 +69,7 @@ def find_min_duration(task: Task, *, model: ArmModel | None = None,
         If the accuracy breaks its bound.
 
     """
+    effort = SearchEffort.of(search)
     number('accuracy', accuracy, at_least=_MIN_ACCURACY, at_most=_MAX_ACCURACY, unit='s')
     if not np.isfinite([joint.motor.stall_torque for joint in task.arm.joints]).all():
         raise InvalidTaskError('a motor of the arm has no stall torque, so no duration is the '
@@ -76,10 +83,14 @@ def find_min_duration(task: Task, *, model: ArmModel | None = None,
     problem = MotionProblem(model, fixed, task_parameters(fixed))
     neighbours = start_from if isinstance(start_from, Neighbours) else Neighbours(
         near=start_from)
+    limits = LimitSearch(DURATION, problem, solver, accuracy, effort)
     try:
-        found = _search(task, LimitSearch(DURATION, problem, solver, accuracy), neighbours)
+        found = _search(task, limits, neighbours)
     except StoppedError as error:
-        found = MinDuration(task=task, status=STOP_STATUS[error.reason], message=str(error))
+        found = _result(task, limits, STOP_STATUS[error.reason], str(error))
+    except FlexPlannerError as error:  # of a duration that was tried
+        found = _result(task, limits, PlanStatus.NOT_CONVERGED, str(error))
+    found = replace(found, proved_lower=bound_duration(problem))
     return replace(found, iterations=solver.monitor.iteration - began[0],
                    planning_time=solver.monitor.elapsed - began[1])
 
@@ -89,19 +100,31 @@ def _search(task: Task, search: LimitSearch, neighbours: Neighbours) -> MinDurat
     point = None if neighbours.near is None else neighbours.near.restart_point
     failure = search.follow_price(None if point is None else SearchStart.of(point), neighbours)
     if failure is not None:
-        return MinDuration(task=task, status=failure.status, message=failure.message)
+        return _result(task, search, failure.status, failure.message)
     plan, last = search.plan(), search.last
     lower = max(0.0, last.value - last.gap)
-    found = MinDuration(task=task, status=plan.status, message=plan.message, plan=plan,
-                        duration=last.value if plan.solved else np.inf, lower=lower,
-                        extremals=search.priced, warm=search.warm)
+    found = replace(_result(task, search, plan.status, plan.message), plan=plan,
+                    duration=last.value if plan.solved else np.inf, local_lower=lower)
     if not plan.solved:
         return found
     if not search.is_near:
         return replace(found, status=PlanStatus.NOT_CONVERGED, message=(
-            f'{last.value:.6g} s are enough, but it was not shown that no less are'))
-    kind = ' for motions of this kind' if task.arm.gravity.any() else ''
-    return replace(found, message=f'{last.value:.6g} s are enough, {lower:.6g} s are not{kind}')
+            f'{last.value:.6g} s are enough, but where this kind of motion ends was not found'))
+    best = search.explored_best
+    if best is not None:
+        return replace(found, status=PlanStatus.NOT_CONVERGED, message=(
+            f'{last.value:.6g} s are enough; {best.value:.6g} s were found by direct collocation '
+            f'on two meshes ({best.sentence}), but not certified'))
+    return replace(found, message=(
+        f'{last.value:.6g} s are enough, certified{describe_kinds(found)}; this kind of motion '
+        f'ends at {lower:.6g} s'))
+
+
+def _result(task: Task, search: LimitSearch, status: PlanStatus, message: str) -> MinDuration:
+    """Return the outcome of a search so far, without a plan."""
+    return MinDuration(task=task, status=status, message=message, extremals=search.priced,
+                       warm=search.warm, kinds=tuple(search.kinds[:MOST_KINDS]),
+                       starts=search.starts)
 
 
 def payload_against_duration(task: Task, durations: ArrayLike, *, model: ArmModel | None = None,

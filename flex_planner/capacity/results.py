@@ -9,7 +9,9 @@ from flex_planner.base.validation import Array
 from flex_planner.capacity.bracket import restart_point
 from flex_planner.capacity.incremental import PayloadTrial
 from flex_planner.optimal_control.task import Task
+from flex_planner.planning.kinds.clusters import KindOfMotion
 from flex_planner.planning.plan import Plan, PlanStatus
+from flex_planner.planning.proofs import Proof
 from flex_planner.planning.strategies.extremals import Extremal
 import numpy as np
 
@@ -60,6 +62,11 @@ class LimitResult:
         The motion at the end of the bracket that is possible.
     extremals : tuple of Extremal
         Motions with values nearer and nearer to the limit, with their prices.
+    kinds : tuple of KindOfMotion
+        Kinds of motion that the search met, at most four, the best first; values of the arm
+        made rigid. Empty where it started from a given motion, or followed one kind only.
+    starts : int
+        How many starts were explored.
     warm : bool
         Whether it went on from the motion that it was given to start from.
     iterations : int
@@ -74,6 +81,8 @@ class LimitResult:
     message: str
     plan: Plan | None = None
     extremals: tuple[Extremal, ...] = field(default=(), repr=False)
+    kinds: tuple[KindOfMotion, ...] = field(default=(), repr=False)
+    starts: int = 0
     warm: bool = False
     iterations: int = 0
     planning_time: float = 0.0
@@ -94,7 +103,8 @@ class MaxPayload(LimitResult):
     """
     The outcome of a search for the maximum payload, see `LimitResult`.
 
-    Its status is ``INFEASIBLE`` if not even the task's own payload can be carried.
+    Its status is ``INFEASIBLE`` if a proof shows that not even the task's own payload can be
+    carried, ``NOT_FOUND`` if no motion that carries it was found.
 
     Attributes
     ----------
@@ -103,9 +113,13 @@ class MaxPayload(LimitResult):
     payload : float
         Lower end of the bracket: the largest payload with a certified plan; 0 if there is
         none [kg].
-    upper : float
-        Upper end: too much, see `Extremal.gap`, or a payload without a solution; ``inf`` if
-        unknown [kg].
+    local_upper : float
+        Upper end: where this kind of motion ends, see `Extremal.gap`, or a payload without a
+        solution; ``inf`` if unknown. Motions of another kind may carry more [kg].
+    proved_upper : float
+        What no motion of the task exceeds; ``inf`` if nothing is proved [kg].
+    proof : Proof or None
+        Of `proved_upper`.
     limiting_joint : int or None
         Index of the joint whose motor is on its limit for the largest share of the time, see
         `Plan.saturation`, or that can hold no more at the goal.
@@ -120,7 +134,9 @@ class MaxPayload(LimitResult):
 
     method: PayloadMethod
     payload: float = 0.0
-    upper: float = np.inf
+    local_upper: float = np.inf
+    proved_upper: float = np.inf
+    proof: Proof | None = None
     limiting_joint: int | None = None
     held: bool = False
     front: PayloadFront = field(default_factory=PayloadFront)
@@ -137,10 +153,23 @@ class MinDuration(LimitResult):
     duration : float
         Upper end of the bracket: the shortest with a certified plan; ``inf`` if there is
         none [s].
-    lower : float
-        Lower end: too short, see `Extremal.gap`; 0 if unknown [s].
+    local_lower : float
+        Lower end: where this kind of motion ends, see `Extremal.gap`; 0 if unknown. Motions of
+        another kind may be shorter [s].
+    proved_lower : float
+        What no motion of the task falls below; 0 if nothing is proved [s].
 
     """
 
     duration: float = np.inf
-    lower: float = 0.0
+    local_lower: float = 0.0
+    proved_lower: float = 0.0
+
+
+def describe_kinds(found: LimitResult) -> str:
+    """Return among how many kinds of motion a limit is the best, in words."""
+    if not found.kinds:
+        return ''
+    count = len(found.kinds)
+    kinds = 'the only kind of motion' if count == 1 else f'the best of {count} kinds of motion'
+    return f', {kinds} found from {found.starts} starts'

@@ -9,6 +9,7 @@ from flex_planner.base.progress import StopReason
 from flex_planner.base.validation import Array, integer, number
 from flex_planner.collocation.gauss import FEWEST_STAGES, GaussRule, MOST_STAGES
 from flex_planner.collocation.solution import CollocationSolution
+import numpy as np
 
 
 class SolverStatus(Enum):
@@ -116,3 +117,10 @@ class CollocationResult:
     def converged(self) -> bool:
         """Whether this is a solution."""
         return self.status is SolverStatus.CONVERGED
+
+    @classmethod
+    def failed(cls, solution: CollocationSolution, message: str) -> CollocationResult:
+        """Return the result where nothing was solved, with a guess in place of a solution."""
+        return cls(solution=solution, status=SolverStatus.NEWTON_FAILED,
+                   errors=np.full(solution.nodes.shape[1], np.inf), residual=np.inf,
+                   switches=np.zeros(0), iterations=0, meshes=0, message=message)

@@ -109,7 +109,7 @@ class CellSolver:
             shortest = find_min_duration(
                 task, model=self._model, solver=solver, accuracy=_SHORT * task.duration,
                 start_from=_neighbours(start) if late else None)
-            if shortest.solved and shortest.lower > task.duration:
+            if shortest.solved and shortest.local_lower > task.duration:
                 return shortest
         return find_max_payload(task, model=self._model, solver=solver,
                                 accuracy=self._study.accuracy,
@@ -189,7 +189,7 @@ def _late_result(index: tuple[int, ...], found: MinDuration) -> CellResult:
     """Return the result of a cell whose motion takes longer than it may."""
     task = found.task
     return CellResult(index=index, code=CellCode.INFEASIBLE, iterations=found.iterations, message=(
-        f'the motion takes at least {found.lower:.4g} s with {task.payload_mass:g} kg, and '
+        f'the motion takes at least {found.local_lower:.4g} s with {task.payload_mass:g} kg, and '
         f'{task.duration:g} s were asked for'))
 
 
@@ -208,9 +208,9 @@ def _plan_of(found: CellSolution | None) -> Plan | None:
 def _value(found: CellSolution) -> tuple[float, float]:
     """Return the quantity, and the bound of its true value."""
     if isinstance(found, MaxPayload):
-        return found.payload, found.upper
+        return found.payload, found.local_upper
     if isinstance(found, MinDuration):
-        return found.duration, found.lower
+        return found.duration, found.local_lower
     if isinstance(found, Vibration):
         return found.peak_to_peak, math.nan
     return found.cost, math.nan

@@ -31,11 +31,13 @@ class FreeDurationProblem:
     ----------
     motion : MotionProblem
         Of the task, whose duration is the scale of T.
+    price : float
+        rho, > 0 [1/s].
 
     """
 
-    def __init__(self, motion: MotionProblem) -> None:
-        self.motion = motion
+    def __init__(self, motion: MotionProblem, price: float) -> None:
+        self.motion, self._price = motion, price
         self.size = motion.size + 1
         self.scale = np.append(motion.scale, _SHORTEST * motion.task.duration)
         self.explicit: Indices = motion.explicit
@@ -70,7 +72,7 @@ class FreeDurationProblem:
         rate = self.motion.rate(np.zeros(1), point)[0]
         half = rate.size // 2
         gradient = np.concatenate([-rate[half:], rate[:half], [0.0]])
-        return (np.concatenate([residual, hamiltonian + self.motion.task.time_weight]),
+        return (np.concatenate([residual, hamiltonian + self._price]),
                 np.vstack([append_zeros(rows, 1), gradient]))
 
     def extend(self, solution: CollocationSolution) -> CollocationSolution:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from flex_planner.base.validation import Array
 from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectResult, DirectSettings
+from flex_planner.optimal_control.direct.unknowns import Free
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import Plan, Samples
@@ -26,9 +27,10 @@ def maximize_payload(task: Task, plan: Plan, price: float, intervals: int = 30) 
     """Maximize the payload at a price by IPOPT, starting from a light load."""
     light = replace(task, payload_mass=1.0)
     problem = MotionProblem(plan.model, light, task_parameters(light))
-    settings = DirectSettings(degree=_DEGREE, intervals=intervals, free_payload=True)
+    settings = DirectSettings(degree=_DEGREE, intervals=intervals)
     return DirectProblem(plan.model, settings).solve(
-        problem.parameters, problem.start, problem.goal, task.duration, price=price)
+        problem.parameters, problem.start, problem.goal, task.duration, free=Free.PAYLOAD,
+        price=price)
 
 
 def format_value(result: DirectResult, value: float, digits: int = 6) -> str:

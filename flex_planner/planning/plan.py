@@ -19,6 +19,8 @@ from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.optimal_control.task import Task
 from flex_planner.optimal_control.torque_limits import TorqueLimits
 from flex_planner.planning.certificate import Certificate
+from flex_planner.planning.kinds.clusters import KindOfMotion
+from flex_planner.planning.kinds.explorer import ExploredMotion
 from flex_planner.planning.objectives import (
     Margin,
     Objective,
@@ -116,6 +118,11 @@ class Plan:
         When a motor reaches or leaves its limit [s].
     saturation : numpy.ndarray, shape (n,)
         Share of the time that each motor spends on its limit.
+    kinds : tuple of KindOfMotion
+        Kinds of motion that were met, at most four, that of the plan first; values of the others
+        are of the arm made rigid.
+    starts : int
+        How many starts led to them.
     objectives : ObjectiveSearch or None
         How objectives were met; None if there are none.
     iterations : int
@@ -137,6 +144,8 @@ class Plan:
     energy: float = np.inf
     switching_times: Array = field(default_factory=lambda: np.zeros(0))
     saturation: Array = field(default_factory=lambda: np.zeros(0))
+    kinds: tuple[KindOfMotion, ...] = ()
+    starts: int = 1
     objectives: ObjectiveSearch | None = None
     iterations: int = 0
     planning_time: float = 0.0
@@ -247,7 +256,8 @@ class Plan:
 # what a file of a plan may hold
 _SAVED = (Plan, PlanStatus, Certificate, Task, Arm, Link, Joint, Motor, Node, ArmModel,
           MotionProblem, BoundaryConditions, Parameters, CollocationSolution, GaussRule,
-          ObjectiveSearch, Objectives, Objective, WeightTrial, Margin)
+          ObjectiveSearch, Objectives, Objective, WeightTrial, Margin, KindOfMotion,
+          ExploredMotion)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

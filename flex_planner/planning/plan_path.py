@@ -7,16 +7,20 @@ Optimal paths for a given payload: Korayem et al. 2009, section 4.1.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from flex_planner.base.progress import Monitor
 from flex_planner.collocation import CollocationSolution, Solver
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
 from flex_planner.optimal_control.task import Task
+from flex_planner.planning.kinds.clusters import KindOfMotion
+from flex_planner.planning.kinds.effort import SearchEffort
+from flex_planner.planning.kinds.kinds_strategy import as_guess
 from flex_planner.planning.objectives import Objectives
-from flex_planner.planning.plan import Plan
+from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_problem import plan_problem
+from flex_planner.planning.proofs import find_proof
 from flex_planner.planning.strategies.catalogue import CATALOGUE
 from flex_planner.planning.strategies.initial_guesses import warm_start
 from flex_planner.planning.strategies.strategy import Strategy
@@ -25,9 +29,10 @@ from flex_planner.planning.weight_search import adapt_weights
 
 def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | None = None,
               monitor: Monitor | None = None,
-              start_from: Plan | CollocationSolution | None = None,
+              start_from: Plan | KindOfMotion | CollocationSolution | None = None,
               objectives: Objectives | None = None,
-              strategies: Sequence[Strategy] = CATALOGUE) -> Plan:
+              strategies: Sequence[Strategy] = CATALOGUE,
+              search: SearchEffort | str = SearchEffort.NORMAL) -> Plan:
     """
     Plan the motion of a task that minimises eq. (6) within the motor limits of eq. (15).
 
@@ -41,14 +46,17 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
         Of boundary-value problems: its settings, its monitor and its method.
     monitor : Monitor, optional
         Receives progress, and may cancel or limit the time; that of the solver if not given.
-    start_from : Plan or CollocationSolution, optional
+    start_from : Plan, KindOfMotion or CollocationSolution, optional
         A solved plan of a similar task, or its solution, tried first; any mesh, any duration, the
-        same number of coordinates.
+        same number of coordinates. Or a kind of motion that a plan or a search has met.
     objectives : Objectives, optional
         What the motion must keep besides: weights of the task are raised until it does, fig. 1
         of the paper. `Plan.objectives` tells how.
     strategies : sequence of Strategy, optional
         Ways to a solution in the order in which they are tried, at least one.
+    search : SearchEffort or str
+        ``'fast'`` keeps to the kind of motion that the first strategy finds; ``'normal'`` and
+        ``'thorough'`` look for a cheaper one, unless the plan starts from a given motion.
 
     Returns
     -------
@@ -58,23 +66,35 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
     Raises
     ------
     InvalidTaskError
-        If a motor is too weak to hold the arm at the goal, or an objective or the model does
-        not go with the task.
+        If an objective or the model does not go with the task, or the links buckle at rest.
     ValueError
         If there are no strategies.
 
     """
     if not strategies:
         raise ValueError('strategies must name at least one way to a solution')
+    effort = SearchEffort.of(search)
     model = ArmModel.for_arm(task.arm, model)  # before a clock starts
     solver = (solver or Solver()).watched_by(monitor)
     problem = MotionProblem(model, task, task_parameters(task))
-    start = start_from.solution if isinstance(start_from, Plan) else start_from
-    if start is not None:
-        strategies = (warm_start(start), *strategies)
     if objectives is not None:
         objectives.check(task)
-    plan = plan_problem(problem, solver, strategies)
+    proof = find_proof(problem)
+    if proof is not None:
+        return Plan(task=task, status=PlanStatus.INFEASIBLE, message=str(proof), strategy='',
+                    problem=problem, solution=None)
+    plan = plan_problem(problem, solver, (*_given(start_from, problem, solver), *strategies),
+                        effort)
     if objectives is None or not plan.solved:
         return plan
     return adapt_weights(plan, objectives, solver)
+
+
+def _given(start: Plan | KindOfMotion | CollocationSolution | None, problem: MotionProblem,
+           solver: Solver) -> Iterator[Strategy]:
+    """Yield the strategy that starts from what was given."""
+    if isinstance(start, KindOfMotion):
+        yield warm_start(as_guess(problem, start, solver))
+    solution = start.solution if isinstance(start, Plan) else start
+    if isinstance(solution, CollocationSolution):
+        yield warm_start(solution)

@@ -11,11 +11,14 @@ from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import MAX_DURATION
 from flex_planner.optimal_control.totals import integrate_totals
 from flex_planner.planning.certificate import CertificateLimits, certify
+from flex_planner.planning.kinds.cheaper import find_cheaper
+from flex_planner.planning.kinds.clusters import are_alike, MOST_KINDS
+from flex_planner.planning.kinds.effort import SearchEffort
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.strategies.catalogue import CATALOGUE
+from flex_planner.planning.strategies.initial_guesses import WARM_START
 from flex_planner.planning.strategies.price_continuation import free_duration
 from flex_planner.planning.strategies.strategy import Attempt, Strategy
-import numpy as np
 
 INTERRUPTED_STATUS = {SolverStatus.TIMEOUT: PlanStatus.TIMEOUT,
                       SolverStatus.CANCELED: PlanStatus.CANCELED}
@@ -29,9 +32,12 @@ _GUESSES = (2.0, 4.0, 8.0)
 
 
 def plan_problem(problem: MotionProblem, solver: Solver,
-                 strategies: Sequence[Strategy] = CATALOGUE) -> Plan:
+                 strategies: Sequence[Strategy] = CATALOGUE,
+                 effort: SearchEffort = SearchEffort.FAST) -> Plan:
     """
     Return the certified plan of a problem by the first strategy that solves it.
+
+    Unless it was a warm start, other kinds of motion are looked for then.
 
     Parameters
     ----------
@@ -41,13 +47,21 @@ def plan_problem(problem: MotionProblem, solver: Solver,
         Its monitor may interrupt the work.
     strategies : sequence of Strategy
         In the order in which they are tried, at least one.
+    effort : SearchEffort
+        Whether cheaper kinds of motion are looked for.
 
     """
     try:
         if problem.task.time_weight:
-            plan = _plan_in_any_time(problem, solver, strategies)
+            problem, strategy, attempt = _solve_in_any_time(problem, solver, strategies)
         else:
-            plan = _conclude(problem, *_solve_first(problem, solver, strategies), solver)
+            strategy, attempt = _solve_first(problem, solver, strategies)
+        if effort.explores and strategy != WARM_START and attempt.result.converged:
+            attempt = _look_for_cheaper(problem, attempt, solver)
+            if problem.task.time_weight:
+                problem, result = free_duration(problem, attempt.result, solver)
+                attempt = replace(attempt, result=result)
+        plan = _conclude(problem, strategy, attempt, solver)
     except StoppedError as error:
         plan = Plan(task=problem.task, status=STOP_STATUS[error.reason], message=str(error),
                     strategy='', problem=problem, solution=None)
@@ -55,13 +69,20 @@ def plan_problem(problem: MotionProblem, solver: Solver,
                    planning_time=solver.monitor.elapsed)
 
 
-def _plan_in_any_time(problem: MotionProblem, solver: Solver,
-                      strategies: Sequence[Strategy]) -> Plan:
+def _look_for_cheaper(problem: MotionProblem, attempt: Attempt, solver: Solver) -> Attempt:
+    """Return the cheapest motion of other kinds, too, with the kinds that were met."""
+    cheapest = find_cheaper(problem, attempt.result, solver)
+    others = [kind for kind in attempt.kinds if not any(
+        are_alike(kind.motion.angles, one.motion.angles) for one in cheapest.kinds)]
+    return Attempt(result=cheapest.result, kinds=(*cheapest.kinds, *others),
+                   starts=cheapest.starts + attempt.starts - 1)
+
+
+def _solve_in_any_time(problem: MotionProblem, solver: Solver, strategies: Sequence[Strategy],
+                       ) -> tuple[MotionProblem, str, Attempt]:
     """Solve for the duration of the task or a longer one, then free it."""
-    # what the guess of the duration forbids is no limit of the task
-    useful = [strategy for strategy in strategies if not strategy.shows_infeasibility]
-    quick = [strategy for strategy in useful if strategy.quick] or useful
-    slow = [strategy for strategy in useful if strategy not in quick]
+    quick = [strategy for strategy in strategies if strategy.quick] or list(strategies)
+    slow = [strategy for strategy in strategies if strategy not in quick]
     strategy, attempt = _solve_first(problem, solver, quick)
     for factor in _GUESSES:
         longer = factor * problem.task.duration
@@ -80,17 +101,17 @@ def _plan_in_any_time(problem: MotionProblem, solver: Solver,
     if attempt.result.converged:
         solver.monitor.phase = 'duration freed'
         problem, result = free_duration(problem, attempt.result, solver)
-        attempt = Attempt(result=result)
-    return _conclude(problem, strategy, attempt, solver)
+        attempt = replace(attempt, result=result)
+    return problem, strategy, attempt
 
 
 def _conclude(problem: MotionProblem, strategy: str, attempt: Attempt, solver: Solver) -> Plan:
     """Return the plan of an attempt, certified if it solved the task."""
     result = attempt.result
-    plan = Plan(task=problem.task, status=PlanStatus.NOT_CONVERGED, message=result.message,
-                strategy=strategy, problem=problem, solution=None)
-    if attempt.evidence:
-        return replace(plan, status=PlanStatus.INFEASIBLE, message=attempt.evidence)
+    failed = PlanStatus.NOT_FOUND if attempt.not_found else PlanStatus.NOT_CONVERGED
+    plan = Plan(task=problem.task, status=failed, message=result.message,
+                strategy=strategy, problem=problem, solution=None,
+                kinds=attempt.kinds[:MOST_KINDS], starts=attempt.starts)
     if result.status in INTERRUPTED_STATUS:
         return replace(plan, status=INTERRUPTED_STATUS[result.status])
     return _certify(plan, result, solver) if result.converged else plan
@@ -100,7 +121,7 @@ def _solve_first(problem: MotionProblem, solver: Solver,
                  strategies: Sequence[Strategy]) -> tuple[str, Attempt]:
     """Try the strategies in order; report the first that decides it, or all failures."""
     failures, names = [], []
-    last = Attempt(result=_unsolved(problem, solver))
+    last, not_found = Attempt(result=_unsolved(problem, solver)), False
     for strategy in strategies:
         solver.monitor.phase = strategy.name
         attempt = strategy.attempt(problem, solver)
@@ -111,8 +132,10 @@ def _solve_first(problem: MotionProblem, solver: Solver,
             return strategy.name, attempt
         names.append(strategy.name)
         failures.append(f'{strategy.name}: {attempt.result.message}')
+        not_found = not_found or attempt.not_found
     message = '; '.join(failures) or last.result.message
-    return ', '.join(names), Attempt(result=replace(last.result, message=message))
+    return ', '.join(names), Attempt(result=replace(last.result, message=message),
+                                     not_found=not_found)
 
 
 def _certify(plan: Plan, result: CollocationResult, solver: Solver) -> Plan:
@@ -132,7 +155,7 @@ def _certify(plan: Plan, result: CollocationResult, solver: Solver) -> Plan:
                        switching_times=result.switches, saturation=total.saturation)
         reasons = limits.violations(certificate)
         if not reasons:
-            return replace(plan, status=PlanStatus.SOLVED, message=PlanStatus.SOLVED.value)
+            return replace(plan, status=PlanStatus.SOLVED, message=describe_choice(plan))
         if refinements < _REFINEMENTS:
             solver.monitor.phase = 'mesh refinement'
             reached = min(solver.settings.error_tolerance, float(result.errors.max()))
@@ -146,10 +169,17 @@ def _certify(plan: Plan, result: CollocationResult, solver: Solver) -> Plan:
     return replace(plan, status=PlanStatus.CERTIFICATE_FAILED, message='; '.join(reasons))
 
 
+def describe_choice(plan: Plan) -> str:
+    """Return that a plan is certified, and among which kinds of motion it is the cheapest."""
+    if len(plan.kinds) < 2:
+        return PlanStatus.SOLVED.value
+    others = ', '.join(f'{kind.value:.4g}' for kind in plan.kinds[1:])
+    return (f'{PlanStatus.SOLVED.value}; the cheapest of {len(plan.kinds)} kinds of motion found '
+            f'from {plan.starts} starts (J = {plan.cost:.4g}; of the others {others})')
+
+
 def _unsolved(problem: MotionProblem, solver: Solver) -> CollocationResult:
     """Return the result where no strategy had anything to add."""
-    return CollocationResult(
-        solution=problem.straight_line(solver.settings.intervals, solver.settings.rule),
-        status=SolverStatus.NEWTON_FAILED, errors=np.full(problem.size, np.inf), residual=np.inf,
-        switches=np.zeros(0), iterations=0, meshes=0,
-        message='no strategy applies to this motion')
+    return CollocationResult.failed(
+        problem.straight_line(solver.settings.intervals, solver.settings.rule),
+        'no strategy applies to this motion')

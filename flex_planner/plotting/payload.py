@@ -56,7 +56,7 @@ def _result(found: MaxPayload) -> str:
     """Return the result in a line."""
     if not found.solved:
         return found.status.value
-    return f'largest payload {found.payload:.6g} kg, too much {found.upper:.6g} kg'
+    return f'largest payload {found.payload:.6g} kg, too much {found.local_upper:.6g} kg'
 
 
 def _draw_front(axes: Sequence[Axes], found: MaxPayload) -> None:
@@ -71,8 +71,8 @@ def _draw_front(axes: Sequence[Axes], found: MaxPayload) -> None:
                   label='motions of the search')
         if found.payload:
             each.axvline(found.payload, color='C2', linestyle='--', label='largest payload')
-        if np.isfinite(found.upper):
-            _shade(each, found.upper)
+        if np.isfinite(found.local_upper):
+            _shade(each, found.local_upper)
     finish(axes[0], 'least effort for each payload', 'J [N² m² s]', 'payload [kg]')
     finish(axes[1], 'price of more payload', '$dJ/dm_p$ [N² m² s/kg]', 'payload [kg]')
 

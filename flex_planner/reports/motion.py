@@ -126,11 +126,11 @@ def payload_rows(found: MaxPayload, peaks: Peaks | None) -> list[Row]:
 def _bracket(found: MaxPayload) -> str:
     """Return the bracket of the largest payload."""
     below = f'{found.payload:.6g} kg' if found.payload else 'none found'
-    if not np.isfinite(found.upper):
+    if not np.isfinite(found.local_upper):
         return below
     if found.status is PlanStatus.SOLVED:
-        return f'{below}; {found.upper:.6g} kg is too much'
-    return f'{below}; no solution at {found.upper:.6g} kg'
+        return f'{below}; {found.local_upper:.6g} kg is too much'
+    return f'{below}; no solution at {found.local_upper:.6g} kg'
 
 
 def _limit(found: MaxPayload) -> str:

@@ -16,13 +16,13 @@ def test_bracket_is_as_narrow_as_asked(accuracy: float) -> None:
     found = find_max_payload(one_link(2.0), accuracy=accuracy)
     assert found.solved, found.message
     # the motion at the lower end is as exact as the bracket is narrow
-    assert found.payload - accuracy / 10 <= 3 <= found.upper + accuracy / 10
-    assert 0 < found.upper - found.payload <= accuracy
+    assert found.payload - accuracy / 10 <= 3 <= found.local_upper + accuracy / 10
+    assert 0 < found.local_upper - found.payload <= accuracy
 
 
 def test_accuracy_of_ten_kilograms_needs_no_step() -> None:
     found = find_max_payload(one_link(20.0), accuracy=10.0)
-    assert found.payload <= 399 <= found.upper
+    assert found.payload <= 399 <= found.local_upper
 
 
 @every_arm

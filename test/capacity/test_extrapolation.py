@@ -60,7 +60,7 @@ def test_payloads_on_a_line_are_those_found_one_by_one(
         cold = search(task)
         assert one.solved, one.message
         assert one.payload == pytest.approx(cold.payload, abs=1e-3)
-        assert one.upper - one.payload <= 1e-3
+        assert one.local_upper - one.payload <= 1e-3
         assert one.plan is not None
         assert one.plan.certificate.tip_error < 1e-7
         assert one.iterations < 0.6 * cold.iterations

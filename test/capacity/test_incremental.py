@@ -24,8 +24,8 @@ def raised_search(rigid_model: ArmModel, paper_task: TaskFactory) -> MaxPayload:
 def test_raised_payload_ends_in_a_narrow_bracket(raised_search: MaxPayload) -> None:
     found = raised_search
     assert found.solved, found.message
-    assert found.payload <= HEAVIEST['rigid'] <= found.upper
-    assert 0 < found.upper - found.payload <= 0.05
+    assert found.payload <= HEAVIEST['rigid'] <= found.local_upper
+    assert 0 < found.local_upper - found.payload <= 0.05
     assert found.plan is not None
     assert found.plan.task.payload_mass == found.payload
     assert found.method is PayloadMethod.INCREMENTAL
@@ -39,7 +39,7 @@ def test_steps_are_halved_from_the_first_on(raised_search: MaxPayload) -> None:
     assert set(steps[1:] / steps[:-1]) <= {1.0, 0.5}
     assert not trials[1].solved
     # the bracket is never wider than the last step
-    assert raised_search.upper - raised_search.payload <= steps[-1]
+    assert raised_search.local_upper - raised_search.payload <= steps[-1]
 
 
 def test_trials_are_recorded_in_order(raised_search: MaxPayload) -> None:
@@ -51,7 +51,7 @@ def test_trials_are_recorded_in_order(raised_search: MaxPayload) -> None:
         assert not trial.interrupted
         carried, failed = (trial.payload, failed) if trial.solved else (carried, trial.payload)
     # the upper end is the least payload that failed
-    assert (carried, failed) == (raised_search.payload, raised_search.upper)
+    assert (carried, failed) == (raised_search.payload, raised_search.local_upper)
 
 
 def test_methods_fill_only_what_is_theirs(raised_search: MaxPayload,
@@ -68,7 +68,7 @@ def test_first_step_may_be_larger_than_the_answer(rigid_model: ArmModel,
     found = raised(paper_task(rigid_model.arm), model=rigid_model, step=10.0, accuracy=2.0)
     assert found.solved, found.message
     assert [trial.payload for trial in found.trials] == [11.0, 6.0, 3.5, 4.75]
-    assert (found.payload, found.upper) == (4.75, 6.0)
+    assert (found.payload, found.local_upper) == (4.75, 6.0)
 
 
 def test_raised_payload_that_the_motor_cannot_hold_is_too_much() -> None:
@@ -77,7 +77,7 @@ def test_raised_payload_that_the_motor_cannot_hold_is_too_much() -> None:
     assert found.solved, found.message
     # what cannot be held is no trial, but it is an upper end
     assert all(trial.payload < limit for trial in found.trials)
-    assert found.payload <= limit <= found.upper <= found.payload + 0.05
+    assert found.payload <= limit <= found.local_upper <= found.payload + 0.05
 
 
 def test_paper_search_reports_the_payload_tried(rigid_model: ArmModel,

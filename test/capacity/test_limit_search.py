@@ -29,21 +29,21 @@ def test_search_from_a_similar_one_needs_fewer_iterations(
     assert warm.solved, warm.message
     assert warm.iterations < 0.9 * cold.iterations
     # the same limit is in both
-    assert max(cold.payload, warm.payload) <= min(cold.upper, warm.upper)
+    assert max(cold.payload, warm.payload) <= min(cold.local_upper, warm.local_upper)
 
 
 def test_search_of_the_rigid_arm_is_a_start_for_one_that_bends(
         ei5_model: ArmModel, paper_task: TaskFactory, search_of: SearchFactory) -> None:
     found = find_max_payload(paper_task(ei5_model.arm), model=ei5_model,
                              start_from=search_of('rigid'))
-    assert found.payload <= HEAVIEST['ei5'] <= found.upper
+    assert found.payload <= HEAVIEST['ei5'] <= found.local_upper
 
 
 def test_search_of_an_arm_that_bends_is_a_start_for_a_rigid_one(
         rigid_model: ArmModel, paper_task: TaskFactory, search_of: SearchFactory) -> None:
     found = find_max_payload(paper_task(rigid_model.arm), model=rigid_model,
                              start_from=search_of('ei5'))
-    assert found.payload <= HEAVIEST['rigid'] <= found.upper
+    assert found.payload <= HEAVIEST['rigid'] <= found.local_upper
 
 
 def test_search_that_found_nothing_is_no_start_but_no_harm(rigid_model: ArmModel,
@@ -69,7 +69,7 @@ def test_limit_that_is_not_met_by_its_payload_is_met_by_its_price(
     found = find_max_payload(task, model=rigid_model)
     assert found.solved, found.message
     assert found.payload == pytest.approx(payload, abs=1e-3)
-    assert found.payload <= found.upper <= found.payload + 1e-3
+    assert found.payload <= found.local_upper <= found.payload + 1e-3
     assert found.plan is not None
     assert found.plan.certificate.tip_error < 1e-5
 

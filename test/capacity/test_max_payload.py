@@ -46,14 +46,14 @@ def test_stronger_motors_carry_more(rigid_arm: Arm, paper_task: TaskFactory) -> 
     found = [find_max_payload(paper_task(arm_with(rigid_arm, (torque, torque))))
              for torque in (4.0, 8.0, 8.01, 16.0)]
     assert all(each.solved for each in found)
-    assert all(less.upper < more.payload for less, more in zip(found[:-1], found[1:], strict=True))
+    assert all(less.local_upper < more.payload for less, more in zip(found[:-1], found[1:], strict=True))
 
 
 def test_stronger_second_motor_alone_carries_more(rigid_arm: Arm,
                                                   paper_task: TaskFactory) -> None:
     less, more = (find_max_payload(paper_task(arm_with(rigid_arm, (8.0, torque))))
                   for torque in (8.0, 9.0))
-    assert less.upper < more.payload
+    assert less.local_upper < more.payload
 
 
 def test_more_time_carries_more_in_the_horizontal_plane(rigid_model: ArmModel,
@@ -61,14 +61,14 @@ def test_more_time_carries_more_in_the_horizontal_plane(rigid_model: ArmModel,
     found = [find_max_payload(paper_task(rigid_model.arm, 0.0, duration=T), model=rigid_model)
              for T in (0.6, 1.0, 1.001, 4.0)]
     assert all(each.solved for each in found)
-    assert all(less.upper < more.payload for less, more in zip(found[:-1], found[1:], strict=True))
+    assert all(less.local_upper < more.payload for less, more in zip(found[:-1], found[1:], strict=True))
 
 
 def test_slower_motion_of_motors_as_much_weaker_carries_the_same(rigid_arm: Arm,
                                                                  paper_task: TaskFactory) -> None:
     # time in units of t_f: torques go with 1 / t_f^2, speeds with 1 / t_f
     found = find_max_payload(paper_task(arm_with(rigid_arm, (0.5, 0.5), 0.875), duration=4.0))
-    assert found.payload <= HEAVIEST['rigid'] <= found.upper
+    assert found.payload <= HEAVIEST['rigid'] <= found.local_upper
 
 
 def test_heavier_arm_of_motors_as_much_stronger_carries_as_much_more(
@@ -76,7 +76,7 @@ def test_heavier_arm_of_motors_as_much_stronger_carries_as_much_more(
     link = Link(length=0.5, linear_density=18.0)
     arm = replace(arm_with(rigid_arm, (24.0, 24.0)), links=(link, link))
     found = find_max_payload(paper_task(arm))
-    assert found.payload <= 3 * HEAVIEST['rigid'] <= found.upper
+    assert found.payload <= 3 * HEAVIEST['rigid'] <= found.local_upper
 
 
 @pytest.mark.parametrize('changes', [
@@ -87,7 +87,7 @@ def test_weights_do_not_matter(rigid_model: ArmModel, paper_task: TaskFactory,
                                changes: dict[str, Any]) -> None:
     found = find_max_payload(paper_task(rigid_model.arm, **changes), model=rigid_model)
     assert found.solved, found.message
-    assert found.payload <= HEAVIEST['rigid'] <= found.upper
+    assert found.payload <= HEAVIEST['rigid'] <= found.local_upper
     # the gap counts efforts as they weigh
     assert all(one.value < HEAVIEST['rigid'] < one.value + one.gap for one in found.extremals)
 
@@ -97,7 +97,7 @@ def test_weights_do_not_matter_where_links_bend(ei5_model: ArmModel,
     task = paper_task(ei5_model.arm, effort_weights=[1.0, 4.0],
                       velocity_weights=[5.0, 5.0, 1.0, 1.0, 1.0, 1.0])
     found = find_max_payload(task, model=ei5_model)
-    assert found.payload <= HEAVIEST['ei5'] <= found.upper
+    assert found.payload <= HEAVIEST['ei5'] <= found.local_upper
     assert found.plan is not None
     assert found.plan.task.velocity_weights.tolist() == task.velocity_weights.tolist()
 
@@ -107,7 +107,7 @@ def test_first_payload_does_not_matter(rigid_model: ArmModel, paper_task: TaskFa
                                        payload_mass: float) -> None:
     found = find_max_payload(paper_task(rigid_model.arm, payload_mass), model=rigid_model)
     assert max(found.payload, payload_mass) == found.payload
-    assert found.payload <= HEAVIEST['rigid'] <= found.upper
+    assert found.payload <= HEAVIEST['rigid'] <= found.local_upper
 
 
 @pytest.mark.parametrize('duration', [1.01, 1.5, 2.0, 5.0, 50.0])
@@ -115,15 +115,15 @@ def test_maximum_payload_of_one_link_has_its_closed_form(duration: float) -> Non
     # bang-bang: u_max T^2 = 4 M d
     found = find_max_payload(one_link(duration))
     assert found.solved, found.message
-    assert found.payload <= duration**2 - 1 <= found.upper
+    assert found.payload <= duration**2 - 1 <= found.local_upper
     # a millionth of the payload is the finest
-    assert found.upper - found.payload <= max(1e-3, 1e-6 * found.payload)
+    assert found.local_upper - found.payload <= max(1e-3, 1e-6 * found.payload)
 
 
 def test_payload_inertia_is_carried_too() -> None:
     # M = 1 + J_p + m_p
     found = find_max_payload(one_link(2.0, payload_inertia=0.5))
-    assert found.payload <= 2.5 <= found.upper
+    assert found.payload <= 2.5 <= found.local_upper
 
 
 def test_first_payload_may_cost_next_to_nothing(rigid_model: ArmModel,
@@ -132,7 +132,7 @@ def test_first_payload_may_cost_next_to_nothing(rigid_model: ArmModel,
     # the same in units of t_f
     same = find_max_payload(paper_task(arm_with(rigid_model.arm, (8e4, 8e4), 350.0)))
     assert same.solved, same.message
-    assert max(found.payload, same.payload) <= min(found.upper, same.upper)
+    assert max(found.payload, same.payload) <= min(found.local_upper, same.upper)
 
 
 # An independent method
@@ -171,7 +171,7 @@ def test_ipopt_carries_a_thousandth_less_and_no_thousandth_more(
         np.sign(carried.torques) * 8 / 3.5)
     assert (np.abs(carried.torques) <= bounds * (1 + 1e-6)).all()
     # failures take longer: on a third of the mesh
-    above = by_ipopt(model, paper_task(model.arm, 1.001 * found.upper), 20)
+    above = by_ipopt(model, paper_task(model.arm, 1.001 * found.local_upper), 20)
     assert not above.converged
     assert above.message == 'infeasible problem detected'
 
@@ -180,7 +180,7 @@ def test_ipopt_agrees_under_gravity() -> None:
     task = lifted_to(0.0, 0.5)
     model, found = ArmModel(task.arm), find_max_payload(task)
     below, above = (by_ipopt(model, replace(task, payload_mass=payload), 40)
-                    for payload in (0.999 * found.payload, 1.001 * found.upper))
+                    for payload in (0.999 * found.payload, 1.001 * found.local_upper))
     assert below.converged
     assert not above.converged
 
@@ -247,7 +247,7 @@ def test_payload_that_cannot_be_carried_is_infeasible_with_the_reason(
                              model=rigid_model, method=method)
     assert (found.status, found.solved) == (PlanStatus.INFEASIBLE, False)
     assert found.message.startswith(f'{reason} (the price of more has grown ')
-    assert (found.payload, found.upper, found.plan) == (0.0, inf, None)
+    assert (found.payload, found.local_upper, found.plan) == (0.0, inf, None)
     assert (found.limiting_joint, found.held, found.method) == (None, False, method)
 
 
@@ -260,9 +260,9 @@ def test_payload_that_the_motor_just_holds_at_the_goal_is_the_limit() -> None:
         found = find_max_payload(lifted_to(angle, 2.0))
         assert found.solved, found.message
         assert found.held
-        assert found.upper == pytest.approx(6 / (G * math.cos(angle)) - 0.15, rel=1e-10)
-        assert found.payload == pytest.approx(found.upper, rel=2e-9)
-        assert found.payload < found.upper
+        assert found.local_upper == pytest.approx(6 / (G * math.cos(angle)) - 0.15, rel=1e-10)
+        assert found.payload == pytest.approx(found.local_upper, rel=2e-9)
+        assert found.payload < found.local_upper
         assert found.limiting_joint == 0
         assert found.message.endswith(
             'kg cannot: the motor of joint 1 can hold no more at the goal')
@@ -284,8 +284,8 @@ def test_payload_of_a_quick_lift_is_less_than_the_motor_holds(angle: float,
     found = find_max_payload(lifted_to(angle, duration))
     assert found.solved, found.message
     assert not found.held
-    assert found.upper < 6 / (G * math.cos(angle)) - 0.15
-    assert found.upper - found.payload <= 1e-3
+    assert found.local_upper < 6 / (G * math.cos(angle)) - 0.15
+    assert found.local_upper - found.payload <= 1e-3
     assert found.message.split(': ')[1].startswith('the motor of joint 1 is on its limit for 9')
 
 
@@ -307,7 +307,7 @@ def test_joint_that_can_hold_no_more_is_named() -> None:
     found = find_max_payload(task)
     assert found.solved, found.message
     assert (found.held, found.limiting_joint) == (True, 1)
-    assert found.upper == pytest.approx((4 / G - 0.125) / 0.5, rel=1e-9)
+    assert found.local_upper == pytest.approx((4 / G - 0.125) / 0.5, rel=1e-9)
 
 
 def test_goal_that_the_motor_cannot_hold_with_the_first_payload_is_refused() -> None:
@@ -383,4 +383,4 @@ def test_time_limit_that_has_passed_leaves_nothing(rigid_model: ArmModel,
     found = find_max_payload(paper_task(rigid_model.arm), model=rigid_model,
                              monitor=Monitor(time_limit=0.0))
     assert_stopped(found, PlanStatus.TIMEOUT)
-    assert (found.plan, found.upper, found.extremals) == (None, inf, ())
+    assert (found.plan, found.local_upper, found.extremals) == (None, inf, ())

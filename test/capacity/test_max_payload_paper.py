@@ -65,8 +65,8 @@ def test_maximum_payload_is_that_of_table_v(search_of: SearchFactory,
     # two brackets wide; a published value may be off by e and half its last digit
     assert found.payload == pytest.approx(ours, abs=2e-3)
     assert found.payload == pytest.approx(published, abs=E + 5e-3)
-    assert found.payload <= reference <= found.upper
-    assert found.upper - found.payload <= 1e-3
+    assert found.payload <= reference <= found.local_upper
+    assert found.local_upper - found.payload <= 1e-3
 
 
 @every_arm
@@ -82,7 +82,7 @@ def test_plan_with_the_maximum_payload_is_certified(search_of: SearchFactory,
     assert found.plan.saturation.min() > 0.9
     assert found.limiting_joint == found.plan.saturation.argmax()
     assert found.message.startswith(
-        f'{found.payload:.6g} kg can be carried, {found.upper:.6g} kg cannot: '
+        f'{found.payload:.6g} kg can be carried, {found.local_upper:.6g} kg cannot: '
         f'the motor of joint {found.limiting_joint + 1} is on its limit for 9')
 
 
@@ -90,7 +90,7 @@ def test_softer_links_carry_less(search_of: SearchFactory) -> None:
     for modes in (1, 2):
         rigid, stiff, soft = (search_of(*arm) for arm in ((math.inf, 0), (50.0, modes),
                                                           (5.0, modes)))
-        assert soft.upper < stiff.payload < stiff.upper < rigid.payload
+        assert soft.local_upper < stiff.payload < stiff.local_upper < rigid.payload
 
 
 # Table III
@@ -115,7 +115,7 @@ def test_maximum_payload_of_table_iv_does_not_depend_on_the_weight(
         search_of: SearchFactory, w_2: float, published: float) -> None:
     found = search_of(math.inf, 0, w_2)
     assert found.payload == pytest.approx(5.855, abs=2e-3)
-    assert found.payload <= RIGID <= found.upper
+    assert found.payload <= RIGID <= found.local_upper
     assert found.payload > published + E
     assert found.plan is not None
     assert found.plan.solved
@@ -140,8 +140,8 @@ def test_paper_search_with_a_weight_ends_at_the_same_payload(
         rigid_model: ArmModel, paper_task: TaskFactory) -> None:
     found = raised(rigid_model, paper_task(rigid_model.arm, 5.8, 200.0), step=E)
     assert found.solved, found.message
-    assert found.payload <= RIGID <= found.upper
-    assert found.upper - found.payload <= E * (1 + 1e-12)
+    assert found.payload <= RIGID <= found.local_upper
+    assert found.local_upper - found.payload <= E * (1 + 1e-12)
 
 
 # Fig. 2
@@ -155,8 +155,8 @@ def rigid_search(rigid_model: ArmModel, paper_task: TaskFactory) -> MaxPayload:
 def test_paper_search_ends_at_the_same_payload(rigid_search: MaxPayload) -> None:
     found = rigid_search
     assert found.solved, found.message
-    assert found.payload <= RIGID <= found.upper
-    assert found.upper - found.payload <= E
+    assert found.payload <= RIGID <= found.local_upper
+    assert found.local_upper - found.payload <= E
     assert [trial.payload for trial in found.trials[:5]] == [2, 3, 4, 5, 6]
     assert found.plan is not None
     assert found.plan.certificate.boundary_error < 1e-6 * EPS
@@ -167,8 +167,8 @@ def test_paper_search_of_the_soft_arm_ends_at_the_same_payload(
     # from near the end: a trial that fails takes some seconds
     found = raised(ei5_model, paper_task(ei5_model.arm, 5.72), step=E)
     assert found.solved, found.message
-    assert found.payload <= SOFT <= found.upper
-    assert found.upper - found.payload <= E * (1 + 1e-12)
+    assert found.payload <= SOFT <= found.local_upper
+    assert found.local_upper - found.payload <= E * (1 + 1e-12)
 
 
 def test_boundary_error_below_that_of_the_paper_shows_no_solution(
@@ -201,6 +201,6 @@ def test_angle_of_eq_28_is_not_that_of_the_papers_payload(
         rigid_model: ArmModel, paper_task: TaskFactory, elbow: float, payload: float) -> None:
     task = paper_task(rigid_model.arm, start_positions=np.deg2rad([60.0, elbow]))
     found = find_max_payload(task, model=rigid_model)
-    assert found.payload <= payload <= found.upper
+    assert found.payload <= payload <= found.local_upper
     reached, _ = postures_from_points(rigid_model.arm, (0.5, 0.0), (0.5, 0.5), elbow=-1)
     assert np.rad2deg(reached) == pytest.approx([60.0, -120.0])

@@ -33,8 +33,8 @@ both_stops = pytest.mark.parametrize('status', [PlanStatus.CANCELED, PlanStatus.
 def assert_encloses(found: MinDuration, duration: float, accuracy: float = 1e-4) -> None:
     assert found.solved, found.message
     # the motion at the upper end is as exact as the bracket is narrow
-    assert found.lower - accuracy / 10 <= duration <= found.duration + accuracy / 10
-    assert 0 < found.duration - found.lower <= accuracy
+    assert found.local_lower - accuracy / 10 <= duration <= found.duration + accuracy / 10
+    assert 0 < found.duration - found.local_lower <= accuracy
 
 
 def assert_stopped(found: MinDuration, status: PlanStatus) -> None:
@@ -53,7 +53,7 @@ def test_shortest_duration_is_enclosed(request: pytest.FixtureRequest, paper_tas
     found = find_min_duration(paper_task(model.arm), model=model)
     assert_encloses(found, SHORTEST[name])
     assert found.duration == pytest.approx(SHORTEST[name], abs=1e-4)
-    assert found.message == f'{found.duration:.6g} s are enough, {found.lower:.6g} s are not'
+    assert found.message == f'{found.duration:.6g} s are enough, {found.local_lower:.6g} s are not'
     assert found.plan is not None
     assert found.plan.solved
     assert found.plan.task.duration == found.duration
@@ -87,7 +87,7 @@ def test_first_guess_does_not_matter(rigid_model: ArmModel, paper_task: TaskFact
 def test_first_guess_may_be_the_longest_duration(rigid_model: ArmModel,
                                                  paper_task: TaskFactory) -> None:
     found = find_min_duration(paper_task(rigid_model.arm, duration=1000.0), model=rigid_model)
-    assert found.lower <= SHORTEST['rigid'] <= found.duration
+    assert found.local_lower <= SHORTEST['rigid'] <= found.duration
 
 
 @pytest.mark.parametrize('changes', [
@@ -109,7 +109,7 @@ def test_shortest_duration_of_the_maximum_payload_is_its_duration(
     heavy = find_max_payload(paper_task(rigid_model.arm), model=rigid_model)
     quick = find_min_duration(paper_task(rigid_model.arm, heavy.payload), model=rigid_model)
     # a kilogram more takes 60 ms more, and a bracket is 1 g wide
-    assert quick.lower < 1.0 <= quick.duration + 1e-5
+    assert quick.local_lower < 1.0 <= quick.duration + 1e-5
     assert quick.duration < 1.0 + 1e-4
 
 
@@ -120,7 +120,7 @@ def test_maximum_payload_of_the_shortest_duration_is_its_payload(
                              model=rigid_model)
     # 0.1 ms more carries a gram more
     assert heavy.payload <= 3.0 + 2e-3
-    assert 3.0 <= heavy.upper
+    assert 3.0 <= heavy.local_upper
 
 
 def test_less_time_is_not_enough_and_a_little_more_is(rigid_model: ArmModel,
@@ -130,7 +130,7 @@ def test_less_time_is_not_enough_and_a_little_more_is(rigid_model: ArmModel,
     problem = problem_of(rigid_model, paper_task(rigid_model.arm))
     direct = DirectProblem(rigid_model, DirectSettings(degree=4, intervals=20))
     less, more = (direct.solve(problem.parameters, problem.start, problem.goal, duration)
-                  for duration in (0.999 * found.lower, 1.001 * found.duration))
+                  for duration in (0.999 * found.local_lower, 1.001 * found.duration))
     assert more.converged, more.message
     assert less.message == 'infeasible problem detected'
 
@@ -158,18 +158,18 @@ def lift(payload_mass: float, duration: float) -> Task:
 def test_lift_of_more_payload_against_gravity_takes_longer() -> None:
     found = [find_min_duration(lift(payload, 1.0)) for payload in (0.0, 0.2, 0.4)]
     assert all(each.solved for each in found)
-    assert found[0].duration < found[1].lower
-    assert found[1].duration < found[2].lower
+    assert found[0].duration < found[1].local_lower
+    assert found[1].duration < found[2].local_lower
     heavy = find_max_payload(lift(0.0, found[1].duration))
     # 0.1 ms carries 0.1 g
-    assert heavy.payload - 2e-4 <= 0.2 <= heavy.upper
+    assert heavy.payload - 2e-4 <= 0.2 <= heavy.local_upper
 
 
 @pytest.mark.parametrize('payload_mass', [0.0, 0.4])
 def test_search_that_ends_elsewhere_claims_nothing(payload_mass: float) -> None:
     # from a slow lift the way leads to swings, or nowhere
     found = find_min_duration(lift(payload_mass, 2.0))
-    assert 0 <= found.lower <= found.duration
+    assert 0 <= found.local_lower <= found.duration
     assert found.solved == found.message.endswith(' s are not')
     assert found.solved or found.message != PlanStatus.SOLVED.value
 
@@ -198,11 +198,11 @@ def test_payload_grows_with_the_duration_and_is_that_of_single_searches(
              for duration in durations]
     assert [each.task.duration for each in found] == durations
     assert all(each.solved for each in found)
-    assert all(less.upper < more.payload for less, more in zip(found[:-1], found[1:], strict=True))
+    assert all(less.local_upper < more.payload for less, more in zip(found[:-1], found[1:], strict=True))
     # each pair of brackets has the limit in it
-    assert all(max(one.payload, other.payload) <= min(one.upper, other.upper)
+    assert all(max(one.payload, other.payload) <= min(one.local_upper, other.local_upper)
                for one, other in zip(found, alone, strict=True))
-    assert found[3].payload <= HEAVIEST['rigid'] <= found[3].upper
+    assert found[3].payload <= HEAVIEST['rigid'] <= found[3].local_upper
     # the first has nothing to start from
     assert found[0].iterations == alone[0].iterations
     assert sum(each.iterations for each in found) < sum(each.iterations for each in alone)
@@ -212,7 +212,7 @@ def test_payload_of_an_arm_that_bends_grows_with_the_duration(ei5_model: ArmMode
                                                               paper_task: TaskFactory) -> None:
     less, more = payload_against_duration(paper_task(ei5_model.arm), [0.98, 1.0],
                                           model=ei5_model)
-    assert less.upper < more.payload <= 5.741828 <= more.upper
+    assert less.local_upper < more.payload <= 5.741828 <= more.local_upper
     assert more.iterations < less.iterations
 
 
@@ -221,7 +221,7 @@ def test_duration_that_is_too_short_is_passed_over(rigid_model: ArmModel,
     short, first, second, third = payload_against_duration(
         paper_task(rigid_model.arm), [0.6, 1.0, 1.05, 1.1], model=rigid_model)
     assert short.status is PlanStatus.INFEASIBLE
-    assert first.payload <= HEAVIEST['rigid'] <= first.upper
+    assert first.payload <= HEAVIEST['rigid'] <= first.local_upper
     assert second.iterations < first.iterations
     assert third.iterations < first.iterations / 2  # two neighbours tell where the motion goes
 

@@ -71,7 +71,7 @@ def with_goal(plan: Plan, goal: dict[str, list[float]], which: type[Any]) -> Ext
     values = {field: getattr(plan.task, field) for field in (
         'arm', 'start_positions', 'goal_positions', 'duration', 'payload_mass')}
     problem = problem_of(plan.model, Task(**values, **goal))
-    return (FreeDurationProblem(problem) if which is FreeDurationProblem
+    return (FreeDurationProblem(problem, 1.7) if which is FreeDurationProblem
             else FreePayloadProblem(problem, 3.0))
 
 

@@ -105,12 +105,14 @@ def test_weights_of_the_torque_enter_the_costates_through_the_moving_bound_alone
         np.testing.assert_allclose(found[:, joint], -slope, rtol=1e-6, atol=1e-9 * scale)
 
 
-def at_all_points(model: ArmModel, parameters: Parameters, z: Array, size: int) -> Array:
+def at_all_points(model: ArmModel, parameters: Parameters, z: Array, duration: float,
+                  size: int) -> Array:
     """Return unknowns of the programme with y = (q, q', q'', u + K_2 q') at all six points."""
     n_t, found = model.arm.n_coordinates, model.controls(z[None], parameters.stack())
     y = np.concatenate([z[:2 * n_t], found.acceleration[0], found.torque[0]
                         + parameters.torque_slope * z[n_t:n_t + 2]])
-    return np.concatenate([np.tile(y, 6), np.zeros(size - 6 * y.size)])
+    others = np.zeros(size - 2 - 6 * y.size)
+    return np.concatenate([np.tile(y, 6), others, [parameters.payload_mass, duration]])
 
 
 def test_programme_has_the_same_cost_at_the_same_point(
@@ -120,7 +122,7 @@ def test_programme_has_the_same_cost_at_the_same_point(
     cost, ends = ca.Function('f', [x, p], [f]), np.zeros(4 * model.arm.n_coordinates)
     expected = model.controls(points, parameters.stack()).cost_rate
     for z, rate in zip(points, expected, strict=True):
-        found = cost(at_all_points(model, parameters, z, x.numel()),
-                     np.concatenate([parameters.stack(), ends, [duration]]))
+        found = cost(at_all_points(model, parameters, z, duration, x.numel()),
+                     np.concatenate([parameters.stack(), ends, [1.0, 0.0, 0.0]]))
         # rounding, of which u + K_2 q' - K_2 q' leaves a little more
         assert float(found) == pytest.approx(duration * rate, rel=1e-12)

@@ -19,7 +19,7 @@ Extended = FreeDurationProblem | FreePayloadProblem
 def extended(plan: Plan, which: type[Any]) -> tuple[Extended, CollocationSolution]:
     """Return a problem with an unknown more, and a point of it that is no solution."""
     problem = problem_of(plan.model, plan.task)
-    made = (FreeDurationProblem(problem) if which is FreeDurationProblem
+    made = (FreeDurationProblem(problem, 1.7) if which is FreeDurationProblem
             else FreePayloadProblem(plan.problem, 3.0))
     return made, made.extend(solution_of(plan))
 

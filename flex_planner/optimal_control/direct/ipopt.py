@@ -8,8 +8,7 @@ It needs no costates to start from and returns them, from the multipliers of the
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum
 import time
 from typing import Any
@@ -20,10 +19,10 @@ from flex_planner.base.validation import Array, integer, number, vector
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.direct.mesh import Mesh, SCHEMES
 from flex_planner.optimal_control.direct.programme import Programme
+from flex_planner.optimal_control.direct.unknowns import Free, Guess, Path, Unknowns
 from flex_planner.optimal_control.parameters import Parameters
+from flex_planner.optimal_control.task import MAX_PAYLOAD
 import numpy as np
-
-Guess = Callable[[Array], Array]
 
 # MUMPS orders these matrices best by minimum degree: its own choice takes up to four times as long
 _ALWAYS = {'print_level': 0, 'sb': 'yes', 'option_file_name': '', 'acceptable_iter': 0,
@@ -31,6 +30,9 @@ _ALWAYS = {'print_level': 0, 'sb': 'yes', 'option_file_name': '', 'acceptable_it
 _PUSHES = ('bound_push', 'bound_frac', 'slack_bound_push', 'slack_bound_frac', 'mult_bound_push')
 _WARM = {'warm_start_init_point': 'yes', 'mu_init': 1e-6,
          **{f'warm_start_{name}': 1e-9 for name in _PUSHES}}
+# to compare motions of several kinds, not to have them exactly
+_EXPLORING = {'mu_strategy': 'adaptive', 'constr_viol_tol': 1e-5, 'dual_inf_tol': 1e2,
+              'compl_inf_tol': 1e-3}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,8 +53,9 @@ class DirectSettings:
         Of IPOPT, 1 to 100000.
     tolerance : float
         Of IPOPT's scaled optimality error, 1e-14 to 1e-2.
-    free_payload : bool
-        Whether the payload is an unknown with a price, see `DirectProblem.solve`.
+    exploring : bool
+        Whether motions are to be compared rather than to be exact: conditions other than the
+        tolerance are loose, and the barrier is lowered adaptively.
 
     Raises
     ------
@@ -66,7 +69,7 @@ class DirectSettings:
     intervals: int = 40
     max_iterations: int = 500
     tolerance: float = 1e-8
-    free_payload: bool = False
+    exploring: bool = False
 
     def __post_init__(self) -> None:
         if self.scheme not in SCHEMES:
@@ -98,8 +101,8 @@ class DirectResult:
         What IPOPT says, or why it was stopped.
     cost : float
         J of eq. (6), by the quadrature of the scheme.
-    payload : float
-        m_p [kg].
+    payload, duration : float
+        m_p [kg] and t_f [s].
     times, states, costates : numpy.ndarray, shapes (N + 1,), (N + 1, 2 n_t) twice
         (q, q') and (psi_1, psi_2) at the nodes of the mesh.
     point_times, point_states, point_costates : numpy.ndarray, shapes (k,), (k, 2 n_t) twice
@@ -120,6 +123,7 @@ class DirectResult:
     message: str
     cost: float
     payload: float
+    duration: float
     times: Array
     states: Array
     costates: Array
@@ -168,19 +172,23 @@ class DirectProblem:
         self.model, self.settings = model, settings or DirectSettings()
         self._mesh = Mesh.of(self.settings.scheme, self.settings.degree, self.settings.intervals,
                              breaks)
-        self._programme = Programme.of(model.arm, self._mesh, self.settings.free_payload)
+        self._programme = Programme.of(model.arm, self._mesh)
+        self._unknowns = Unknowns(model, self._mesh)
         self._watch = self._programme.watch(self.settings.intervals)
         self._solvers: dict[bool, Any] = {}
         self._solver(warm=False)
         self.build_seconds = time.perf_counter() - began
 
     def solve(self, parameters: Parameters, start: Array, goal: Array, duration: float, *,
-              guess: Guess | None = None, warm: DirectResult | None = None, price: float = 0.0,
+              guess: Guess | None = None, path: Path | None = None,
+              warm: DirectResult | None = None, free: Free = Free.NOTHING, price: float = 0.0,
+              most_payload: float = MAX_PAYLOAD,
               monitor: Monitor | None = None) -> DirectResult:
         """
         Minimise eq. (6) between two states within the motor limits of eq. (15).
 
-        With a free payload, minimise that less price times payload, from the given one on.
+        With a free payload, minimise that less price times payload, from the given one on; with
+        a free duration, that and price times duration.
 
         Parameters
         ----------
@@ -193,10 +201,16 @@ class DirectProblem:
         guess : callable, optional
             Times (k,) to z (k, 4 n_t), such as a `CollocationSolution` or a `DirectResult`; a
             straight line if not given.
+        path : callable, optional
+            Instead of a guess: times (k,) to q, q', q'' (k, n_t) each.
         warm : DirectResult, optional
             Of this problem with other data: IPOPT starts from its unknowns and multipliers.
+        free : Free
+            What is an unknown besides the motion.
         price : float
-            sigma of a free payload [1/kg].
+            Of a free payload [1/kg] or duration [1/s].
+        most_payload : float
+            Largest free payload [kg].
         monitor : Monitor, optional
             Receives every iteration with the largest violation of a row, and may stop it.
 
@@ -209,89 +223,52 @@ class DirectProblem:
         n_x = 2 * self.model.arm.n_coordinates
         start, goal = vector('start', start, n_x), vector('goal', goal, n_x)
         number('duration', duration, above=0, unit='s')
-        solver, (lower, upper) = self._solver(warm=warm is not None), self._bounds(parameters)
-        began = time.perf_counter()
+        solver, began = self._solver(warm=warm is not None), time.perf_counter()
+        lower, upper = self._unknowns.bounds(parameters, duration, free, most_payload)
         iterate = warm.iterate if warm else {
-            'x0': self._guess_unknowns(guess, parameters, duration) if guess
-            else self._straight_line(start, goal, duration)}
-        prices = [price] if self.settings.free_payload else []
-        if prices and not warm:
-            iterate = {'x0': np.append(iterate['x0'], parameters.payload_mass)}
+            'x0': self._first(guess, path, parameters, start, goal, duration)}
+        prices = [1.0, price * (free is Free.PAYLOAD), price * (free is Free.DURATION)]
         self._watch.follow(monitor or Monitor())
         found = solver(**iterate, lbx=lower, ubx=upper, lbg=0, ubg=0,
-                       p=np.concatenate([parameters.stack(), start, goal, [duration], prices]))
+                       p=np.concatenate([parameters.stack(), start, goal, prices]))
         if self._watch.error is not None:
             raise self._watch.error
         arrays = {name: np.array(found[name])[:, 0] for name in ('x', 'lam_x', 'lam_g')}
-        payload = float(arrays['x'][-1]) if prices else parameters.payload_mass
-        cost = float(found['f']) + price * payload * len(prices)
-        return self._result(arrays, cost, solver.stats(), replace(
-            parameters, payload_mass=payload), duration, time.perf_counter() - began)
+        cost = float(found['f']) + prices[1] * arrays['x'][-2] - prices[2] * arrays['x'][-1]
+        return self._result(arrays, cost, solver.stats(), parameters, time.perf_counter() - began)
+
+    def _first(self, guess: Guess | None, path: Path | None, parameters: Parameters,
+               start: Array, goal: Array, duration: float) -> Array:
+        """Return the first unknowns."""
+        if path is not None:
+            return self._unknowns.on_path(path, parameters, duration)
+        if guess is not None:
+            return self._unknowns.on_motion(guess, parameters, duration)
+        return self._unknowns.on_straight_line(start, goal, parameters, duration)
 
     def _solver(self, *, warm: bool) -> Any:
         """Return IPOPT for the programme, created once for each kind of start."""
         if warm not in self._solvers:
             options = {**_ALWAYS, 'max_iter': self.settings.max_iterations,
-                       'tol': self.settings.tolerance, **(_WARM if warm else {})}
+                       'tol': self.settings.tolerance, **(_WARM if warm else {}),
+                       **(_EXPLORING if self.settings.exploring else {})}
             self._solvers[warm] = self._programme.ipopt(options, self._watch)
         return self._solvers[warm]
 
-    def _bounds(self, parameters: Parameters) -> tuple[Array, Array]:
-        """Return bounds of the unknowns: of those at points, w alone has some."""
-        arm, mesh = self.model.arm, self._mesh
-        upper = np.full((mesh.points.size, 3 * arm.n_coordinates + arm.n_joints), np.inf)
-        upper[:, -arm.n_joints:] = parameters.stall_torque
-        others = (mesh.P.shape[1] - mesh.points.size) * 2 * arm.n_coordinates
-        both = np.concatenate([upper.ravel(), np.full(others, np.inf)])
-        free = int(self.settings.free_payload)
-        return np.append(-both, [0.0] * free), np.append(both, [np.inf] * free)
-
-    def _guess_unknowns(self, guess: Guess, parameters: Parameters, duration: float) -> Array:
-        """Return the unknowns on a motion with costates."""
-        n, n_t = self.model.arm.n_joints, self.model.arm.n_coordinates
-        times, node_times = self._times(duration)
-        z = guess(times)
-        control = self.model.controls(z, parameters.stack())
-        w = control.torque + parameters.torque_slope * z[:, n_t:n_t + n]
-        y = np.hstack([z[:, :2 * n_t], control.acceleration, w])
-        return np.concatenate([y.ravel(), guess(node_times)[:, :2 * n_t].ravel()])
-
-    def _straight_line(self, start: Array, goal: Array, duration: float) -> Array:
-        """Return the unknowns at constant velocity; free fall would lead to worse minima."""
-        n, n_t = self.model.arm.n_joints, self.model.arm.n_coordinates
-        velocity = (goal - start)[:n_t] / duration
-
-        def states(times: Array) -> Array:
-            positions = start[:n_t] + np.outer(times, velocity)
-            return np.hstack([positions, np.tile(velocity, (times.size, 1))])
-
-        times, node_times = self._times(duration)
-        y = np.hstack([states(times), np.zeros((times.size, n_t + n))])
-        return np.concatenate([y.ravel(), states(node_times).ravel()])
-
-    def _times(self, duration: float) -> tuple[Array, Array]:
-        """Return the times of the points, and of the nodes that are no points."""
-        mesh = self._mesh
-        nodes = duration * mesh.breaks
-        return duration * mesh.points, nodes[mesh.nodes >= mesh.points.size]
-
     def _result(self, arrays: dict[str, Array], cost: float, stats: dict[str, Any],
-                parameters: Parameters, duration: float, seconds: float) -> DirectResult:
+                parameters: Parameters, seconds: float) -> DirectResult:
         """Return IPOPT's solution in the terms of the problem."""
-        arm, mesh = self.model.arm, self._mesh
-        n, n_t, K = arm.n_joints, arm.n_coordinates, mesh.points.size
-        y = arrays['x'][:K * (3 * n_t + n)].reshape(K, -1)
-        others = arrays['x'][y.size:arrays['x'].size - self.settings.free_payload]
-        values = np.vstack([y[:, :2 * n_t], others.reshape(-1, 2 * n_t)])
+        n_t, mesh = self.model.arm.n_coordinates, self._mesh
+        y, states, used, duration = self._unknowns.split(arrays['x'], parameters)
         rows = arrays['lam_g'][:mesh.P.shape[0] * 2 * n_t].reshape(-1, 2 * n_t)
         costates, point_costates = mesh.costates(rows)
         status, message = _outcome(stats, self._watch.stopped)
+        speeds = y[:, n_t:n_t + self.model.arm.n_joints]
         return DirectResult(
-            status=status, message=message, cost=cost, payload=parameters.payload_mass,
-            times=duration * mesh.breaks,
-            states=values[mesh.nodes], costates=costates, point_times=duration * mesh.points,
-            point_states=values[:K], point_costates=point_costates,
-            torques=y[:, 3 * n_t:] - parameters.torque_slope * y[:, n_t:n_t + n],
+            status=status, message=message, cost=cost, payload=used.payload_mass,
+            duration=duration, times=duration * mesh.breaks, states=states, costates=costates,
+            point_times=duration * mesh.points, point_states=y[:, :2 * n_t],
+            point_costates=point_costates, torques=y[:, 3 * n_t:] - used.torque_slope * speeds,
             iterations=int(stats['iter_count']), seconds=seconds,
             iterate={'x0': arrays['x'], 'lam_x0': arrays['lam_x'], 'lam_g0': arrays['lam_g']})
 

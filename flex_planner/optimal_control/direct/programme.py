@@ -65,9 +65,10 @@ class Programme:
     """
     A nonlinear programme and its derivatives, as CasADi's ``nlpsol`` takes them.
 
-    Unknowns are y at the points, then x at the nodes that are no points, then the payload if it
-    is free; parameters are p, x at both ends, the duration, and the price of a free payload. All
-    rows are equations: those of the mesh, then eq. (3).
+    Unknowns are y at the points, then x at the nodes that are no points, then the payload m_p and
+    the duration t_f, which bounds fix or free. Parameters are p, in which the payload does not
+    count, x at both ends, and three prices: the cost is ``prices[0] J - prices[1] m_p +
+    prices[2] t_f``. All rows are equations: those of the mesh, then eq. (3).
 
     """
 
@@ -75,40 +76,45 @@ class Programme:
     derivatives: dict[str, Any]
 
     @classmethod
-    def of(cls, arm: Arm, mesh: Mesh, free_payload: bool = False) -> Programme:
+    def of(cls, arm: Arm, mesh: Mesh) -> Programme:
         """Derive it."""
         import casadi as ca
 
-        point, K, n_x, free = _Point.of(arm), mesh.points.size, 2 * arm.n_coordinates, free_payload
+        point, K, n_x = _Point.of(arm), mesh.points.size, 2 * arm.n_coordinates
         size, outer = point.cost.numel_in(0), (mesh.P.shape[1] - K) * n_x
-        X = ca.MX.sym('X', K * size + outer + free)
-        p, price = ca.MX.sym('p', point.cost.numel_in(1)), ca.MX.sym('sigma', int(free))
-        ends, duration = ca.MX.sym('ends', 2 * n_x), ca.MX.sym('t_f')
-        at = payload_index()
-        used = ca.vertcat(p[:at], X[-1], p[at + 1:]) if free else p
+        X, p = ca.MX.sym('X', K * size + outer + 2), ca.MX.sym('p', point.cost.numel_in(1))
+        ends, prices = ca.MX.sym('ends', 2 * n_x), ca.MX.sym('prices', 3)
+        motion, duration, at = X[:-2], X[-1], payload_index()
+        used = ca.vertcat(p[:at], X[-2], p[at + 1:])
         points = ca.reshape(X[:K * size], size, K), ca.repmat(used, 1, K)
-        weights, linear = duration * ca.DM(mesh.weights).T, _linear_rows(mesh, n_x, size, duration)
-        linear = ca.horzcat(linear, ca.MX(linear.size1(), int(free)))
-        given = ca.vertcat(ca.MX(linear.size1() - 2 * n_x, 1), ends)
+        weights, (constant, growing) = ca.DM(mesh.weights).T, _linear_rows(mesh, n_x, size)
+        given = ca.vertcat(ca.MX(constant.size1() - 2 * n_x, 1), ends)
+        moved = growing @ motion
         L, L_slope = point.cost.map(K)(*points)
         force, force_slope = point.force.map(K)(*points)
-        f, g = ca.dot(weights, L), ca.vertcat(linear @ X - given, ca.vec(force))
+        share, mean = point.share.map(K)(*points), ca.dot(weights, L)
+        f = prices[0] * duration * mean - prices[1] * X[-2] + prices[2] * duration
+        g = ca.vertcat(constant @ motion - duration * moved - given, ca.vec(force))
         s, multipliers = ca.MX.sym('s'), ca.MX.sym('lambda', g.numel())
-        mu = ca.reshape(multipliers[linear.size1():], -1, K)
-        hessian = ca.diagcat(_diagonal(point.hessian.map(K)(*points, s * weights, mu), K),
-                             ca.MX(outer, outer))
-        f_slope = ca.vertcat(ca.vec(L_slope * ca.repmat(weights, size, 1)), ca.DM.zeros(outer))
-        force_rows = ca.horzcat(_diagonal(force_slope, K), ca.MX(force.numel(), outer))
-        if free:
-            share, bend = point.share.map(K)(*points), point.bend.map(K)(*points, mu)
-            f, f_slope = f - price * X[-1], ca.vertcat(f_slope, -price)
-            force_rows = ca.horzcat(force_rows, ca.vec(share))
-            column = ca.vertcat(ca.vec(bend), ca.MX(outer, 1))
-            hessian = ca.blockcat(hessian, column, ca.MX(1, K * size + outer), ca.MX(1, 1))
-        inputs = [X, ca.vertcat(p, ends, duration, price)]
+        in_mesh, of_force = ca.vertsplit(multipliers, [0, constant.size1(), g.numel()])
+        mu = ca.reshape(of_force, -1, K)
+        along = ca.vertcat(ca.vec(L_slope * ca.repmat(weights, size, 1)), ca.DM.zeros(outer))
+        f_slope = ca.vertcat(prices[0] * duration * along, -prices[1],
+                             prices[0] * mean + prices[2])
+        rows = ca.blockcat([
+            [constant - duration * growing, ca.MX(moved.numel(), 1), -moved],
+            [ca.horzcat(_diagonal(force_slope, K), ca.MX(force.numel(), outer)), ca.vec(share),
+             ca.MX(force.numel(), 1)]])
+        bend = ca.vertcat(ca.vec(point.bend.map(K)(*points, mu)), ca.MX(outer, 1))
+        hessian = ca.blockcat([
+            [ca.diagcat(_diagonal(point.hessian.map(K)(
+                *points, s * prices[0] * duration * weights, mu), K), ca.MX(outer, outer)),
+             bend, s * prices[0] * along - growing.T @ in_mesh],
+            [ca.MX(2, K * size + outer), ca.MX(2, 1), ca.MX(2, 1)]])
+        inputs = [X, ca.vertcat(p, ends, prices)]
         return cls({'x': X, 'p': inputs[1], 'f': f, 'g': g}, {
             'grad_f': ca.Function('grad_f', inputs, [f, f_slope]),
-            'jac_g': ca.Function('jac_g', inputs, [g, ca.vertcat(linear, force_rows)]),
+            'jac_g': ca.Function('jac_g', inputs, [g, rows]),
             'hess_lag': ca.Function('hess_lag', [*inputs, s, multipliers], [hessian])})
 
     def ipopt(self, options: dict[str, Any], watch: Any) -> Any:
@@ -154,16 +160,18 @@ class Programme:
         return Watch()
 
 
-def _linear_rows(mesh: Mesh, n_x: int, size: int, duration: Any) -> Any:
-    """Return the matrix of the mesh's rows for all unknowns; x' = (q', q'') follows x in y."""
+def _linear_rows(mesh: Mesh, n_x: int, size: int) -> tuple[Any, Any]:
+    """Return A and B of the mesh's rows (A - t_f B) (y, nodes); x' = (q', q'') follows x in y."""
     import casadi as ca
 
     P, Q = ca.DM(mesh.P.tocsc()), ca.DM(mesh.Q.tocsc())
     value, K = ca.DM.eye(n_x), Q.size2()
     in_point = ca.horzcat(value, ca.DM(n_x, size - n_x))
     rate = ca.horzcat(ca.DM(n_x, n_x // 2), value, ca.DM(n_x, size - n_x - n_x // 2))
-    at_points = ca.kron(P[:, :K], in_point) - duration * ca.kron(Q, rate)
-    return ca.horzcat(at_points, ca.kron(P[:, K:], value))
+    constant = ca.horzcat(ca.kron(P[:, :K], in_point), ca.kron(P[:, K:], value))
+    growing = ca.kron(Q, rate)
+    return constant, ca.horzcat(growing, ca.DM(growing.size1(), constant.size2()
+                                                - growing.size2()))
 
 
 def _diagonal(blocks: Any, count: int) -> Any:

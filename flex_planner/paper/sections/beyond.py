@@ -87,7 +87,8 @@ def clamped_links(*, reduced: bool = False) -> Section:
                                        _CLAMPED_ACCURACY) for rigidity in rigidities}
     light = plan_certified(point_to_point(paper_arm(50.0, 1, 'clamped_free'), 1.0))
     rows = tuple((f'{rigidity:g}', f'{STIFFNESS_LIMITS[rigidity]:g}',
-                  f'{pinned[rigidity].payload:.4f}', f'{found.payload:.4f} - {found.upper:.4f}')
+                  f'{pinned[rigidity].payload:.4f}',
+                  f'{found.payload:.4f} - {found.local_upper:.4f}')
                  for rigidity, found in built_in.items())
     values = {f'clamped_limit_{rigidity:g}': one.payload for rigidity, one in built_in.items()}
     values['clamped_cost'] = light.cost
@@ -155,7 +156,7 @@ def modes(*, reduced: bool = False) -> Section:
              for count in counts}
     limits = {count: find_largest(point_to_point(paper_arm(_SOFT, count), 1.0))
               for count in counts}
-    rows = tuple((str(count), f'{costs[count]:.9f}', f'{one.payload:.5f} - {one.upper:.5f}')
+    rows = tuple((str(count), f'{costs[count]:.9f}', f'{one.payload:.5f} - {one.local_upper:.5f}')
                  for count, one in limits.items())
     return Section(
         key='6.4', title='Beyond the paper: how many modes',

@@ -116,7 +116,8 @@ def _weight_table(weighted: dict[float, Plan]) -> Table:
 
 def _stiffness_table(found: dict[float, MaxPayload], independent: dict[float, str]) -> Table:
     rows = tuple((_link_name(rigidity), f'{STIFFNESS_LIMITS[rigidity]:g}', f'{one.payload:.5f}',
-                  f'{one.upper:.5f}', independent[rigidity]) for rigidity, one in found.items())
+                  f'{one.local_upper:.5f}', independent[rigidity])
+                 for rigidity, one in found.items())
     return Table(title='Table V: the largest payload', rows=rows,
                  header=('links', 'paper [kg]', 'ours, carried [kg]', 'too much [kg]',
                          'IPOPT [kg]'))
@@ -124,13 +125,13 @@ def _stiffness_table(found: dict[float, MaxPayload], independent: dict[float, st
 
 def _limit_claims(found: MaxPayload, raised: MaxPayload) -> tuple[Claim, ...]:
     plan = _plan_of(found)
-    missed = [trial for trial in raised.trials if trial.payload > found.upper]
+    missed = [trial for trial in raised.trials if trial.payload > found.local_upper]
     close = [trial for trial in missed if trial.boundary_error <= EPSILON]
     error = min((trial.boundary_error for trial in missed), default=math.inf)
     return (
         Claim(said='The rigid arm carries 5.85 kg.',
               found=f'{found.payload:.5f} kg is carried by a certified motion, '
-              f'{found.upper:.5f} kg is too much; the algorithm of fig. 2 ends at '
+              f'{found.local_upper:.5f} kg is too much; the algorithm of fig. 2 ends at '
               f'{raised.payload:.3f} kg, to its accuracy of {ACCURACY:g} kg.',
               verdict=judge(abs(found.payload - LIMITS[0.0]) <= ACCURACY)),
         Claim(said='At the largest payload both torques lie on their limits completely.',

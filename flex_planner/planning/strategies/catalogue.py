@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from flex_planner.planning.kinds.kinds_strategy import explore_kinds
 from flex_planner.planning.strategies.homotopies import (
     lower_vibration_price,
     raise_weights,
@@ -19,14 +20,14 @@ from flex_planner.planning.strategies.limit_strategies import (
 )
 from flex_planner.planning.strategies.strategy import Strategy
 
-# the limits come before the thorough strategies: to refuse a task should not take minutes
 CATALOGUE: tuple[Strategy, ...] = (
     Strategy('cold start', cold_start, quick=True),
     Strategy('rigid motion first', lift_rigid_motion, quick=True),
     Strategy('homotopy in the weights', raise_weights, quick=True),
     Strategy('coarse mesh first', coarse_mesh, quick=True),
-    Strategy('continuation in payload', continue_in_payload, shows_infeasibility=True),
-    Strategy('continuation in duration', continue_in_duration, shows_infeasibility=True),
+    Strategy('kinds of motion', explore_kinds),
+    Strategy('continuation in payload', continue_in_payload),
+    Strategy('continuation in duration', continue_in_duration),
     Strategy('homotopy in vibration weights', lower_vibration_price),
     Strategy('homotopy in stiffness', soften_links),
     Strategy('direct collocation', direct_collocation),

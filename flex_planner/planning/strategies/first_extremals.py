@@ -48,7 +48,7 @@ def approach_limit(parameter: FreeParameter, problem: MotionProblem, solver: Sol
     """
     if first is None and problem.model.arm.n_modes:
         rigid = _rigid_extremals(parameter, problem, solver)
-        first = _lift_extremal(parameter, problem, rigid, solver)
+        first = lift_extremal(parameter, problem, rigid, solver)
         if first is None and rigid and parameter is PAYLOAD:
             price, found = rigid[-1].price, False
             for extremal in continue_by_ipopt(problem, price, solver, target_gap):
@@ -84,7 +84,7 @@ def _rigid_extremals(parameter: FreeParameter, problem: MotionProblem,
     return extremals
 
 
-def _lift_extremal(parameter: FreeParameter, problem: MotionProblem, rigid: list[Extremal],
+def lift_extremal(parameter: FreeParameter, problem: MotionProblem, rigid: list[Extremal],
                    solver: Solver) -> Extremal | None:
     """Return the flexible motion at the price of a rigid one that is near its limit, or None."""
     for extremal in reversed(rigid[-_LIFTS:]):

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 
 from flex_planner.base.errors import FlexPlannerError
 from flex_planner.collocation import (
@@ -21,6 +20,7 @@ from flex_planner.collocation import (
     Solver,
     SolverStatus,
 )
+from flex_planner.optimal_control.direct.unknowns import Free
 from flex_planner.optimal_control.free_duration import FreeDurationProblem
 from flex_planner.optimal_control.free_payload import FreePayloadProblem, payload_price
 from flex_planner.optimal_control.free_problem import FreeProblem
@@ -48,11 +48,14 @@ class FreeParameter(ABC):
     ----------
     name, unit : str
         Shown to people.
+    unknown : Free
+        What it is to a transcription.
 
     """
 
     name: str
     unit: str
+    unknown: Free
 
     @abstractmethod
     def value(self, problem: MotionProblem) -> float:
@@ -158,7 +161,7 @@ class FreeParameter(ABC):
 class _Payload(FreeParameter):
     """The payload m_p: the limit is the most that the arm carries."""
 
-    name, unit = 'payload', 'kg'
+    name, unit, unknown = 'payload', 'kg', Free.PAYLOAD
 
     def value(self, problem: MotionProblem) -> float:
         return problem.task.payload_mass
@@ -202,7 +205,7 @@ class _Payload(FreeParameter):
 class _Duration(FreeParameter):
     """The duration t_f: the limit is the shortest in which the arm can make the motion."""
 
-    name, unit = 'duration', 's'
+    name, unit, unknown = 'duration', 's', Free.DURATION
 
     def value(self, problem: MotionProblem) -> float:
         return problem.task.duration
@@ -217,8 +220,7 @@ class _Duration(FreeParameter):
         return max(-float(np.mean(hamiltonian)), _LEAST_SHARE * share, _LEAST_PRICE)
 
     def free(self, problem: MotionProblem, price: float) -> FreeProblem:
-        task = replace(problem.task, time_weight=price)
-        return FreeDurationProblem(MotionProblem(problem.model, task, problem.parameters))
+        return FreeDurationProblem(problem, price)
 
     def improves(self, value: float, other: float) -> bool:
         return value < other

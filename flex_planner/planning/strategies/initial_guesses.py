@@ -11,8 +11,9 @@ from dataclasses import replace
 
 from flex_planner.base.errors import InvalidTaskError
 from flex_planner.base.validation import Array
-from flex_planner.collocation import CollocationSolution, GaussRule, Solver, SolverStatus
+from flex_planner.collocation import CollocationSolution, Solver, SolverStatus
 from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.direct.conversion import to_solution
 from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectSettings
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.planning.strategies.strategy import Attempt, Strategy
@@ -134,12 +135,7 @@ def direct_collocation(problem: MotionProblem, solver: Solver) -> Attempt | None
     found = direct.solve(problem.parameters, problem.start, problem.goal,
                          problem.task.duration, monitor=solver.monitor)
     solver.monitor.check()
-    mesh = np.linspace(0, problem.task.duration, intervals + 1, dtype=np.float64)
-    points = np.hstack([found.point_states, found.point_costates])
-    rates = problem.rate(found.point_times, points).reshape(intervals, _DIRECT_STAGES, -1)
-    guess = CollocationSolution(mesh, np.hstack([found.states, found.costates]), rates,
-                                GaussRule.of(_DIRECT_STAGES))
-    return Attempt(result=solver.solve(problem, guess))
+    return Attempt(result=solver.solve(problem, to_solution(found, problem)))
 
 
 def warm_start(solution: CollocationSolution, name: str = WARM_START) -> Strategy:

@@ -10,7 +10,7 @@ the motion and its multipliers are a start for Newton's method.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from flex_planner.base.errors import FlexPlannerError
@@ -20,15 +20,16 @@ from flex_planner.collocation import (
     BoundaryValueProblem,
     CollocationResult,
     CollocationSolution,
-    GaussRule,
     INTERRUPTED,
     Solver,
 )
 from flex_planner.collocation.mesh import defects, level_mesh, switching_times
+from flex_planner.optimal_control.direct.conversion import to_solution
 from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectSettings
-from flex_planner.optimal_control.free_payload import FreePayloadProblem
+from flex_planner.optimal_control.free_problem import FreeProblem
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.planning.strategies.extremals import Extremal
+from flex_planner.planning.strategies.free_parameters import FreeParameter, PAYLOAD
 from flex_planner.planning.strategies.price_continuation import TargetGap
 import numpy as np
 
@@ -72,7 +73,7 @@ def continue_by_ipopt(problem: MotionProblem, price: float, solver: Solver,
     before = price = _FIRST * price
     factor = _DEARER
     while factor > _LEAST_FACTOR:
-        extremal = _solve_at_price(problem, price, mesh, guess, solver)
+        extremal = _solve_at_price(PAYLOAD, problem, price, mesh, guess, solver)
         if extremal is None or not (extremal.interrupted or extremal.value > value):
             if guess is None:
                 return
@@ -87,6 +88,37 @@ def continue_by_ipopt(problem: MotionProblem, price: float, solver: Solver,
         price = before * factor
 
 
+def transcribe_at_price(parameter: FreeParameter, problem: MotionProblem, price: float,
+                        value: float, make_guess: Callable[[MotionProblem], CollocationSolution],
+                        solver: Solver) -> Extremal | None:
+    """
+    Return the motion at a price that IPOPT finds from a guess and Newton's method makes exact.
+
+    Parameters
+    ----------
+    parameter : FreeParameter
+        What is free.
+    problem : MotionProblem
+        With hard goals.
+    price, value : float
+        Of the free parameter; the value is that of the guess.
+    make_guess : callable
+        From the motion with that value to a guess.
+    solver : Solver
+        If its monitor interrupts it, the extremal says so.
+
+    """
+    fewest = problem.fewest_intervals(_STAGES)
+    if np.isfinite(problem.goal_weights).any() or fewest > _MOST_FIRST:
+        return None
+    try:
+        near = parameter.with_value(problem, value)
+    except FlexPlannerError:  # too heavy to hold
+        return None
+    mesh = np.linspace(0, near.task.duration, max(_INTERVALS, fewest) + 1, dtype=np.float64)
+    return _solve_at_price(parameter, near, price, mesh, make_guess(near), solver)
+
+
 def _factor(extremal: Extremal, largest: float, target_gap: TargetGap) -> float:
     """Return the factor in price that leaves the gap wanted, which goes with its inverse."""
     wanted = target_gap(extremal.value)
@@ -95,17 +127,17 @@ def _factor(extremal: Extremal, largest: float, target_gap: TargetGap) -> float:
     return min(max(extremal.gap / (_SURE * wanted), 1.1 * _LEAST_FACTOR), largest)
 
 
-def _solve_at_price(problem: MotionProblem, price: float, mesh: Array,
+def _solve_at_price(parameter: FreeParameter, problem: MotionProblem, price: float, mesh: Array,
                     guess: CollocationSolution | None, solver: Solver) -> Extremal | None:
-    """Return the motion whose payload is worth a price, on better and better meshes; or None."""
+    """Return the motion whose value is worth a price, on better and better meshes; or None."""
     for _ in range(_MESHES):
         try:
-            found = _transcribe(problem, price, mesh, guess, solver.monitor)
-            ahead = FreePayloadProblem(found.problem, price)
+            found = _transcribe(parameter, problem, price, mesh, guess, solver.monitor)
+            ahead = parameter.free(found.problem, price)
             start = ahead.extend(found.solution)
             result = _exact(solver).solve(ahead, start)
             if result.converged or result.status in INTERRUPTED:
-                return _extremal(ahead, result, price)
+                return _extremal(ahead, found.problem, result, price)
         except FlexPlannerError:  # a payload of an iterate: too heavy to hold, or below none
             return None
         if not found.converged:
@@ -120,30 +152,28 @@ def _exact(solver: Solver) -> Solver:
     return solver.with_settings(stages=_STAGES, error_tolerance=_EXACT).patient(_NEWTON)
 
 
-def _extremal(ahead: FreePayloadProblem, result: CollocationResult, price: float) -> Extremal:
+def _extremal(ahead: FreeProblem, motion: MotionProblem, result: CollocationResult,
+              price: float) -> Extremal:
     """Return a solution as an extremal."""
-    payload, _ = ahead.restrict(result.solution)
+    value, _ = ahead.restrict(result.solution)
     if not result.converged:
-        return Extremal(value=payload, price=price, result=result, problem=ahead.motion)
-    return Extremal(value=payload, price=price, result=ahead.restrict_result(result),
-                    problem=ahead.fix(payload))
+        return Extremal(value=value, price=price, result=result, problem=motion)
+    return Extremal(value=value, price=price, result=ahead.restrict_result(result),
+                    problem=ahead.fix(value))
 
 
-def _transcribe(problem: MotionProblem, price: float, mesh: Array,
+def _transcribe(parameter: FreeParameter, problem: MotionProblem, price: float, mesh: Array,
                 guess: CollocationSolution | None, monitor: Monitor) -> _Transcribed:
     """Return IPOPT's motion on a mesh, with its multipliers as costates."""
-    duration = problem.task.duration
+    duration = mesh[-1]
     direct = DirectProblem(problem.model, DirectSettings(
         scheme='gauss', degree=_STAGES, intervals=mesh.size - 1, tolerance=_TOLERANCE,
-        max_iterations=_ITERATIONS, free_payload=True), mesh / duration)
-    found = direct.solve(problem.parameters, problem.start, problem.goal, duration, guess=guess,
-                         price=price, monitor=monitor)
-    motion = problem.with_changes(payload_mass=max(found.payload, 0.0))
-    points = np.hstack([found.point_states, found.point_costates])
-    rates = motion.rate(found.point_times, points).reshape(mesh.size - 1, _STAGES, -1)
-    solution = CollocationSolution(mesh, np.hstack([found.states, found.costates]), rates,
-                                   GaussRule.of(_STAGES))
-    return _Transcribed(problem=motion, solution=solution, converged=found.converged)
+        max_iterations=_ITERATIONS), mesh / duration)
+    found = direct.solve(problem.parameters, problem.start, problem.goal, problem.task.duration,
+                         guess=guess, free=parameter.unknown, price=price, monitor=monitor)
+    motion = problem.with_changes(payload_mass=max(found.payload, 0.0), duration=found.duration)
+    return _Transcribed(problem=motion, solution=to_solution(found, motion),
+                        converged=found.converged)
 
 
 def _level(problem: BoundaryValueProblem, solution: CollocationSolution,

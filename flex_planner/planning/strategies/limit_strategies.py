@@ -1,9 +1,8 @@
 """
-Limits of payload and duration as ways to a plan, and as evidence that there is none.
+Limits of payload and duration as ways to a plan.
 
-Both limits are found on the way to a task that no other strategy solves. Either the task is met,
-then its neighbour is a start for it; or the limit lies before it, and is the evidence that the
-task is infeasible.
+Both are followed from an easier task to one that no other strategy solves. Where the motions
+followed come to the task, the nearest of them is a start for it.
 
 """
 
@@ -58,8 +57,8 @@ def continue_in_payload(problem: MotionProblem, solver: Solver) -> Attempt | Non
     if not last.result.converged:
         return Attempt(result=last.result)
     if last.value * (1 + _STEADY) < wanted:
-        return _judge_limit(extremals, (
-            f'the arm carries at most {last.value:.4g} kg from start to goal in '
+        return _ended(last, (
+            f'motions of the kind that was followed carry at most {last.value:.4g} kg in '
             f'{problem.task.duration:g} s, and {wanted:g} kg were asked for'))
     return Attempt(result=_reach_payload(problem, extremals, solver))
 
@@ -96,9 +95,9 @@ def continue_in_duration(problem: MotionProblem, solver: Solver) -> Attempt | No
     if not last.result.converged:
         return Attempt(result=last.result)
     if last.value > wanted * (1 + _STEADY):
-        return _judge_limit(met, (
-            f'the motion takes at least {last.value:.4g} s with {problem.task.payload_mass:g} kg, '
-            f'and {wanted:g} s were asked for'))
+        return _ended(last, (
+            f'motions of the kind that was followed take at least {last.value:.4g} s with '
+            f'{problem.task.payload_mass:g} kg, and {wanted:g} s were asked for'))
     nearest = min(met, key=lambda extremal: abs(extremal.value - wanted))
     result = solve_stretched(bare, nearest.result.solution, solver)
     if result.converged and has_weights(problem):
@@ -124,21 +123,7 @@ def is_steady(extremals: list[Extremal], share: float = _STEADY) -> bool:
     return bool(cheaper) and abs(last.value - cheaper[-1].value) < share * last.value
 
 
-def _judge_limit(extremals: list[Extremal], sentence: str) -> Attempt:
-    """
-    Return an attempt with evidence: only if the price shows that the limit is near.
-
-    Under gravity motions of several kinds (swinging back first) have limits of their own, and
-    that of one is no evidence.
-
-    """
-    last = extremals[-1]
-    if last.problem.model.arm.gravity.any():
-        return Attempt(result=replace(last.result, status=SolverStatus.NEWTON_FAILED, message=(
-            f'by the motions that were followed {sentence}; under gravity others may do more')))
-    if is_steady(extremals):
-        grown = last.price / max(extremals[0].price, 1.0)
-        return Attempt(result=last.result, evidence=(
-            f'{sentence} (the price of more has grown {grown:.0e} times)'))
+def _ended(last: Extremal, sentence: str) -> Attempt:
+    """Return an attempt that ended before the task, which shows nothing about other kinds."""
     return Attempt(result=replace(last.result, status=SolverStatus.NEWTON_FAILED,
-                                  message='the limit was not found'))
+                                  message=sentence))

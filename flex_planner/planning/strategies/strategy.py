@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from flex_planner.collocation import CollocationResult, INTERRUPTED, Solver
 from flex_planner.optimal_control.motion_problem import MotionProblem
+from flex_planner.planning.kinds.clusters import KindOfMotion
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -18,18 +19,27 @@ class Attempt:
     ----------
     result : CollocationResult
         A solution, or how far it came.
-    evidence : str
-        Why the motion is impossible; empty where nothing shows it.
+    kinds : tuple of KindOfMotion
+        Kinds of motion that it met on the way.
+    starts : int
+        From how many starts.
+    not_found : bool
+        Whether many starts led to no motion that could do the task.
+    hopeless : bool
+        Whether what was found instead speaks against trying on.
 
     """
 
     result: CollocationResult
-    evidence: str = ''
+    kinds: tuple[KindOfMotion, ...] = ()
+    starts: int = 1
+    not_found: bool = False
+    hopeless: bool = False
 
     @property
     def decides(self) -> bool:
-        """Return whether nothing else need be tried: solved, impossible, or interrupted."""
-        return bool(self.evidence or self.result.converged or self.result.status in INTERRUPTED)
+        """Return whether nothing else need be tried: solved, hopeless, or interrupted."""
+        return (self.hopeless or self.result.converged or self.result.status in INTERRUPTED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,12 +56,9 @@ class Strategy:
         such as a homotopy in the weights of a task without any.
     quick : bool
         Whether it takes little time, solved or not.
-    shows_infeasibility : bool
-        Whether it may find evidence that the task cannot be done in its duration with its payload.
 
     """
 
     name: str
     attempt: Callable[[MotionProblem, Solver], Attempt | None]
     quick: bool = False
-    shows_infeasibility: bool = False

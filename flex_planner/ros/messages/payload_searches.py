@@ -69,7 +69,7 @@ def search_message(found: MaxPayload, options: SearchOptions) -> PayloadSearch:
     return PayloadSearch(
         method=_CODES[found.method], payload_accuracy=options.accuracy,
         payload_step=options.step, payload=float(found.payload) if found.solved else 0.0,
-        payload_upper=float(found.upper), limiting_joint=-1 if joint is None else int(joint),
+        payload_upper=float(found.local_upper), limiting_joint=-1 if joint is None else int(joint),
         held=bool(found.held), front_payloads=front.payloads.tolist(),
         front_efforts=front.efforts.tolist(), front_prices=front.prices.tolist(),
         tried_payloads=[float(trial.payload) for trial in trials],

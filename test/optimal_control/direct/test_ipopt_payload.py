@@ -20,6 +20,7 @@ from flex_planner.optimal_control.direct.ipopt import (
 )
 from flex_planner.optimal_control.direct.mesh import Mesh, SCHEMES
 from flex_planner.optimal_control.direct.programme import Programme
+from flex_planner.optimal_control.direct.unknowns import Free
 from flex_planner.optimal_control.free_payload import FreePayloadProblem
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import Task
@@ -39,13 +40,13 @@ CONVERGING = [('gauss', 5e-4, 1e-4), ('radau', 2e-3, 1e-4), ('hermite_simpson', 
 
 def free(problem: MotionProblem, intervals: int = 40, scheme: str = 'gauss') -> DirectProblem:
     return DirectProblem(problem.model, DirectSettings(
-        free_payload=True, intervals=intervals, scheme=scheme))
+        intervals=intervals, scheme=scheme))
 
 
 def solved(problem: MotionProblem, direct: DirectProblem, price: float = PRICE,
            warm: DirectResult | None = None) -> DirectResult:
     found = direct.solve(problem.parameters, problem.start, problem.goal, problem.task.duration,
-                         price=price, warm=warm)
+                         free=Free.PAYLOAD, price=price, warm=warm)
     assert found.converged, found.message
     return found
 
@@ -94,7 +95,7 @@ def test_payload_at_a_high_price_is_the_maximum(motion: MotionProblem) -> None:
     found = solved(motion, free(motion, 80), 1e4)
     limit = find_max_payload(motion.task, model=motion.model)
     # the mesh gives 3e-5
-    assert limit.payload - 1e-4 < found.payload < limit.upper + 1e-4
+    assert limit.payload - 1e-4 < found.payload < limit.local_upper + 1e-4
 
 
 def test_cost_is_that_of_the_payload_without_its_price(motion: MotionProblem) -> None:
@@ -122,7 +123,7 @@ def test_cost_of_more_payload_is_its_price(motion: MotionProblem) -> None:
 def test_first_payload_does_not_matter(motion: MotionProblem) -> None:
     direct = free(motion)
     payloads = [direct.solve(replace(motion.parameters, payload_mass=first), motion.start,
-                             motion.goal, 1.0, price=PRICE).payload for first in (0.0, 3.0, 9.0)]
+                             motion.goal, 1.0, free=Free.PAYLOAD, price=PRICE).payload for first in (0.0, 3.0, 9.0)]
     # IPOPT's tolerance of 1e-8
     np.testing.assert_allclose(payloads, payloads[0], rtol=1e-6)
 
@@ -162,23 +163,24 @@ def test_warm_start_at_the_next_price_takes_fewer_iterations(motion: MotionProbl
 def test_search_is_stopped_and_can_be_made_again(motion: MotionProblem) -> None:
     direct = free(motion, 20)
     data = motion.parameters, motion.start, motion.goal, 1.0
-    stopped = direct.solve(*data, price=PRICE, monitor=Monitor(time_limit=0.0))
+    stopped = direct.solve(*data, free=Free.PAYLOAD, price=PRICE, monitor=Monitor(time_limit=0.0))
     assert (stopped.status, stopped.message) == (DirectStatus.STOPPED, 'time limit reached')
-    assert direct.solve(*data, price=PRICE).converged
+    assert direct.solve(*data, free=Free.PAYLOAD, price=PRICE).converged
 
 
 def test_impossible_motion_fails_with_a_free_payload(motion: MotionProblem) -> None:
     # it takes 0.536 s without payload
-    found = free(motion, 20).solve(motion.parameters, motion.start, motion.goal, 0.4, price=PRICE)
+    found = free(motion, 20).solve(motion.parameters, motion.start, motion.goal, 0.4,
+                                   free=Free.PAYLOAD, price=PRICE)
     assert found.status is DirectStatus.FAILED
 
 
 # Derivatives
 
 
-def derivatives(arm: Arm, scheme: str, free_payload: bool) -> dict[str, tuple[Array, Array]]:
+def derivatives(arm: Arm, scheme: str) -> dict[str, tuple[Array, Array]]:
     """Return the programme's derivatives and CasADi's own of its expressions, at some point."""
-    programme = Programme.of(arm, Mesh.of(scheme, 2, 3), free_payload)
+    programme = Programme.of(arm, Mesh.of(scheme, 2, 3))
     x, p, f, g = (programme.expressions[name] for name in ('x', 'p', 'f', 'g'))
     s, multipliers = ca.MX.sym('s'), ca.MX.sym('lambda', g.numel())
     lagrangian = ca.triu(ca.hessian(s * f + ca.dot(multipliers, g), x)[0])
@@ -194,29 +196,28 @@ def derivatives(arm: Arm, scheme: str, free_payload: bool) -> dict[str, tuple[Ar
 
 
 @EVERY
-@pytest.mark.parametrize('free_payload', [False, True])
-def test_derivatives_are_those_of_the_expressions(single_mode_arm: Arm, scheme: str,
-                                                  free_payload: bool) -> None:
-    for name, (ours, own) in derivatives(single_mode_arm, scheme, free_payload).items():
+def test_derivatives_are_those_of_the_expressions(single_mode_arm: Arm, scheme: str) -> None:
+    for name, (ours, own) in derivatives(single_mode_arm, scheme).items():
         assert ours.shape == own.shape
         # rounding
         np.testing.assert_allclose(ours, own, atol=1e-12 * np.abs(own).max(), err_msg=name)
 
 
 def test_derivatives_of_an_arm_that_has_everything(workshop_arm: Arm) -> None:
-    for name, (ours, own) in derivatives(workshop_arm, 'gauss', True).items():
+    for name, (ours, own) in derivatives(workshop_arm, 'gauss').items():
         np.testing.assert_allclose(ours, own, atol=1e-11 * np.abs(own).max(), err_msg=name)
 
 
-def test_free_payload_adds_one_unknown_that_moves_rows_and_cost(rigid_arm: Arm) -> None:
-    given, more = (derivatives(rigid_arm, 'gauss', free_payload) for free_payload in (False, True))
-    rows, unknowns = given['jacobian'][0].shape
-    assert more['jacobian'][0].shape == (rows, unknowns + 1)
-    by_payload = more['jacobian'][0][:, -1]
-    # eq. (3) has it at each of 6 points, the mesh has not
+def test_payload_and_duration_are_the_last_unknowns(rigid_arm: Arm) -> None:
+    found = derivatives(rigid_arm, 'gauss')
+    by_payload, by_duration = found['jacobian'][0][:, -2:].T
+    # eq. (3) has the payload at each of 6 points, the mesh has the duration
     assert not by_payload[:-12].any()
     assert by_payload[-12:].all()
-    # linear in the cost, and in eq. (3)
-    assert more['gradient'][0][-1] < 0
-    assert more['hessian'][0][-1, -1] == 0
-    assert more['hessian'][0][:-1, -1].any()
+    assert by_duration[:-12].any()
+    assert not by_duration[-12:].any()
+    # linear in the cost, and in the rows
+    assert found['gradient'][0][-2] < 0
+    assert not found['hessian'][0][-2:, -2:].any()
+    assert found['hessian'][0][:-2, -2].any()
+    assert found['hessian'][0][:-2, -1].any()

@@ -116,7 +116,7 @@ def test_every_method_has_its_constant_in_both_messages() -> None:
 def test_message_of_a_direct_search_has_every_number(direct: MaxPayload) -> None:
     message = search_message(direct, OPTIONS)
     assert (message.method, message.payload_accuracy, message.payload_step) == (0, 2e-3, 0.25)
-    assert (message.payload, message.payload_upper) == (direct.payload, direct.upper)
+    assert (message.payload, message.payload_upper) == (direct.payload, direct.local_upper)
     assert (message.limiting_joint, message.held) == (0, False)
     assert message.front_payloads.tolist() == direct.front.payloads.tolist() != []
     assert message.front_efforts.tolist() == direct.front.efforts.tolist()
@@ -142,7 +142,7 @@ def test_message_tells_the_joint_that_holds_no_more(direct: MaxPayload) -> None:
 def test_failed_search_has_no_payload_though_a_motion_was_met(direct: MaxPayload) -> None:
     failed = replace(direct, status=PlanStatus.NOT_CONVERGED, limiting_joint=None)
     message, report = search_message(failed, OPTIONS), report_from_search(failed)
-    assert (message.payload, message.payload_upper) == (0.0, direct.upper)
+    assert (message.payload, message.payload_upper) == (0.0, direct.local_upper)
     assert message.limiting_joint == -1
     assert message.front_payloads.tolist() == direct.front.payloads.tolist()
     assert (report.error_code, report.cost) == (PlanReport.NOT_CONVERGED, math.inf)

@@ -1,0 +1,121 @@
+"""Kinds of motion as a strategy: many starts of the rigid arm by IPOPT, for hard tasks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from flex_planner.collocation import (
+    CollocationResult,
+    CollocationSolution,
+    INTERRUPTED,
+    Solver,
+)
+from flex_planner.optimal_control.direct.unknowns import Free
+from flex_planner.optimal_control.motion_problem import MotionProblem
+from flex_planner.planning.kinds.clusters import KindOfMotion
+from flex_planner.planning.kinds.effort import SearchEffort
+from flex_planner.planning.kinds.search import find_kinds, rigid_twin
+from flex_planner.planning.strategies.homotopies import (
+    drop_weights,
+    has_weights,
+    raise_weights_from,
+)
+from flex_planner.planning.strategies.initial_guesses import lift
+from flex_planner.planning.strategies.strategy import Attempt
+
+# kinds that Newton's method is tried from
+_TRIED = 3
+# a task is out of sight if the heaviest payload found is less than this share of its own, and the
+# shortest duration more than its own by as much; of a flexible arm, whose rigid twin is explored
+_NEAR, _NEAR_FLEXIBLE = 0.98, 0.9
+
+
+def explore_kinds(problem: MotionProblem, solver: Solver) -> Attempt | None:
+    """Start from motions of the rigid arm that IPOPT finds from many paths, the cheapest first."""
+    bare = drop_weights(problem)
+    if rigid_twin(bare) is None:
+        return None
+    starts = SearchEffort.NORMAL.starts
+    kinds = find_kinds(bare, Free.NOTHING, starts, solver.monitor)
+    attempt = _solve_first(problem, bare, kinds, solver)
+    if attempt.decides:
+        return attempt
+    limits = _Limits.find(bare, starts, solver)
+    enough = [kind for kind in limits.heaviest if kind.value >= problem.task.payload_mass]
+    again = _solve_first(problem, bare, enough, solver)
+    again = replace(again, kinds=(*kinds, *again.kinds), starts=2 * starts)
+    if again.decides:
+        return again
+    return replace(again, result=replace(again.result, message=limits.sentence),
+                   not_found=not kinds and not enough, hopeless=limits.hopeless)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Limits:
+    """The heaviest payloads and the shortest durations that were found near a task."""
+
+    bare: MotionProblem
+    starts: int
+    heaviest: list[KindOfMotion]
+    shortest: list[KindOfMotion]
+
+    @classmethod
+    def find(cls, bare: MotionProblem, starts: int, solver: Solver) -> _Limits:
+        """Explore both."""
+        heaviest, shortest = (find_kinds(bare, free, starts, solver.monitor)
+                              for free in (Free.PAYLOAD, Free.DURATION))
+        return cls(bare=bare, starts=starts, heaviest=heaviest, shortest=shortest)
+
+    @property
+    def hopeless(self) -> bool:
+        """Return whether both limits speak against the task."""
+        task = self.bare.task
+        near = _NEAR_FLEXIBLE if self.bare.model.arm.n_modes else _NEAR
+        late = bool(self.shortest) and near * self.shortest[0].value > task.duration
+        if not self.heaviest:
+            return late
+        return late or self.heaviest[0].value < near * task.payload_mass
+
+    @property
+    def sentence(self) -> str:
+        """Return what was found, and that it proves nothing."""
+        task, parts = self.bare.task, []
+        if self.heaviest and task.payload_mass:
+            parts.append(f'the heaviest payload found in {task.duration:g} s is '
+                         f'{self.heaviest[0].value:.4g} kg')
+        if self.shortest:
+            parts.append(f'the shortest duration found with {task.payload_mass:g} kg is '
+                         f'{self.shortest[0].value:.4g} s')
+        rigid = ' (of the arm made rigid)' if self.bare.model.arm.n_modes else ''
+        found = f'{", ".join(parts)}{rigid}' if parts else 'nor near it'
+        return (f'no motion with {task.payload_mass:g} kg in {task.duration:g} s was found from '
+                f'{self.starts} starts; {found}. This does not show that there is none')
+
+
+def _solve_first(problem: MotionProblem, bare: MotionProblem, kinds: list[KindOfMotion],
+                 solver: Solver) -> Attempt:
+    """Return the first motion that Newton's method reaches from kinds, or the last failure."""
+    result = CollocationResult.failed(bare.straight_line(
+        solver.settings.intervals, solver.settings.rule), 'no kind of motion was found')
+    for kind in kinds[:_TRIED]:
+        result = _solve_from(problem, bare, kind, solver)
+        if result.converged or result.status in INTERRUPTED:
+            break
+    return Attempt(result=result, kinds=tuple(kinds), starts=SearchEffort.NORMAL.starts)
+
+
+def _solve_from(problem: MotionProblem, bare: MotionProblem, kind: KindOfMotion,
+                solver: Solver) -> CollocationResult:
+    """Solve a problem from a kind of motion: without its weights first, then with them."""
+    guess = as_guess(bare, kind, solver)
+    if not has_weights(problem):
+        return solver.solve(problem, guess)
+    result = solver.coarse().solve(bare, guess)
+    return raise_weights_from(problem, result.solution, solver) if result.converged else result
+
+
+def as_guess(problem: MotionProblem, kind: KindOfMotion, solver: Solver) -> CollocationSolution:
+    """Return the motion of a kind as a guess, stretched to the duration, lifted if need be."""
+    motion = kind.motion.solution
+    guess = motion.stretched(problem.task.duration / motion.mesh[-1])
+    return guess if guess.nodes.shape[1] == problem.size else lift(problem, guess, solver)

@@ -1,0 +1,95 @@
+"""From a kind of motion of the rigid arm to a motion of the arm itself, at the same price."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from flex_planner.base.errors import FlexPlannerError
+from flex_planner.collocation import Solver
+from flex_planner.optimal_control.motion_problem import MotionProblem
+from flex_planner.planning.kinds.clusters import KindOfMotion
+from flex_planner.planning.kinds.explorer import ExploredMotion
+from flex_planner.planning.strategies.extremals import Extremal, SearchStart
+from flex_planner.planning.strategies.first_extremals import lift_extremal, transfer_extremal
+from flex_planner.planning.strategies.free_parameters import FreeParameter
+from flex_planner.planning.strategies.initial_guesses import lift
+from flex_planner.planning.strategies.ipopt_continuation import transcribe_at_price
+import numpy as np
+
+# kinds that are lifted to a flexible arm
+_LIFTED = 2
+# a motion is of its kind if its value is no worse than this share
+_KEPT = 0.01
+# rigid motions that are lifted in turn: at these shares of the price
+_CHEAPER = (1.0, 1 / 8, 1 / 64)
+
+
+def solve_best_kind(parameter: FreeParameter, problem: MotionProblem,
+                    kinds: Sequence[KindOfMotion], solver: Solver) -> Extremal | None:
+    """
+    Return the motion, solved exactly, that the best kind leads to; None if none does.
+
+    Parameters
+    ----------
+    parameter : FreeParameter
+        What is free.
+    problem : MotionProblem
+        With the least demanding value of interest, and no weights but R.
+    kinds : sequence of KindOfMotion
+        Of the arm made rigid, the best first.
+    solver : Solver
+        If its monitor interrupts it, the extremal says so.
+
+    """
+    if not problem.model.arm.n_modes:
+        solved = (_solve_rigid(parameter, problem, kind.motion, solver) for kind in kinds)
+        return next((one for one in solved if one is not None), None)
+    best: Extremal | None = None
+    for kind in kinds[:_LIFTED]:
+        found = _lift(parameter, problem, kind.motion, solver)
+        if found is not None and (best is None or found.interrupted
+                                  or parameter.improves(found.value, best.value)):
+            best = found
+        if best is not None and best.interrupted:
+            break
+    return best
+
+
+def _solve_rigid(parameter: FreeParameter, problem: MotionProblem, motion: ExploredMotion,
+                 solver: Solver) -> Extremal | None:
+    """Return the rigid arm's motion at the price of its kind; None if that is left."""
+    start = SearchStart(value=motion.value, price=motion.price, solution=motion.solution)
+    found = transfer_extremal(parameter, problem, start, solver)
+    if found is None or found.interrupted:
+        return found
+    worst = motion.value - _KEPT * motion.value * np.sign(
+        1 if parameter.improves(1.0, 0.0) else -1)
+    return None if parameter.improves(worst, found.value) else found
+
+
+def _lift(parameter: FreeParameter, problem: MotionProblem, motion: ExploredMotion,
+          solver: Solver) -> Extremal | None:
+    """Return the flexible arm's motion that a rigid one leads to."""
+    rigid = _rigid_extremals(parameter, motion, solver)
+    found = lift_extremal(parameter, problem, rigid, solver)
+    if found is not None:
+        return found
+    return transcribe_at_price(parameter, problem, motion.price, motion.value,
+                               lambda near: lift(near, motion.solution, solver), solver)
+
+
+def _rigid_extremals(parameter: FreeParameter, motion: ExploredMotion,
+                     solver: Solver) -> list[Extremal]:
+    """Return exact motions of the rigid arm at prices up to that of the exploration."""
+    found: list[Extremal] = []
+    problem, guess = motion.problem, motion.solution
+    for share in _CHEAPER:
+        try:
+            extremal = parameter.solve_at_price(problem, guess, share * motion.price, solver)
+        except FlexPlannerError:  # a payload too heavy to hold
+            break
+        if extremal is None or extremal.interrupted:
+            break
+        found.insert(0, extremal)
+        problem, guess = extremal.problem, extremal.result.solution
+    return found

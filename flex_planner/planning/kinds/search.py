@@ -1,0 +1,128 @@
+"""The kinds of motion of a task, from many starts: for a limit, and for a plan that is hard."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from itertools import chain, islice
+
+from flex_planner.base.errors import InvalidTaskError
+from flex_planner.base.progress import Monitor
+from flex_planner.optimal_control.boundary_conditions import holding_limit
+from flex_planner.optimal_control.direct.unknowns import Free
+from flex_planner.optimal_control.motion_problem import MotionProblem
+from flex_planner.planning.kinds.clusters import cluster, kind_of, KindOfMotion, merge
+from flex_planner.planning.kinds.explorer import ExploredMotion, Explorer
+from flex_planner.planning.kinds.paths import fixed_paths, JointPath, random_paths
+from flex_planner.planning.strategies.initial_guesses import rigid_problem
+import numpy as np
+
+# kinds that are confirmed on finer meshes, and how many are tried for that
+_CONFIRMED, _TRIED = 3, 8
+# an exploration for a plan ends once the best value came twice, after some starts
+_FEWEST, _TWICE, _SAME = 4, 2, 0.01
+
+
+def find_kinds(problem: MotionProblem, free: Free, starts: int,
+               monitor: Monitor) -> list[KindOfMotion]:
+    """
+    Return the kinds of motion of a task, taken as rigid, the best first.
+
+    Parameters
+    ----------
+    problem : MotionProblem
+        Of the arm, rigid or not.
+    free : Free
+        Payload or duration for the limit of a task; nothing for motions of least effort.
+    starts : int
+        How many starts to explore.
+    monitor : Monitor
+        Receives progress.
+
+    Returns
+    -------
+    list of KindOfMotion
+        Values that stand on a mesh twice as fine; empty where the rigid arm cannot do the task,
+        or the goal is approached at a price only.
+
+    Raises
+    ------
+    StoppedError
+        If the monitor stopped it.
+
+    """
+    rigid = rigid_twin(problem)
+    if rigid is None or not starts:
+        return []
+    most = np.inf
+    if free is Free.PAYLOAD:
+        most = holding_limit(problem.model, problem.task, problem.parameters)[0]
+    explorer = Explorer(rigid, free, monitor, most)
+    motions = list(_explore(explorer, rigid, free, starts, monitor))
+    better = is_better(free)
+    return _confirm(explorer, cluster(motions, better), better)
+
+
+def is_better(free: Free) -> Callable[[float, float], bool]:
+    """Return whether a value is better than another: payloads count up, others down."""
+    if free is Free.PAYLOAD:
+        return lambda value, other: value > other
+    return lambda value, other: value < other
+
+
+def rigid_twin(problem: MotionProblem) -> MotionProblem | None:
+    """Return the problem of the arm made rigid; None where that is no motion to explore."""
+    if np.isfinite(problem.goal_weights).any():
+        return None
+    if not problem.model.arm.n_modes:
+        return problem
+    try:
+        return rigid_problem(problem)
+    except InvalidTaskError:  # motors that hold the bent arm may be too weak for the straight one
+        return None
+
+
+def starting_paths(problem: MotionProblem, count: int) -> Iterator[JointPath]:
+    """Yield the first paths of an exploration of a rigid arm."""
+    n, gravity = problem.model.arm.n_joints, bool(problem.model.arm.gravity.any())
+    start, goal = problem.start[:n], problem.goal[:n]
+    return islice(chain(fixed_paths(start, goal, gravity=gravity), random_paths(start, goal)),
+                  count)
+
+
+def has_settled(motions: list[ExploredMotion], better: Callable[[float, float], bool]) -> bool:
+    """Return whether the best value came twice, after some starts."""
+    if len(motions) < _FEWEST:
+        return False
+    best = motions[0].value
+    for motion in motions:
+        best = motion.value if better(motion.value, best) else best
+    return sum(abs(one.value - best) <= _SAME * abs(best) for one in motions) >= _TWICE
+
+
+def _explore(explorer: Explorer, rigid: MotionProblem, free: Free, starts: int,
+             monitor: Monitor) -> Iterator[ExploredMotion]:
+    """Yield the motions met; for a limit from all starts, for a plan until it has settled."""
+    met: list[ExploredMotion] = []
+    for i, path in enumerate(starting_paths(rigid, starts), 1):
+        monitor.phase = f'kinds of motion, start {i} of {starts}'
+        motion = explorer.explore(path)
+        if motion is not None:
+            met.append(motion)
+            yield motion
+        if free is Free.NOTHING and has_settled(met, is_better(free)):
+            return
+
+
+def _confirm(explorer: Explorer, kinds: list[KindOfMotion],
+             better: Callable[[float, float], bool]) -> list[KindOfMotion]:
+    """Return the best kinds with values that stand on finer meshes."""
+    confirmed: list[KindOfMotion] = []
+    for kind in kinds[:_TRIED]:
+        if len(confirmed) >= _CONFIRMED and not better(kind.value, confirmed[-1].value):
+            break
+        motion = explorer.confirm(kind.motion)
+        if motion is None:
+            continue
+        confirmed = merge(confirmed, replace(kind_of(motion), met=kind.met), better)
+    return confirmed
