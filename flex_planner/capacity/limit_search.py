@@ -17,7 +17,7 @@ from flex_planner.collocation import CollocationSolution, Solver
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.planning.kinds.clusters import KindOfMotion
 from flex_planner.planning.kinds.effort import SearchEffort
-from flex_planner.planning.kinds.lift import solve_best_kind
+from flex_planner.planning.kinds.lift import solve_best_kind, walk_back
 from flex_planner.planning.kinds.search import find_kinds
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_problem import INTERRUPTED_STATUS, plan_problem
@@ -165,12 +165,22 @@ class LimitSearch:
         self.warm = known is not None
         if known is None:
             known = self._explore(bare, solver)
+            if known is not None and not known.interrupted:
+                self._follow_kind(bare, known, solver)
+                return
         for problem in self._parameter.starts(bare):
             self.extremals = collect_to_limit(
                 approach_limit(self._parameter, problem, solver, first=known,
                                target_gap=self._target_gap), self._accuracy)
             if self.extremals[0].result.converged or self.extremals[0].interrupted:
                 return
+
+    def _follow_kind(self, bare: MotionProblem, known: Extremal, solver: Solver) -> None:
+        """Collect extremals of a kind of motion: some with less, for others to start from."""
+        before = walk_back(self._parameter, known, self._parameter.value(bare), solver)
+        self.extremals = [*before, *collect_to_limit(
+            approach_limit(self._parameter, bare, solver, first=known,
+                           target_gap=self._target_gap), self._accuracy)]
 
     def _transfer(self, bare: MotionProblem, start: SearchStart,
                   solver: Solver) -> Extremal | None:

@@ -21,7 +21,9 @@ _LIFTED = 2
 # a motion is of its kind if its value is no worse than this share
 _KEPT = 0.01
 # rigid motions that are lifted in turn: at these shares of the price
-_CHEAPER = (1.0, 1 / 8, 1 / 64)
+_CHEAPER = (1 / 2, 1 / 8, 1 / 64)
+# by so much the price falls from one motion of a front to the one before; so many are enough
+_BACK, _MOST_BACK = 4.0, 6
 
 
 def solve_best_kind(parameter: FreeParameter, problem: MotionProblem,
@@ -93,3 +95,39 @@ def _rigid_extremals(parameter: FreeParameter, motion: ExploredMotion,
         found.insert(0, extremal)
         problem, guess = extremal.problem, extremal.result.solution
     return found
+
+
+def walk_back(parameter: FreeParameter, known: Extremal, least: float,
+              solver: Solver) -> list[Extremal]:
+    """
+    Return motions of a rigid arm at lower and lower prices, the lowest first.
+
+    They are the front of a limit that an exploration has found at once: what a little less takes.
+
+    Parameters
+    ----------
+    parameter : FreeParameter
+        What is free.
+    known : Extremal
+        Where the front ends.
+    least : float
+        Value at which it may begin.
+    solver : Solver
+        If its monitor interrupts the walk, it ends.
+
+    """
+    front: list[Extremal] = []
+    here = known
+    while not known.problem.model.arm.n_modes and len(front) < _MOST_BACK:
+        try:
+            found = parameter.solve_at_price(here.problem, here.result.solution,
+                                             here.price / _BACK, solver)
+        except FlexPlannerError:  # no payload at all
+            break
+        if found is None or found.interrupted or not parameter.improves(found.value, least):
+            break
+        if not parameter.improves(here.value, found.value):
+            break
+        front.insert(0, found)
+        here = found
+    return front
