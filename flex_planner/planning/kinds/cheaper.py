@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from flex_planner.collocation import CollocationResult, CollocationSolution, INTERRUPTED, Solver
+from flex_planner.optimal_control.direct.unknowns import Free
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.totals import integrate_totals
 from flex_planner.planning.kinds.clusters import (
@@ -19,7 +20,7 @@ from flex_planner.planning.kinds.clusters import (
     kind_of,
     KindOfMotion,
 )
-from flex_planner.planning.kinds.explorer import ExploredMotion, sample_angles
+from flex_planner.planning.kinds.explorer import ExploredMotion, Explorer, sample_angles
 from flex_planner.planning.kinds.paths import JointPath
 from flex_planner.planning.kinds.search import has_settled, rigid_twin, starting_paths
 from flex_planner.planning.strategies.initial_guesses import lift
@@ -29,7 +30,9 @@ import numpy as np
 _STAGES, _INTERVALS, _MOST_INTERVALS, _TOLERANCE, _ITERATIONS, _MESHES = 4, 16, 64, 1e-2, 30, 3
 # starts at most, and Newton iterations: of a rigid arm (some 0.8 ms each), and in units of what
 # the plan of a flexible one took
-_STARTS, _RIGID_BUDGET, _FLEXIBLE_BUDGET = 12, 500, 5
+_STARTS, _RIGID_BUDGET, _FLEXIBLE_BUDGET = 16, 500, 5
+# where Newton's method converges from less than this share of the starts, IPOPT tries the first
+_FEW, _BY_IPOPT = 0.5, 4
 # another kind is worth solving if it is cheaper by this share, and so many are
 _CHEAPER, _SOLVED = 0.01, 2
 
@@ -93,16 +96,31 @@ def find_cheaper(problem: MotionProblem, found: CollocationResult,
 def _explore(problem: MotionProblem, rigid: MotionProblem, own: KindOfMotion,
              solver: Solver) -> tuple[list[ExploredMotion], int]:
     """Return motions of the rigid arm, its own included where it is rigid, and the starts."""
+    is_rigid = rigid is problem
+    paths = list(starting_paths(rigid, _STARTS))
+    motions, starts = _explore_by_newton(
+        rigid, paths[is_rigid:], [own.motion] if is_rigid else [],
+        _RIGID_BUDGET if is_rigid else _FLEXIBLE_BUDGET * solver.monitor.iteration, solver)
+    if is_rigid and len(motions) < _FEW * starts and not solver.monitor.stop_reason():
+        explorer = Explorer(rigid, Free.NOTHING, solver.monitor)
+        met = [explorer.explore(path) for path in paths[:_BY_IPOPT]]
+        motions += [motion for motion in met if motion is not None]
+        starts += _BY_IPOPT
+    return motions, starts
+
+
+def _explore_by_newton(rigid: MotionProblem, paths: list[JointPath],
+                       motions: list[ExploredMotion], budget: int,
+                       solver: Solver) -> tuple[list[ExploredMotion], int]:
+    """Return motions known and met, until they have settled or a budget of iterations is used."""
     coarse = solver.with_settings(
         stages=_STAGES, intervals=_INTERVALS, max_intervals=_MOST_INTERVALS,
         error_tolerance=_TOLERANCE, max_iterations=_ITERATIONS, max_meshes=_MESHES)
-    is_rigid, monitor = rigid is problem, solver.monitor
-    motions = [own.motion] if is_rigid else []
-    budget = _RIGID_BUDGET if is_rigid else _FLEXIBLE_BUDGET * monitor.iteration
-    began, starts = monitor.iteration, 1
-    for path in list(starting_paths(rigid, _STARTS))[is_rigid:]:
+    monitor, starts = solver.monitor, len(motions)
+    began = monitor.iteration
+    for path in paths:
         if (monitor.iteration - began >= budget or monitor.stop_reason()
-                or has_settled(motions, lambda value, other: value < other)):
+                or has_settled(motions, starts, lambda value, other: value < other)):
             break
         starts += 1
         monitor.phase = f'kinds of motion, start {starts}'

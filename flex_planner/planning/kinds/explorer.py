@@ -31,6 +31,8 @@ _ITERATIONS, _TOLERANCE, _FINE_TOLERANCE = 100, 1e-4, 1e-6
 # the price of what is free, in units of the largest possible cost by the mass of the links, or by
 # the duration; it goes with R, so that the motion does not depend on it
 _PRICE = 20.0
+# of the largest payload of use: IPOPT passes its bounds by a little
+_BELOW = 1 - 1e-6
 # of a free payload: where it starts, by the mass of the links
 _FIRST_PAYLOAD = 0.3
 # of a free duration, by that of the task
@@ -85,7 +87,7 @@ class Explorer:
     def __init__(self, problem: MotionProblem, free: Free, monitor: Monitor,
                  most_payload: float = np.inf) -> None:
         self._problem, self._free, self._monitor = problem, free, monitor
-        self._most = min(most_payload, _heaviest(problem))
+        self._most = min(_BELOW * most_payload, _heaviest(problem))
         self._price = _price(problem, free)
         self._directs: dict[int, DirectProblem] = {}
 

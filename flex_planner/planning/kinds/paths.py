@@ -86,9 +86,9 @@ def fixed_paths(start: Array, goal: Array, *, gravity: bool) -> Iterator[JointPa
         yield JointPath(start, goal, wave(-_SWING, *rest))
 
 
-def random_paths(start: Array, goal: Array) -> Iterator[JointPath]:
-    """Yield the same random detours for each task, without end."""
-    generator = np.random.default_rng(_SEED)
+def random_paths(start: Array, goal: Array, seed: int = _SEED) -> Iterator[JointPath]:
+    """Yield random detours without end, the same for each task."""
+    generator = np.random.default_rng(seed)
     falling = 1 / np.arange(1, _TERMS + 1)[:, None]
     while True:
         for deviation in _RANDOM:

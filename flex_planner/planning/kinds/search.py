@@ -19,8 +19,8 @@ import numpy as np
 
 # kinds that are confirmed on finer meshes, and how many are tried for that
 _CONFIRMED, _TRIED = 3, 8
-# an exploration for a plan ends once the best value came twice, after some starts
-_FEWEST, _TWICE, _SAME = 4, 2, 0.01
+# an exploration for a plan ends once the best value came so often, after some starts
+_FEWEST, _OFTEN, _SAME = 8, 3, 0.01
 
 
 def find_kinds(problem: MotionProblem, free: Free, starts: int,
@@ -90,14 +90,15 @@ def starting_paths(problem: MotionProblem, count: int) -> Iterator[JointPath]:
                   count)
 
 
-def has_settled(motions: list[ExploredMotion], better: Callable[[float, float], bool]) -> bool:
-    """Return whether the best value came twice, after some starts."""
-    if len(motions) < _FEWEST:
+def has_settled(motions: list[ExploredMotion], starts: int,
+                better: Callable[[float, float], bool]) -> bool:
+    """Return whether the best value came often, after some starts."""
+    if starts < _FEWEST or not motions:
         return False
     best = motions[0].value
     for motion in motions:
         best = motion.value if better(motion.value, best) else best
-    return sum(abs(one.value - best) <= _SAME * abs(best) for one in motions) >= _TWICE
+    return sum(abs(one.value - best) <= _SAME * abs(best) for one in motions) >= _OFTEN
 
 
 def _explore(explorer: Explorer, rigid: MotionProblem, free: Free, starts: int,
@@ -110,7 +111,7 @@ def _explore(explorer: Explorer, rigid: MotionProblem, free: Free, starts: int,
         if motion is not None:
             met.append(motion)
             yield motion
-        if free is Free.NOTHING and has_settled(met, is_better(free)):
+        if free is Free.NOTHING and has_settled(met, i, is_better(free)):
             return
 
 
