@@ -8,13 +8,17 @@ Optimal paths for a given payload: Korayem et al. 2009, section 4.1.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any
 
+from flex_planner.base.errors import InvalidTaskError
 from flex_planner.base.progress import Monitor
+from flex_planner.base.validation import integer
 from flex_planner.collocation import CollocationSolution, Solver
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
 from flex_planner.optimal_control.task import Task
-from flex_planner.planning.kinds.clusters import KindOfMotion
+from flex_planner.planning.kinds.clusters import KindOfMotion, MOST_KINDS
 from flex_planner.planning.kinds.effort import SearchEffort
 from flex_planner.planning.kinds.kinds_strategy import as_guess
 from flex_planner.planning.objectives import Objectives
@@ -88,6 +92,40 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
     if objectives is None or not plan.solved:
         return plan
     return adapt_weights(plan, objectives, solver)
+
+
+def plan_kind(task: Task, number: int, **options: Any) -> Plan:
+    """
+    Plan a motion of another kind than the best.
+
+    Parameters
+    ----------
+    task : Task
+        The motion.
+    number : int
+        0 or 1 for the best kind, 2 to 4 for another one of `Plan.kinds`.
+    options
+        Of `plan_path`.
+
+    Raises
+    ------
+    InvalidTaskError
+        If there are not so many kinds, or one of `plan_path`.
+    InvalidValueError
+        If the number breaks its bound.
+
+    """
+    integer('kind', number, at_least=0, at_most=MOST_KINDS)
+    best = plan_path(task, **options)
+    if number <= 1 or not best.solved:
+        return best
+    if number > len(best.kinds):
+        raise InvalidTaskError(f'kind is {number}, but must be at most {len(best.kinds)}: so many '
+                               f'kinds of motion were found from {best.starts} starts')
+    chosen = best.kinds[number - 1]
+    plan = plan_path(task, **{**options, 'start_from': chosen})
+    others = tuple(kind for kind in best.kinds if kind is not chosen)
+    return replace(plan, kinds=(*plan.kinds[:1], *others), starts=best.starts)
 
 
 def _given(start: Plan | KindOfMotion | CollocationSolution | None, problem: MotionProblem,

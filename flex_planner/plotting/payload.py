@@ -56,7 +56,8 @@ def _result(found: MaxPayload) -> str:
     """Return the result in a line."""
     if not found.solved:
         return found.status.value
-    return f'largest payload {found.payload:.6g} kg, too much {found.local_upper:.6g} kg'
+    return (f'largest payload {found.payload:.6g} kg, this kind of motion ends at '
+            f'{found.local_upper:.6g} kg')
 
 
 def _draw_front(axes: Sequence[Axes], found: MaxPayload) -> None:

@@ -6,7 +6,8 @@ from collections.abc import Iterable, Sequence
 
 from flex_planner.capacity.results import MaxPayload
 from flex_planner.planning.certificate import Certificate
-from flex_planner.planning.plan import Peaks, Plan, PlanStatus
+from flex_planner.planning.kinds.clusters import KindOfMotion
+from flex_planner.planning.plan import Peaks, Plan
 import numpy as np
 
 Row = tuple[str, str]
@@ -62,6 +63,7 @@ def plan_rows(plan: Plan, peaks: Peaks | None) -> list[Row]:
     rows = [('status', plan.status.value),
             planning_row(plan.planning_time, plan.strategy, f'{plan.iterations} iterations',
                          intervals)]
+    rows += kind_rows(plan.kinds, plan.starts, 'J = ', '')
     rows += objective_rows(plan)
     return rows if peaks is None else [*rows, *motion_rows(plan, peaks)]
 
@@ -76,6 +78,15 @@ def motion_rows(plan: Plan, peaks: Peaks) -> list[Row]:
             peaks.speeds, peaks.speed_shares, peaks.torques, peaks.torque_shares))),
         ('motors on their limit', _saturation(plan)),
         *certificate_rows(plan.certificate)]
+
+
+def kind_rows(kinds: Sequence[KindOfMotion], starts: int, before: str, after: str) -> list[Row]:
+    """Return the kinds of motion that were met, the best first, with what each is worth."""
+    if not kinds:
+        return []
+    rows = [('kinds of motion', f'{len(kinds)} found from {starts} starts')]
+    return rows + [(f'  kind {i}', f'{before}{kind.value:.6g}{after}: {kind.sentence} (met '
+                                   f'{kind.met} times)') for i, kind in enumerate(kinds, 1)]
 
 
 def _saturation(plan: Plan) -> str:
@@ -117,6 +128,10 @@ def payload_rows(found: MaxPayload, peaks: Peaks | None) -> list[Row]:
             ('largest payload', _bracket(found))]
     if found.limiting_joint is not None:
         rows.append(('limited by', _limit(found)))
+    if np.isfinite(found.proved_upper):
+        rows.append(('proved', f'no motion carries more than {found.proved_upper:.6g} kg '
+                               f'({found.proof})'))
+    rows += kind_rows(found.kinds, found.starts, '', ' kg')
     if found.plan is None or peaks is None:
         return rows
     return [*rows, ('strategy of the motion', found.plan.strategy),
@@ -128,9 +143,9 @@ def _bracket(found: MaxPayload) -> str:
     below = f'{found.payload:.6g} kg' if found.payload else 'none found'
     if not np.isfinite(found.local_upper):
         return below
-    if found.status is PlanStatus.SOLVED:
-        return f'{below}; {found.local_upper:.6g} kg is too much'
-    return f'{below}; no solution at {found.local_upper:.6g} kg'
+    if found.held:
+        return f'{below}; {found.local_upper:.6g} kg cannot be held at the goal'
+    return f'{below}; this kind of motion ends at {found.local_upper:.6g} kg'
 
 
 def _limit(found: MaxPayload) -> str:

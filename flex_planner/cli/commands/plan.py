@@ -14,8 +14,9 @@ from flex_planner.cli.outputs import add_outputs, Outputs
 from flex_planner.cli.progress_line import run_with_progress
 from flex_planner.cli.request import add_objectives, add_task, Request, translate_errors
 from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.planning.kinds.effort import SearchEffort
 from flex_planner.planning.plan import Peaks, peaks, Plan, PlanStatus
-from flex_planner.planning.plan_path import plan_path
+from flex_planner.planning.plan_path import plan_kind
 from flex_planner.planning.sampling import sample_plan, SampledPlan
 from flex_planner.reports.motion import (
     payload_rows,
@@ -35,6 +36,10 @@ def add_commands(commands: Commands) -> None:
         'plan', help='plan a motion', description='Plan the motion of least cost.')
     add_task(plan, payload='mass at the tip (default: 0)')
     add_objectives(plan)
+    _add_kinds(plan)
+    plan.add_argument('--kind', type=int, default=1, metavar='N',
+                      help='plan the N-th of the kinds of motion that are listed, 1 to 4 '
+                      '(default: 1, the best)')
     add_outputs(plan)
     plan.set_defaults(run=_plan)
     payload = commands.add_parser(
@@ -42,6 +47,7 @@ def add_commands(commands: Commands) -> None:
         description='Find the largest payload that the arm can carry, and plan the motion.')
     add_task(payload, payload='smallest payload of interest (default: 0)')
     _add_search(payload)
+    _add_kinds(payload)
     add_outputs(payload)
     payload.set_defaults(run=_payload)
 
@@ -58,14 +64,23 @@ def _add_search(parser: argparse.ArgumentParser) -> None:
                         help='first step of the incremental method (default: 1)')
 
 
+def _add_kinds(parser: argparse.ArgumentParser) -> None:
+    """Add the option for how many kinds of motion are looked for."""
+    parser.add_argument('--search', choices=[effort.value for effort in SearchEffort],
+                        default=SearchEffort.NORMAL.value,
+                        help='how many kinds of motion are looked for: fast follows one '
+                        '(default: %(default)s)')
+
+
 def _plan(options: argparse.Namespace) -> int:
     """Plan a motion; print, draw and record it."""
     request = Request.of(options)
     outputs = Outputs.of(options, request)
 
     def work(model: ArmModel, monitor: Monitor) -> Plan:
-        return plan_path(request.task, model=model, monitor=monitor,
-                         objectives=request.objectives)
+        with translate_errors():
+            return plan_kind(request.task, options.kind, model=model, monitor=monitor,
+                             objectives=request.objectives, search=options.search)
 
     plan = run_with_progress(request.task.arm, request.time_limit, work)
     reference, most = _sample(request, plan)
@@ -87,7 +102,7 @@ def _payload(options: argparse.Namespace) -> int:
         with translate_errors():
             return find_max_payload(
                 request.task, model=model, monitor=monitor, accuracy=accuracy, step=step,
-                method=PayloadMethod[options.method.upper()])
+                method=PayloadMethod[options.method.upper()], search=options.search)
 
     found = run_with_progress(request.task.arm, request.time_limit, work)
     reference, most = _sample(request, found.plan)

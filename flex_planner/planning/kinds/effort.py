@@ -12,7 +12,7 @@ class SearchEffort(Enum):
     How many starts a search over kinds of motion may take.
 
     ``FAST`` follows the kind that a straight start leads to. ``NORMAL`` explores the arm made
-    rigid from 16 starts where a limit is wanted, and from 4 to 12 for a plan. ``THOROUGH``
+    rigid from 16 starts where a limit is wanted, and from 8 to 16 for a plan. ``THOROUGH``
     explores from 48.
 
     """

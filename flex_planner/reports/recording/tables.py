@@ -56,7 +56,7 @@ def verdict(request: RecordedRequest, check: MotionCheck | None = None) -> str:
 def tables(request: RecordedRequest, check: MotionCheck | None = None,
            frequencies: NaturalFrequencies | None = None) -> list[ReportTable]:
     """Return the tables of a report."""
-    found = [_task(request), _outcome(request)]
+    found = [_task(request), _outcome(request), *_kinds(request)]
     if request.solved:
         found.append(_certificate(request))
     if check is not None:
@@ -124,6 +124,20 @@ def _outcome(request: RecordedRequest) -> ReportTable:
     return ReportTable(title='Outcome', rows=tuple(rows))
 
 
+def _kinds(request: RecordedRequest) -> list[ReportTable]:
+    """Return the kinds of motion that were met; older recordings have none."""
+    report = request.report
+    values = getattr(report, 'kind_values', ())
+    if not len(values):
+        return []
+    rows = zip(values, report.kind_sentences, report.kind_counts, strict=True)
+    unit = 'J' if request.search is None else 'payload [kg]'
+    return [ReportTable(
+        title=f'Kinds of motion, from {report.kind_starts} starts',
+        columns=(unit, 'how it moves', 'met'),
+        rows=tuple((f'{value:.6g}', words, str(count)) for value, words, count in rows))]
+
+
 def _certificate(request: RecordedRequest) -> ReportTable:
     """Return the certificate with the limits that it was held against."""
     limits = {entry.name: getattr(CertificateLimits(), entry.name)
@@ -169,7 +183,8 @@ def _search(search: Any) -> ReportTable:
         ('method', 'payload as an unknown at a rising price' if search.method == search.DIRECT
          else 'payload raised step by step'),
         ('largest payload', f'{search.payload:.6g} kg'),
-        ('too much, or no solution', f'{search.payload_upper:.6g} kg'),
+        ('this kind of motion ends at', f'{search.payload_upper:.6g} kg'),
+        ('proved', getattr(search, 'proof', '') or '–'),
         ('accuracy asked for', f'{search.payload_accuracy:g} kg'),
         ('limiting joint', '–' if search.limiting_joint < 0 else
          f'{search.limiting_joint + 1}{", which can hold no more" if search.held else ""}')))

@@ -8,7 +8,12 @@ from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.validation import number
 from flex_planner.capacity.results import MaxPayload, PayloadMethod
 from flex_planner.optimal_control.task import MAX_PAYLOAD
-from flex_planner.ros.messages.plans import failure_report, report_from_plan, STATUS_CODES
+from flex_planner.ros.messages.plans import (
+    add_kinds,
+    failure_report,
+    report_from_plan,
+    STATUS_CODES,
+)
 from flex_planner.ros.settings.planner import MAX_ACCURACY, MIN_ACCURACY, PlannerSettings
 from flex_planner_interfaces.msg import PayloadSearch, PlanReport
 from flex_planner_interfaces.srv import FindMaxPayload
@@ -16,6 +21,8 @@ from flex_planner_interfaces.srv import FindMaxPayload
 METHODS = {PayloadSearch.DIRECT: PayloadMethod.DIRECT,
            PayloadSearch.INCREMENTAL: PayloadMethod.INCREMENTAL}
 _CODES = {method: code for code, method in METHODS.items()}
+
+_UNKNOWN = float('inf')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,7 +67,8 @@ def search_without_result(request: FindMaxPayload.Request) -> PayloadSearch:
     """Return the message of a search that failed before it began."""
     return PayloadSearch(
         method=request.method, payload_accuracy=request.payload_accuracy,
-        payload_step=request.payload_step, payload_upper=float('inf'), limiting_joint=-1)
+        payload_step=request.payload_step, payload_upper=_UNKNOWN,
+        payload_local_upper=_UNKNOWN, payload_proved_upper=_UNKNOWN, limiting_joint=-1)
 
 
 def search_message(found: MaxPayload, options: SearchOptions) -> PayloadSearch:
@@ -68,8 +76,11 @@ def search_message(found: MaxPayload, options: SearchOptions) -> PayloadSearch:
     front, trials, joint = found.front, found.trials, found.limiting_joint
     return PayloadSearch(
         method=_CODES[found.method], payload_accuracy=options.accuracy,
-        payload_step=options.step, payload=float(found.payload) if found.solved else 0.0,
-        payload_upper=float(found.local_upper), limiting_joint=-1 if joint is None else int(joint),
+        payload_step=options.step, payload=float(found.payload),
+        payload_upper=float(found.local_upper), payload_local_upper=float(found.local_upper),
+        payload_proved_upper=float(found.proved_upper),
+        proof='' if found.proof is None else str(found.proof),
+        limiting_joint=-1 if joint is None else int(joint),
         held=bool(found.held), front_payloads=front.payloads.tolist(),
         front_efforts=front.efforts.tolist(), front_prices=front.prices.tolist(),
         tried_payloads=[float(trial.payload) for trial in trials],
@@ -87,6 +98,8 @@ def report_from_search(found: MaxPayload) -> PlanReport:
                                 f'{found.status.value}: {found.message}')
         report.strategy = found.method.value
     report.iterations = found.iterations
+    if found.kinds:
+        add_kinds(report, found.kinds, found.starts)
     return report
 
 

@@ -19,6 +19,7 @@ from flex_planner.base.errors import (
 from flex_planner.base.progress import StopReason
 from flex_planner.base.validation import Array, number
 from flex_planner.optimal_control.task import postures_from_points, Task
+from flex_planner.planning.kinds.clusters import KindOfMotion
 from flex_planner.planning.objectives import Objectives
 from flex_planner.planning.plan import peaks, Plan, PlanStatus, Samples
 from flex_planner.planning.sampling import SampledPlan
@@ -146,11 +147,20 @@ def report_from_plan(plan: Plan) -> PlanReport:
     report.saturation = plan.saturation.tolist()
     report.velocity_weights = plan.task.velocity_weights.tolist()
     report.effort_weights = plan.task.effort_weights.tolist()
+    add_kinds(report, plan.kinds, plan.starts)
     trials = plan.objectives.trials if plan.objectives else ()
     report.tried_objectives = [trial.objective.value for trial in trials]
     report.tried_weights = [float(trial.weight) for trial in trials]
     report.tried_shares = [float(trial.share) for trial in trials]
     return report
+
+
+def add_kinds(report: PlanReport, kinds: Sequence[KindOfMotion], starts: int) -> None:
+    """List kinds of motion in a report."""
+    report.kind_values = [float(kind.value) for kind in kinds]
+    report.kind_sentences = [kind.sentence for kind in kinds]
+    report.kind_counts = [kind.met for kind in kinds]
+    report.kind_starts = starts
 
 
 def add_reference(report: PlanReport, plan: Plan, reference: SampledPlan) -> None:

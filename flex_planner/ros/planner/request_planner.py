@@ -14,7 +14,7 @@ from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import Plan
-from flex_planner.planning.plan_path import plan_path
+from flex_planner.planning.plan_path import plan_kind
 from flex_planner.planning.sampling import sample_plan
 from flex_planner.planning.strategies.initial_guesses import WARM_START
 from flex_planner.ros.messages.payload_searches import (
@@ -88,9 +88,10 @@ class RequestPlanner:
         def plan_task(task: Task, monitor: Monitor) -> Outcome:
             monitor.payload = task.payload_mass
             cell = self._starts.near(task, searched=False)
-            plan = plan_path(task, model=self._model, solver=settings.solver(),
+            plan = plan_kind(task, message.kind, model=self._model, solver=settings.solver(),
                              monitor=monitor, objectives=objectives_from_message(message),
-                             start_from=cell.motion.solution() if cell else None)
+                             start_from=cell.motion.solution() if cell else None,
+                             search=settings.search)
             report = report_from_plan(plan)
             if cell and plan.strategy == WARM_START:
                 report.map_cell = cell.place
@@ -121,7 +122,7 @@ class RequestPlanner:
             found = find_max_payload(
                 task, model=self._model, solver=settings.solver(), monitor=monitor,
                 method=options.method, accuracy=options.accuracy, step=options.step,
-                start_from=cell.motion.start() if cell else None)
+                start_from=cell.motion.start() if cell else None, search=settings.search)
             report = report_from_search(found)
             if cell and found.warm:
                 report.map_cell = cell.place

@@ -11,6 +11,7 @@ from flex_planner.base.errors import InvalidSizeError, InvalidValueError
 from flex_planner.base.validation import vector
 from flex_planner.collocation import Solver, SolverSettings
 from flex_planner.optimal_control.task import MAX_PAYLOAD
+from flex_planner.planning.kinds.effort import SearchEffort
 from flex_planner.planning.sampling import SamplingSettings
 from flex_planner.ros.runtime.parameters import parameter_field
 
@@ -63,6 +64,9 @@ class PlannerSettings:
     error_tolerance: float = parameter_field(
         1e-6, 'Largest estimated error of states and costates relative to their magnitude.',
         lowest=1e-11, highest=1.0)
+    search: str = parameter_field(
+        'normal', 'How many kinds of motion are looked for: fast (one), normal, or thorough. '
+        'Requests that start from the cell of a map stay in its kind.')
     sampling_step: float = parameter_field(
         0.01, 'Longest time between published samples [s].', lowest=2.5e-4, highest=1.0)
     torque_tolerance: float = parameter_field(
@@ -93,6 +97,7 @@ class PlannerSettings:
         if 0 < self.max_recording_size < MIN_RECORDING_SIZE:
             raise InvalidValueError('max_recording_size', self.max_recording_size,
                                     f'0 or at least {MIN_RECORDING_SIZE} bytes')
+        SearchEffort.of(self.search)
         self.solver()
         self.sampling()
 
