@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 from flex_planner.collocation import CollocationResult, CollocationSolution, INTERRUPTED
 from flex_planner.optimal_control.motion_problem import MotionProblem
 import numpy as np
+
+# from a payload or duration to how far from the limit is near enough
+TargetGap = Callable[[float], float]
+
+
+def no_target(value: float) -> float:
+    """Return 0: go as far as the prices lead."""
+    return 0.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -12,7 +12,12 @@ from flex_planner.collocation import (
     Solver,
 )
 from flex_planner.optimal_control.motion_problem import MotionProblem
-from flex_planner.planning.strategies.extremals import Extremal, SearchStart
+from flex_planner.planning.strategies.extremals import (
+    Extremal,
+    no_target,
+    SearchStart,
+    TargetGap,
+)
 from flex_planner.planning.strategies.free_parameters import FreeParameter, PAYLOAD
 from flex_planner.planning.strategies.homotopies import raise_weights
 from flex_planner.planning.strategies.initial_guesses import (
@@ -22,11 +27,7 @@ from flex_planner.planning.strategies.initial_guesses import (
     rigid_problem,
 )
 from flex_planner.planning.strategies.ipopt_continuation import continue_by_ipopt
-from flex_planner.planning.strategies.price_continuation import (
-    continue_in_price,
-    no_target,
-    TargetGap,
-)
+from flex_planner.planning.strategies.price_continuation import continue_in_price
 
 # largest mesh of a first motion, in units of the coarsest that overlooks nothing
 _FIRST_MESHES, _FIRST_INTERVALS, _FIRST_ITERATIONS = 4, 200, 15

@@ -28,9 +28,8 @@ from flex_planner.optimal_control.direct.conversion import to_solution
 from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectSettings
 from flex_planner.optimal_control.free_problem import FreeProblem
 from flex_planner.optimal_control.motion_problem import MotionProblem
-from flex_planner.planning.strategies.extremals import Extremal
+from flex_planner.planning.strategies.extremals import Extremal, TargetGap
 from flex_planner.planning.strategies.free_parameters import FreeParameter, PAYLOAD
-from flex_planner.planning.strategies.price_continuation import TargetGap
 import numpy as np
 
 # points per interval, intervals of the first mesh and of the finest
@@ -43,6 +42,10 @@ _NEWTON, _EXACT = 30, 1e-7
 # the first price, by a rigid arm's; it is raised so much at most, to what leaves this share of
 # the gap that is wanted
 _FIRST, _DEARER, _SURE, _LEAST_FACTOR = 4.0, 16.0, 0.8, 1.5
+
+# a jump in price where Newton's method has stalled: to this share of the gap wanted, within bounds,
+# on a mesh of so many intervals
+_SURE_JUMP, _LEAST_JUMP, _JUMP, _JUMP_INTERVALS = 0.5, 4.0, 64.0, 60
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -117,6 +120,37 @@ def transcribe_at_price(parameter: FreeParameter, problem: MotionProblem, price:
         return None
     mesh = np.linspace(0, near.task.duration, max(_INTERVALS, fewest) + 1, dtype=np.float64)
     return _solve_at_price(parameter, near, price, mesh, make_guess(near), solver)
+
+
+def jump_in_price(parameter: FreeParameter, here: Extremal, target_gap: TargetGap,
+                  solver: Solver) -> Extremal | None:
+    """
+    Return a motion at a much higher price, where Newton's method alone comes on in small steps.
+
+    Parameters
+    ----------
+    parameter : FreeParameter
+        What is free.
+    here : Extremal
+        The motion to jump from.
+    target_gap : callable
+        From a value to the gap that is wanted.
+    solver : Solver
+        If its monitor interrupts it, the extremal says so.
+
+    """
+    problem, guess = here.problem, here.result.solution
+    fewest = problem.fewest_intervals(_STAGES)
+    if np.isfinite(problem.goal_weights).any() or fewest > _MOST_FIRST:
+        return None
+    wanted = target_gap(here.value)
+    factor = _JUMP if not wanted else float(
+        np.clip(here.gap / (_SURE_JUMP * wanted), _LEAST_JUMP, _JUMP))
+    mesh = _level(problem, guess, max(_JUMP_INTERVALS, fewest))
+    found = _solve_at_price(parameter, problem, factor * here.price, mesh, guess, solver)
+    if found is None or found.interrupted:
+        return found
+    return found if parameter.improves(found.value, here.value) else None
 
 
 def _factor(extremal: Extremal, largest: float, target_gap: TargetGap) -> float:

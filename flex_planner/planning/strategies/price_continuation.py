@@ -7,38 +7,33 @@ Which of the two is a `FreeParameter`; the steps are the same for both.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 
 from flex_planner.base.errors import FlexPlannerError, NoEquilibriumError
 from flex_planner.collocation import CollocationResult, INTERRUPTED, Solver, SolverStatus
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import MAX_DURATION
-from flex_planner.planning.strategies.extremals import Extremal
+from flex_planner.planning.strategies.extremals import Extremal, no_target, TargetGap
 from flex_planner.planning.strategies.free_parameters import (
     DURATION,
     FreeParameter,
     SHORTER,
     solve_stretched,
 )
-
-# from a payload or duration to how far from the limit is near enough
-TargetGap = Callable[[float], float]
+from flex_planner.planning.strategies.ipopt_continuation import jump_in_price
 
 # of the price from one motion to the next; grows where that is easy, shrinks where it fails
 _FACTOR, _LARGEST_FACTOR, _SMALLEST_FACTOR = 4.0, 16.0, 1.02
 _EASY = 8
+# below this factor in price IPOPT is asked for a jump, so often
+_STALLED, _MOST_JUMPS = 2.0, 4
 # near a limit the price is raised to what leaves this share of the gap that is wanted
 _CLOSE, _SURE, _LEAST_FACTOR = 0.2, 0.6, 1.5
 # the gap falls with this power of the price: 2 for rigid arms, less where links ring
 _POWER = 1.5
 # a price so near is left to Newton's method
 _NEAR_PRICE = 16.0
-
-
-def no_target(value: float) -> float:
-    """Return 0: go as far as the prices lead."""
-    return 0.0
 
 
 def continue_in_price(parameter: FreeParameter, problem: MotionProblem,
@@ -72,6 +67,7 @@ def continue_in_price(parameter: FreeParameter, problem: MotionProblem,
         return
     here = Extremal(value=parameter.value(problem), result=first, problem=problem, price=price)
     factor = _FACTOR if problem.model.arm.n_modes else _LARGEST_FACTOR
+    jumps = _MOST_JUMPS
     while factor > _SMALLEST_FACTOR:
         solver.monitor.payload = here.problem.task.payload_mass
         try:
@@ -80,7 +76,13 @@ def continue_in_price(parameter: FreeParameter, problem: MotionProblem,
             extremal = None
         if extremal is None:
             factor **= 0.5
-            continue
+            if factor >= _STALLED or not jumps:
+                continue
+            extremal = jump_in_price(parameter, here, target_gap, solver)
+            if extremal is None:
+                jumps = 0
+                continue
+            jumps -= 1
         yield extremal
         if extremal.interrupted:
             return
