@@ -186,6 +186,10 @@ def _search_in_steps(problem: MotionProblem, solver: Solver, step: float,
     upper = min(upper, holding_limit(problem.model, task, problem.parameters)[0])
     found = replace(failed, status=plan.status, message=plan.message, plan=plan, upper=upper,
                     payload=best[0] if plan.solved else 0.0, trials=tuple(trials))
+    refused = next((trial.refusal for trial in trials if trial.payload == upper), '')
+    if refused and plan.solved:
+        return replace(found, message=f'{found.payload:.6g} kg can be carried, {upper:.6g} kg '
+                       f'cannot by this kind of motion: {refused}')
     return _describe(found) if plan.solved else found
 
 

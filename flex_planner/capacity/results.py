@@ -11,6 +11,7 @@ from flex_planner.capacity.incremental import PayloadTrial
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.strategies.extremals import Extremal
+from flex_planner.planning.warnings import find_arm_warnings, PlanWarning
 import numpy as np
 
 
@@ -82,6 +83,11 @@ class LimitResult:
     def solved(self) -> bool:
         """Return whether the limit is known to the accuracy asked for."""
         return self.status is PlanStatus.SOLVED
+
+    @property
+    def warnings(self) -> tuple[PlanWarning, ...]:
+        """Return the warnings of the plan, or of the arm alone where there is none."""
+        return find_arm_warnings(self.task.arm) if self.plan is None else self.plan.warnings
 
     @property
     def restart_point(self) -> Extremal | None:

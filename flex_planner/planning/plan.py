@@ -26,6 +26,7 @@ from flex_planner.planning.objectives import (
     ObjectiveSearch,
     WeightTrial,
 )
+from flex_planner.planning.warnings import PlanWarning, WarningKind
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -116,6 +117,8 @@ class Plan:
         When a motor reaches or leaves its limit [s].
     saturation : numpy.ndarray, shape (n,)
         Share of the time that each motor spends on its limit.
+    warnings : tuple of PlanWarning
+        What is to be known of a certified motion; of the arm alone where there is none.
     objectives : ObjectiveSearch or None
         How objectives were met; None if there are none.
     iterations : int
@@ -137,14 +140,21 @@ class Plan:
     energy: float = np.inf
     switching_times: Array = field(default_factory=lambda: np.zeros(0))
     saturation: Array = field(default_factory=lambda: np.zeros(0))
+    warnings: tuple[PlanWarning, ...] = ()
     objectives: ObjectiveSearch | None = None
     iterations: int = 0
     planning_time: float = 0.0
 
     @property
     def solved(self) -> bool:
-        """Return whether the plan is certified."""
+        """Return whether the plan is certified and keeps the limits of its arm."""
         return self.status is PlanStatus.SOLVED
+
+    @property
+    def certified(self) -> bool:
+        """Return whether the motion solves its task, even if the arm may not do it."""
+        return self.status in (PlanStatus.SOLVED, PlanStatus.LIMIT_VIOLATED,
+                               PlanStatus.BENT_TOO_FAR)
 
     @property
     def arm(self) -> Arm:
@@ -247,7 +257,7 @@ class Plan:
 # what a file of a plan may hold
 _SAVED = (Plan, PlanStatus, Certificate, Task, Arm, Link, Joint, Motor, Node, ArmModel,
           MotionProblem, BoundaryConditions, Parameters, CollocationSolution, GaussRule,
-          ObjectiveSearch, Objectives, Objective, WeightTrial, Margin)
+          ObjectiveSearch, Objectives, Objective, WeightTrial, Margin, PlanWarning, WarningKind)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

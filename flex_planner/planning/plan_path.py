@@ -75,6 +75,7 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
     if objectives is not None:
         objectives.check(task)
     plan = plan_problem(problem, solver, strategies)
-    if objectives is None or not plan.solved:
+    # weights that meet an objective may well bring a motion back within its limits
+    if objectives is None or not plan.certified:
         return plan
     return adapt_weights(plan, objectives, solver)
