@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from flex_planner.capacity.results import MaxPayload
 from flex_planner.planning.certificate import Certificate
 from flex_planner.planning.plan import Peaks, Plan, PlanStatus
+from flex_planner.planning.warnings import PlanWarning
 import numpy as np
 
 Row = tuple[str, str]
@@ -62,7 +63,7 @@ def plan_rows(plan: Plan, peaks: Peaks | None) -> list[Row]:
     rows = [('status', plan.status.value),
             planning_row(plan.planning_time, plan.strategy, f'{plan.iterations} iterations',
                          intervals)]
-    rows += objective_rows(plan)
+    rows += objective_rows(plan) + warning_rows(plan.warnings)
     return rows if peaks is None else [*rows, *motion_rows(plan, peaks)]
 
 
@@ -85,6 +86,11 @@ def _saturation(plan: Plan) -> str:
     shares = ', '.join(f'joint {i} {share:.1%}' for i, share in enumerate(plan.saturation, 1))
     count = plan.switching_times.size
     return f'{shares} of the time; {count} switching time{"" if count == 1 else "s"}'
+
+
+def warning_rows(warnings: Sequence[PlanWarning]) -> list[Row]:
+    """Return the sentence of each warning."""
+    return [('warning', one.sentence) for one in warnings]
 
 
 def objective_rows(plan: Plan) -> list[Row]:
@@ -117,6 +123,7 @@ def payload_rows(found: MaxPayload, peaks: Peaks | None) -> list[Row]:
             ('largest payload', _bracket(found))]
     if found.limiting_joint is not None:
         rows.append(('limited by', _limit(found)))
+    rows += warning_rows(found.warnings)
     if found.plan is None or peaks is None:
         return rows
     return [*rows, ('strategy of the motion', found.plan.strategy),

@@ -8,7 +8,12 @@ from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.validation import number
 from flex_planner.capacity.results import MaxPayload, PayloadMethod
 from flex_planner.optimal_control.task import MAX_PAYLOAD
-from flex_planner.ros.messages.plans import failure_report, report_from_plan, STATUS_CODES
+from flex_planner.ros.messages.plans import (
+    add_warnings,
+    failure_report,
+    report_from_plan,
+    STATUS_CODES,
+)
 from flex_planner.ros.settings.planner import MAX_ACCURACY, MIN_ACCURACY, PlannerSettings
 from flex_planner_interfaces.msg import PayloadSearch, PlanReport
 from flex_planner_interfaces.srv import FindMaxPayload
@@ -86,6 +91,7 @@ def report_from_search(found: MaxPayload) -> PlanReport:
         report = failure_report(STATUS_CODES[found.status],
                                 f'{found.status.value}: {found.message}')
         report.strategy = found.method.value
+        add_warnings(report, found.warnings)
     report.iterations = found.iterations
     return report
 

@@ -22,6 +22,7 @@ from flex_planner.optimal_control.task import postures_from_points, Task
 from flex_planner.planning.objectives import Objectives
 from flex_planner.planning.plan import peaks, Plan, PlanStatus, Samples
 from flex_planner.planning.sampling import SampledPlan
+from flex_planner.planning.warnings import PlanWarning
 from flex_planner.ros.settings.planner import PlannerSettings
 from flex_planner_interfaces.msg import (
     FlexiblePoint,
@@ -78,7 +79,8 @@ def task_from_message(message: MotionTask, arm: Arm, settings: PlannerSettings) 
         effort_weights=np.asarray(message.effort_weights or settings.effort_weights),
         position_weights=np.asarray(message.position_weights),
         velocity_weights=np.asarray(message.velocity_weights),
-        tolerance=tolerance or settings.tolerance)
+        tolerance=tolerance or settings.tolerance,
+        allow_large_bending=message.allow_large_bending)
 
 
 def objectives_from_message(message: MotionTask) -> Objectives | None:
@@ -144,6 +146,7 @@ def report_from_plan(plan: Plan) -> PlanReport:
         setattr(report, name, float(getattr(plan.certificate, name)))
     report.switching_times = plan.switching_times.tolist()
     report.saturation = plan.saturation.tolist()
+    add_warnings(report, plan.warnings)
     report.velocity_weights = plan.task.velocity_weights.tolist()
     report.effort_weights = plan.task.effort_weights.tolist()
     trials = plan.objectives.trials if plan.objectives else ()
@@ -151,6 +154,12 @@ def report_from_plan(plan: Plan) -> PlanReport:
     report.tried_weights = [float(trial.weight) for trial in trials]
     report.tried_shares = [float(trial.share) for trial in trials]
     return report
+
+
+def add_warnings(report: PlanReport, warnings: Sequence[PlanWarning]) -> None:
+    """Add warnings to a report: identifiers and sentences."""
+    report.warning_kinds = [one.kind.name for one in warnings]
+    report.warnings = [one.sentence for one in warnings]
 
 
 def add_reference(report: PlanReport, plan: Plan, reference: SampledPlan) -> None:
