@@ -20,7 +20,7 @@ import numpy as np
 from plan_checks import solution_of
 import pytest
 
-# of estimate and simulation; what a dozen arms had
+# of estimate and simulation; what twenty arms and motions had
 ABOUT = 3.0
 
 
