@@ -8,7 +8,7 @@ between a start and a goal that keep them. `find_limit_violations` says where.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 import math
 
@@ -16,7 +16,6 @@ from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationSolution
 from flex_planner.optimal_control.motion_problem import MotionProblem
 import numpy as np
-from numpy.typing import NDArray
 
 # [rad], and as a share of max_speed: by how much a limit may be passed. Motions are exact to a
 # millionth, so less than this is rounding, as of a start that is its joint's limit.
@@ -101,11 +100,13 @@ def find_limit_violations(problem: MotionProblem,
         Empty where all limits are kept to `MARGIN`.
 
     """
-    found = []
-    samples = None
-    for limit in _limits(problem):
-        samples = solution.values_at(_POSITIONS) if samples is None else samples
-        time, excess = _largest(solution, limit, samples)
+    limits, found = _limits(problem), list[LimitViolation]()
+    if not limits:
+        return ()
+    joints = _joint_motion(problem, solution)
+    samples = joints.values_at(_POSITIONS)
+    for limit in limits:
+        time, excess = _largest(joints, limit, samples)
         if excess > limit.margin:
             value = limit.bound + limit.sign * excess
             found.append(LimitViolation(joint=limit.joint, kind=limit.kind, time=time,
@@ -115,7 +116,7 @@ def find_limit_violations(problem: MotionProblem,
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Limit:
-    """A bound of one unknown: sign * (z[column] - bound) is to be at most the margin."""
+    """A bound of an angle or a speed: sign * (x[column] - bound) is to be at most the margin."""
 
     joint: int
     kind: LimitKind
@@ -124,36 +125,44 @@ class _Limit:
     bound: float
     margin: float
 
-    def excess(self, z: Array) -> Array:
-        """Return by how much unknowns (..., m) are beyond the bound."""
-        beyond: Array = self.sign * (z[..., self.column] - self.bound)
+    def excess(self, x: Array) -> Array:
+        """Return by how much angles and speeds (..., 2 n) are beyond the bound."""
+        beyond: Array = self.sign * (x[..., self.column] - self.bound)
         return beyond
 
 
 def _limits(problem: MotionProblem) -> list[_Limit]:
     """Return the finite limits of all joints; a speed has one in each direction."""
-    n_t, found = problem.model.arm.n_coordinates, []
+    n, found = problem.model.arm.n_joints, []
     for i, joint in enumerate(problem.task.arm.joints):
         speed = joint.motor.max_speed
         for kind, column, sign, bound, margin in (
                 (LimitKind.LOWER_ANGLE, i, -1.0, joint.lower_limit, MARGIN),
                 (LimitKind.UPPER_ANGLE, i, 1.0, joint.upper_limit, MARGIN),
-                (LimitKind.SPEED, n_t + i, -1.0, -speed, MARGIN * speed),
-                (LimitKind.SPEED, n_t + i, 1.0, speed, MARGIN * speed)):
+                (LimitKind.SPEED, n + i, -1.0, -speed, MARGIN * speed),
+                (LimitKind.SPEED, n + i, 1.0, speed, MARGIN * speed)):
             if math.isfinite(bound):
                 found.append(_Limit(joint=i, kind=kind, column=column, sign=sign, bound=bound,
                                     margin=margin))
     return found
 
 
+def _joint_motion(problem: MotionProblem, solution: CollocationSolution) -> CollocationSolution:
+    """Return angles and speeds of the joints alone, 2 n unknowns."""
+    n, n_t = problem.model.arm.n_joints, problem.model.arm.n_coordinates
+    kept = np.r_[0:n, n_t:n_t + n]
+    return replace(solution, nodes=solution.nodes[:, kept], stages=solution.stages[..., kept])
+
+
 def _largest(solution: CollocationSolution, limit: _Limit, samples: Array) -> tuple[float, float]:
     """Return time and size of the largest excess, < 0 where the limit is kept."""
     beyond = limit.excess(samples)  # (N, k)
     k, i = np.unravel_index(int(beyond.argmax()), beyond.shape)
-    times: NDArray[np.float64] = solution.times_at(_POSITIONS)
-    center, step = float(times[k, i]), float(solution.steps[k]) / (_POSITIONS.size - 1)
-    if center in (solution.mesh[0], solution.mesh[-1]):
+    center, step = float(solution.times_at(_POSITIONS)[k, i]), 1 / (_POSITIONS.size - 1)
+    # between samples a motion rises by less than from one to the next
+    if beyond[k, i] + np.abs(np.diff(beyond, axis=1)).max() < 0:
         return center, float(beyond[k, i])
+    step *= float(solution.steps[k])
     for _ in range(_ZOOMS):
         near = np.clip(center + step * _AROUND, solution.mesh[0], solution.mesh[-1])
         values = limit.excess(solution(near))
