@@ -9,11 +9,9 @@ where the arm is in its own way. They cost a thousandth of a second or two and c
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from itertools import combinations
-import math
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import link_points
@@ -22,10 +20,10 @@ from flex_planner.collocation import CollocationSolution
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.planning.bending import find_largest_bending, NOTABLE
 from flex_planner.planning.certificate import CertificateLimits
+from flex_planner.planning.link_overlaps import find_overlap
 from flex_planner.planning.mode_count import estimate_left_out
 from flex_planner.planning.torque_jumps import find_torque_jumps
 import numpy as np
-from numpy.typing import NDArray
 
 # share of the stall torque: after a jump by more, less torque is left to the feedback than the
 # jump itself has, so that it cannot make up for a drive that is late
@@ -34,8 +32,6 @@ _LARGE_JUMP = 0.5
 _ROUNDING = 1e-6
 # share of the reach
 _NEAR_BASE = 0.1
-# [rad], of a joint from where its link is folded back onto the one before
-_FOLDED = math.radians(10)
 # of the link's own inertia about its joint: less makes the joint as light as none
 _LIGHT_JOINT = 0.01
 
@@ -221,43 +217,13 @@ def _tip_near_base(motion: _Motion) -> PlanWarning | None:
 
 def _links_overlap(motion: _Motion) -> PlanWarning | None:
     """Warn of links that are where others are; whether they hit depends on their planes."""
-    met = next(_overlaps(motion), None)
-    if met is None:
+    found = find_overlap(motion.points, motion.coordinates[:, :motion.arm.n_joints])
+    if found is None:
         return None
-    time, how = met
+    time = float(motion.times[found.moment])
     return PlanWarning(
         kind=WarningKind.LINKS_OVERLAP, time=time, sentence=(
-            f'{how} at {time:.4g} s: they pass only if they move in different planes'))
-
-
-def _overlaps(motion: _Motion) -> Iterator[tuple[float, str]]:
-    """Yield when links overlap, and how: first links that cross, then neighbours that fold."""
-    starts, ends = motion.points[:, :, 0], motion.points[:, :, 1]
-    for i, j in combinations(range(motion.arm.n_joints), 2):
-        crossing = np.zeros(0) if j == i + 1 else np.flatnonzero(
-            _cross(starts[:, i], ends[:, i], starts[:, j], ends[:, j]))
-        if crossing.size:
-            yield float(motion.times[crossing[0]]), f'links {i + 1} and {j + 1} cross'
-    for i in range(1, motion.arm.n_joints):
-        opened = np.abs(np.remainder(motion.coordinates[:, i], 2 * np.pi) - np.pi)
-        k = int(opened.argmin())
-        if opened[k] < _FOLDED:
-            yield float(motion.times[k]), (
-                f'links {i} and {i + 1} lie within {math.degrees(opened[k]):.2g} deg over one '
-                'another')
-
-
-def _cross(a: Array, b: Array, c: Array, d: Array) -> NDArray[np.bool_]:
-    """Return whether segments a-b and c-d cross, points (k, 2)."""
-    def side(p: Array, q: Array, r: Array) -> Array:
-        """Return on which side of the line p-q a point is."""
-        s, t = q - p, r - p
-        turn: Array = s[:, 0] * t[:, 1] - s[:, 1] * t[:, 0]
-        return turn
-
-    crossing: NDArray[np.bool_] = ((side(a, b, c) * side(a, b, d) < 0)
-                                   & (side(c, d, a) * side(c, d, b) < 0))
-    return crossing
+            f'{found} at {time:.4g} s: they pass only if they move in different planes'))
 
 
 def _too_few_modes(motion: _Motion) -> PlanWarning | None:
