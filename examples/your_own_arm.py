@@ -66,6 +66,8 @@ def main() -> None:
     print(f'hanging to level in 1 s: {plan.status.value}, {plan.strategy}')
     print(f'tip error {plan.certificate.tip_error * 1e3:.1e} mm, remaining vibration '
           f'{plan.certificate.residual_vibration * 1e3:.1e} mm')
+    for warning in plan.warnings:  # what a certificate cannot know
+        print(f'warning: {warning.sentence}')
     print(f'pictures and files: {FOLDER}/my_arm*')
 
 

@@ -91,7 +91,7 @@ class Link:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Motor:
     """
-    Torque limits of a D.C. motor at the joint, eq. (15): ``+-stall_torque`` at standstill.
+    Limits of a D.C. motor at the joint: torque, eq. (15), ``+-stall_torque`` at standstill; speed.
 
     Parameters
     ----------
@@ -100,6 +100,9 @@ class Motor:
     no_load_speed : float
         Speed at which the driving torque is used up, > 0 [rad/s]; infinite for limits that do
         not depend on the speed.
+    max_speed : float
+        Largest speed of the joint in either direction, of a gear or a bearing for example, > 0
+        [rad/s]; infinite for none. It is checked in every plan, but does not bend the motion.
 
     Raises
     ------
@@ -110,10 +113,12 @@ class Motor:
 
     stall_torque: float = math.inf
     no_load_speed: float = math.inf
+    max_speed: float = math.inf
 
     def __post_init__(self) -> None:
         number('stall_torque', self.stall_torque, above=0, infinite=True, unit='N m')
         number('no_load_speed', self.no_load_speed, above=0, infinite=True, unit='rad/s')
+        number('max_speed', self.max_speed, above=0, infinite=True, unit='rad/s')
         if math.isinf(self.stall_torque) and math.isfinite(self.no_load_speed):
             raise InvalidValueError('no_load_speed', self.no_load_speed,
                                     'infinite where stall_torque is infinite')
@@ -132,11 +137,12 @@ class Joint:
     Parameters
     ----------
     motor : Motor
-        Torque limits.
+        Limits of torque and speed.
     viscous_friction : float
         >= 0 [N m s/rad].
     lower_limit, upper_limit : float
-        Of the joint angle at start and goal [rad]; infinite for none.
+        Of the joint angle at start and goal, which a task must keep, and on the way, which a plan
+        must keep to be solved [rad]; infinite for none.
 
     Raises
     ------

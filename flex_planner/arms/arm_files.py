@@ -178,8 +178,12 @@ def _joint(section: YamlSection) -> Joint:
     motor = Motor()
     if section.has('motor'):
         part = section.section('motor')
-        motor = part.build(Motor, stall_torque=part.take('stall_torque'),
-                           no_load_speed=part.take('no_load_speed', math.inf))
+        # a motor may have a largest speed alone
+        torque = (part.take('stall_torque', math.inf) if part.has('max_speed')
+                  else part.take('stall_torque'))
+        motor = part.build(Motor, stall_torque=torque,
+                           no_load_speed=part.take('no_load_speed', math.inf),
+                           max_speed=part.take('max_speed', math.inf))
     joint: Joint = section.build(
         Joint, motor=motor, viscous_friction=section.take('viscous_friction', 0.0),
         lower_limit=section.take('lower_limit', -math.inf),

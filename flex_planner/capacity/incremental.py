@@ -22,6 +22,7 @@ from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.planning.certificate import simulate_to_goal
 from flex_planner.planning.strategies.catalogue import QUICK
 from flex_planner.planning.strategies.initial_guesses import warm_start
+from flex_planner.planning.verdict import find_refusal
 import numpy as np
 
 _RTOL = 1e-8
@@ -39,10 +40,12 @@ class PayloadTrial:
     step : float
         That led to it [kg].
     solved : bool
-        Whether the motion was found and meets the task's tolerance.
+        Whether the motion was found, meets the task's tolerance and keeps the arm's limits.
     boundary_error : float
         Left side of eq. (17) with W_p = W_v = 1, where the torque found leads; also of a motion
         that is no solution.
+    refusal : str
+        Why the arm may not do a motion that was found, see `find_refusal`; empty if it may.
 
     """
 
@@ -51,6 +54,7 @@ class PayloadTrial:
     solved: bool
     boundary_error: float
     result: CollocationResult = field(repr=False)
+    refusal: str = ''
 
     @property
     def interrupted(self) -> bool:
@@ -122,5 +126,7 @@ def _try_payload(problem: MotionProblem, start: CollocationSolution, payload: fl
     if result.status not in INTERRUPTED:
         final, goal = simulate_to_goal(heavier, result.solution, solver.monitor, _RTOL)
         error = float(np.nan_to_num((final - goal) @ (final - goal) / 2, nan=np.inf))
+    reached = result.converged and error <= problem.task.tolerance
+    refused = find_refusal(heavier, result.solution) if reached else None
     return PayloadTrial(payload=payload, step=step, boundary_error=error, result=result,
-                        solved=result.converged and error <= problem.task.tolerance)
+                        solved=reached and refused is None, refusal=refused[1] if refused else '')

@@ -177,6 +177,11 @@ def search_in_steps(problem: MotionProblem, solver: Solver, step: float,
                     local_upper=min(upper, held))
     if plan.solved:
         found = replace(found, plan=plan, payload=best[0])
+    refused = next((trial.refusal for trial in trials if trial.payload == upper), '')
+    if refused and plan.solved and stopped is None:
+        return replace(_with_bound(found, problem), message=(
+            f'{found.payload:.6g} kg can be carried, {upper:.6g} kg cannot by this kind of '
+            f'motion: {refused}'))
     return _describe(_with_bound(found, problem))
 
 

@@ -13,6 +13,7 @@ from flex_planner.planning.kinds.clusters import KindOfMotion
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.proofs import Proof
 from flex_planner.planning.strategies.extremals import Extremal
+from flex_planner.planning.warnings import find_arm_warnings, PlanWarning
 import numpy as np
 
 
@@ -91,6 +92,11 @@ class LimitResult:
     def solved(self) -> bool:
         """Return whether the limit is known to the accuracy asked for."""
         return self.status is PlanStatus.SOLVED
+
+    @property
+    def warnings(self) -> tuple[PlanWarning, ...]:
+        """Return the warnings of the plan, or of the arm alone where there is none."""
+        return find_arm_warnings(self.task.arm) if self.plan is None else self.plan.warnings
 
     @property
     def restart_point(self) -> Extremal | None:

@@ -97,7 +97,7 @@ def task_message(request: Request) -> MotionTask:
         position_weights=task.position_weights.tolist(),
         velocity_weights=task.velocity_weights.tolist(),
         effort_weights=task.effort_weights.tolist(), tolerance=task.tolerance,
-        allowed_planning_time=request.time_limit)
+        allow_large_bending=task.allow_large_bending, allowed_planning_time=request.time_limit)
     for name in OBJECTIVE_FIELDS if request.objectives else ():
         setattr(message, name, getattr(request.objectives, name).tolist())
     if request.points is None:

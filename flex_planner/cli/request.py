@@ -77,7 +77,8 @@ class Request:
             task = Task(
                 arm=arm, start_positions=start, goal_positions=goal, duration=options.duration,
                 payload_mass=options.payload_mass, payload_inertia=options.payload_inertia,
-                tolerance=options.tolerance, **_weights(options, arm))
+                tolerance=options.tolerance, allow_large_bending=options.allow_large_bending,
+                **_weights(options, arm))
             objectives = _objectives(options, task)
         return cls(task=task, points=points, elbow=options.elbow, time_limit=limit,
                    objectives=objectives)
@@ -123,6 +124,8 @@ def add_task(parser: argparse.ArgumentParser, payload: str) -> None:
         add(f'--{name}-weights', metavar='W,W,...', help=f'diagonal of {what}')
     add('--tolerance', type=float, default=1e-3, metavar='EPS',
         help='largest allowed half squared error of the final state, eq. (17) (default: 0.001)')
+    add('--allow-large-bending', action='store_true',
+        help='accept links that bend by more than 0.3 of their length, though beams are linear')
     add('--time-limit', type=float, default=MAX_TIME_LIMIT, metavar='S',
         help='give up after this time (default and maximum: %(default)g)')
 

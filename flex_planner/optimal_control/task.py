@@ -53,6 +53,9 @@ class Task:
         added to eq. (6). The larger it is, the nearer the motion comes to minimum time.
     tolerance : float
         eps of eq. (17) with W_p = W_v = 1, > 0 and at most 1.
+    allow_large_bending : bool
+        Whether a plan may bend links by more than 0.3 of their length, though they are linear
+        beams.
 
     Raises
     ------
@@ -76,6 +79,7 @@ class Task:
     goal_velocity_weights: Array = field(default_factory=lambda: np.zeros(0))
     time_weight: float = 0.0
     tolerance: float = 1e-3
+    allow_large_bending: bool = False
 
     if TYPE_CHECKING:
         # arrays are made of anything like one; type checkers would insist on arrays
@@ -86,7 +90,7 @@ class Task:
                 velocity_weights: ArrayLike = ..., start_velocities: ArrayLike = ...,
                 goal_velocities: ArrayLike = ..., goal_position_weights: ArrayLike = ...,
                 goal_velocity_weights: ArrayLike = ..., time_weight: float = ...,
-                tolerance: float = ...) -> None:
+                tolerance: float = ..., allow_large_bending: bool = ...) -> None:
             """Accept lists where arrays are kept."""
 
     @classmethod

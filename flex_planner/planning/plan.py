@@ -28,6 +28,7 @@ from flex_planner.planning.objectives import (
     ObjectiveSearch,
     WeightTrial,
 )
+from flex_planner.planning.warnings import PlanWarning, WarningKind
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -123,6 +124,8 @@ class Plan:
         are of the arm made rigid.
     starts : int
         How many starts led to them.
+    warnings : tuple of PlanWarning
+        What is to be known of a certified motion; of the arm alone where there is none.
     objectives : ObjectiveSearch or None
         How objectives were met; None if there are none.
     iterations : int
@@ -146,14 +149,21 @@ class Plan:
     saturation: Array = field(default_factory=lambda: np.zeros(0))
     kinds: tuple[KindOfMotion, ...] = ()
     starts: int = 1
+    warnings: tuple[PlanWarning, ...] = ()
     objectives: ObjectiveSearch | None = None
     iterations: int = 0
     planning_time: float = 0.0
 
     @property
     def solved(self) -> bool:
-        """Return whether the plan is certified."""
+        """Return whether the plan is certified and keeps the limits of its arm."""
         return self.status is PlanStatus.SOLVED
+
+    @property
+    def certified(self) -> bool:
+        """Return whether the motion solves its task, even if the arm may not do it."""
+        return self.status in (PlanStatus.SOLVED, PlanStatus.LIMIT_VIOLATED,
+                               PlanStatus.BENT_TOO_FAR)
 
     @property
     def arm(self) -> Arm:
@@ -257,7 +267,7 @@ class Plan:
 _SAVED = (Plan, PlanStatus, Certificate, Task, Arm, Link, Joint, Motor, Node, ArmModel,
           MotionProblem, BoundaryConditions, Parameters, CollocationSolution, GaussRule,
           ObjectiveSearch, Objectives, Objective, WeightTrial, Margin, KindOfMotion,
-          ExploredMotion)
+          ExploredMotion, PlanWarning, WarningKind)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

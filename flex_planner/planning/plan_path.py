@@ -89,7 +89,8 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
                     problem=problem, solution=None)
     plan = plan_problem(problem, solver, (*_given(start_from, problem, solver), *strategies),
                         effort)
-    if objectives is None or not plan.solved:
+    # weights that meet an objective may well bring a motion back within its limits
+    if objectives is None or not plan.certified:
         return plan
     return adapt_weights(plan, objectives, solver)
 

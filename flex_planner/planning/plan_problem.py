@@ -19,6 +19,8 @@ from flex_planner.planning.strategies.catalogue import CATALOGUE
 from flex_planner.planning.strategies.initial_guesses import WARM_START
 from flex_planner.planning.strategies.price_continuation import free_duration
 from flex_planner.planning.strategies.strategy import Attempt, Strategy
+from flex_planner.planning.verdict import judge
+from flex_planner.planning.warnings import find_arm_warnings
 
 INTERRUPTED_STATUS = {SolverStatus.TIMEOUT: PlanStatus.TIMEOUT,
                       SolverStatus.CANCELED: PlanStatus.CANCELED}
@@ -65,7 +67,9 @@ def plan_problem(problem: MotionProblem, solver: Solver,
     except StoppedError as error:
         plan = Plan(task=problem.task, status=STOP_STATUS[error.reason], message=str(error),
                     strategy='', problem=problem, solution=None)
-    return replace(plan, iterations=solver.monitor.iteration,
+    # where there is no motion to judge, the arm may say why
+    warnings = plan.warnings or find_arm_warnings(problem.task.arm)
+    return replace(plan, warnings=warnings, iterations=solver.monitor.iteration,
                    planning_time=solver.monitor.elapsed)
 
 
@@ -155,7 +159,7 @@ def _certify(plan: Plan, result: CollocationResult, solver: Solver) -> Plan:
                        switching_times=result.switches, saturation=total.saturation)
         reasons = limits.violations(certificate)
         if not reasons:
-            return replace(plan, status=PlanStatus.SOLVED, message=describe_choice(plan))
+            return judge(replace(plan, message=describe_choice(plan)))
         if refinements < _REFINEMENTS:
             solver.monitor.phase = 'mesh refinement'
             reached = min(solver.settings.error_tolerance, float(result.errors.max()))

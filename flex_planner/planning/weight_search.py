@@ -57,7 +57,7 @@ def adapt_weights(plan: Plan, objectives: Objectives, solver: Solver) -> Plan:
     Parameters
     ----------
     plan : Plan
-        Solved, with the weights of the task.
+        Certified, with the weights of the task.
     objectives : Objectives
         Checked against the task.
     solver : Solver

@@ -12,6 +12,7 @@ from flex_planner.base.validation import Array
 from flex_planner.dynamics.statics import equilibrium, natural_modes
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.parameters import Parameters
+from flex_planner.planning.warnings import find_arm_warnings
 import numpy as np
 
 _MOST_FREQUENCIES = 8
@@ -36,6 +37,7 @@ def describe_arm(model: ArmModel, postures: Sequence[Array], payload_mass: float
     lines = [arm.name, *_source_lines(arm.source), '', *_overview(arm, payload_mass), '']
     lines += [f'link {i}: {_describe_link(link)}' for i, link in enumerate(arm.links, 1)]
     lines += [f'joint {i}: {_describe_joint(joint)}' for i, joint in enumerate(arm.joints, 1)]
+    lines += [f'warning: {one.sentence}' for one in find_arm_warnings(arm)]
     for posture in postures:
         lines += ['', *_describe_posture(model, posture, parameters)]
     return '\n'.join(lines)
@@ -86,6 +88,8 @@ def _describe_joint(joint: Joint) -> str:
     else:
         parts.append(f'+-{motor.stall_torque:.4g} N m at standstill, no-load speed '
                      f'{motor.no_load_speed:.4g} rad/s')
+    if math.isfinite(motor.max_speed):
+        parts.append(f'at most {motor.max_speed:.4g} rad/s')
     if joint.viscous_friction:
         parts.append(f'friction {joint.viscous_friction:.4g} N m s/rad')
     if math.isfinite(joint.lower_limit) or math.isfinite(joint.upper_limit):

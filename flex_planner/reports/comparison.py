@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from flex_planner.planning.plan import Plan
-from flex_planner.reports.motion import columns, planning_row, Row
+from flex_planner.reports.motion import columns, planning_row, Row, warning_rows
 from flex_planner.simulation.comparison import Comparison
 from flex_planner.simulation.execution import ExecutionResult
 
@@ -11,12 +11,13 @@ _MILLI = 1e3
 
 
 def comparison_rows(comparison: Comparison) -> list[Row]:
-    """Return both plans, the simulated arm and the goal."""
+    """Return both plans, the warnings of the flexible one, the simulated arm and the goal."""
     simulated = comparison.arm
     rigidity = ', '.join(f'{link.flexural_rigidity:g}' for link in simulated.links)
     x, y = comparison.goal
     return [
         ('planned flexible', _planning(comparison.flexible)),
+        *warning_rows(comparison.flexible.warnings),
         ('planned rigid', _planning(comparison.rigid)),
         ('simulated arm', f'E I = {rigidity} N m^2, {simulated.n_modes} modes, '
                           f'{comparison.payload_mass:g} kg'),

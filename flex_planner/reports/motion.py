@@ -8,6 +8,7 @@ from flex_planner.capacity.results import MaxPayload
 from flex_planner.planning.certificate import Certificate
 from flex_planner.planning.kinds.clusters import KindOfMotion
 from flex_planner.planning.plan import Peaks, Plan
+from flex_planner.planning.warnings import PlanWarning
 import numpy as np
 
 Row = tuple[str, str]
@@ -65,6 +66,7 @@ def plan_rows(plan: Plan, peaks: Peaks | None) -> list[Row]:
                          intervals)]
     rows += kind_rows(plan.kinds, plan.starts, 'J = ', '')
     rows += objective_rows(plan)
+    rows += warning_rows(plan.warnings)
     return rows if peaks is None else [*rows, *motion_rows(plan, peaks)]
 
 
@@ -96,6 +98,11 @@ def _saturation(plan: Plan) -> str:
     shares = ', '.join(f'joint {i} {share:.1%}' for i, share in enumerate(plan.saturation, 1))
     count = plan.switching_times.size
     return f'{shares} of the time; {count} switching time{"" if count == 1 else "s"}'
+
+
+def warning_rows(warnings: Sequence[PlanWarning]) -> list[Row]:
+    """Return the sentence of each warning."""
+    return [('warning', one.sentence) for one in warnings]
 
 
 def objective_rows(plan: Plan) -> list[Row]:
@@ -132,6 +139,7 @@ def payload_rows(found: MaxPayload, peaks: Peaks | None) -> list[Row]:
         rows.append(('proved', f'no motion carries more than {found.proved_upper:.6g} kg '
                                f'({found.proof})'))
     rows += kind_rows(found.kinds, found.starts, '', ' kg')
+    rows += warning_rows(found.warnings)
     if found.plan is None or peaks is None:
         return rows
     return [*rows, ('strategy of the motion', found.plan.strategy),

@@ -52,6 +52,7 @@ NUMBERS: list[tuple[Callable[..., object], str, list[float], str]] = [
     (build_link, 'flexural_rigidity', [0.0, -1.0], '> 0 N m^2'),
     (Motor, 'stall_torque', [0.0, -8.0], '> 0 N m'),
     (Motor, 'no_load_speed', [0.0, -3.5], '> 0 rad/s'),
+    (Motor, 'max_speed', [0.0, -2.0], '> 0 rad/s'),
     (Joint, 'viscous_friction', [-0.1], '>= 0 N m s/rad'),
     (Node, 'mass', [-1.0], '>= 0 kg'),
     (Node, 'inertia', [-1.0], '>= 0 kg m^2'),
@@ -59,7 +60,7 @@ NUMBERS: list[tuple[Callable[..., object], str, list[float], str]] = [
     (build_task, 'payload_mass', [-0.1, 1.1e6], '>= 0 and <= 1e+06 kg'),
     (build_task, 'tolerance', [0.0, 1.1], '> 0 and <= 1'),
 ]
-INFINITE = {'flexural_rigidity', 'stall_torque', 'no_load_speed'}
+INFINITE = {'flexural_rigidity', 'stall_torque', 'no_load_speed', 'max_speed'}
 VECTORS = [
     # task field, its length, a bad entry, the bound in the message
     ('start_positions', 2, 100.1, '>= -100 and <= 100 rad'),

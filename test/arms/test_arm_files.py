@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from flex_planner.arms import arm_files
-from flex_planner.arms.arm import Link, Node
+from flex_planner.arms.arm import Link, Motor, Node
 from flex_planner.arms.arm_files import arm_from_mapping, ArmFileError, load_arm, preset_files
 from flex_planner.base.errors import InvalidValueError
 import pytest
@@ -88,6 +88,7 @@ MISTAKES: list[tuple[str, object, str, str]] = [
     ('joints/0/motor/stall_torque', REMOVE, 'joints[0].motor.stall_torque', 'must be given'),
     ('joints/0/motor/stall_torque', 0, 'joints[0].motor.stall_torque', '> 0 N m'),
     ('joints/0/motor/no_load_speed', -1, 'joints[0].motor.no_load_speed', '> 0 rad/s'),
+    ('joints/0/motor/max_speed', 0, 'joints[0].motor.max_speed', '> 0 rad/s'),
     ('joints/0/motor/power', 8.0, 'joints[0].motor.power', 'no such field'),
     ('joints/0/viscous_friction', -0.1, 'joints[0].viscous_friction', '>= 0 N m s/rad'),
     ('joints/1/friction', 0.1, 'joints[1].friction', 'no such field'),
@@ -152,6 +153,15 @@ def test_file_is_read_as_written(tmp_path: Path) -> None:
     assert arm.nodes[0].inertia == 2.0
     assert arm.joints[0].viscous_friction == 0.1
     assert math.isinf(arm.joints[1].motor.stall_torque)
+
+
+def test_motor_may_have_a_largest_speed_beside_its_torque_or_alone() -> None:
+    def motor(**fields: float) -> Motor:
+        return arm_from_mapping(changed('joints/1/motor', fields)).joints[1].motor
+
+    assert motor(stall_torque=4.0, max_speed=2.0) == Motor(stall_torque=4.0, max_speed=2.0)
+    assert motor(max_speed=2.0) == Motor(max_speed=2.0)
+    assert math.isinf(motor(stall_torque=4.0).max_speed)
 
 
 def of_section(**fields: Any) -> Link:

@@ -64,6 +64,19 @@ def test_text_says_what_the_paper_s_arm_is_like(capsys: pytest.CaptureFixture[st
     assert 'holding torque' not in out
 
 
+def test_limits_of_a_joint_and_what_its_inertia_lacks_are_told(
+        capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path = tmp_path / 'light.yaml'
+    path.write_text('name: light\nlinks: [{length: 0.5, mass: 3.0, flexural_rigidity: 50.0, '
+                    'modes: 1, mode_family: clamped_free}]\njoints: [{lower_limit: -1.0, '
+                    'motor: {stall_torque: 8.0, max_speed: 2.5}}]\n')
+    _, out, _ = run(capsys, str(path), '--no-plot')
+    assert 'joint 1: +-8 N m at any speed, at most 2.5 rad/s, -57.3 to inf deg\n' in out
+    assert 'warning: joint 1 has hardly any rotary inertia, but a link is clamped to it' in out
+    _, out, _ = run(capsys, 'clamped_motors', '--no-plot')
+    assert 'warning' not in out
+
+
 def test_weight_shows_as_deflection_and_torque(capsys: pytest.CaptureFixture[str]) -> None:
     _, out, _ = run(capsys, 'korayem_hanging', '--no-plot', '--posture', '0,0', '--payload', '1')
     assert 'gravity 9.81 m/s^2 in the plane' in out

@@ -15,6 +15,8 @@ def test_comparison_shows_that_the_flexible_plan_is_worth_it(
         capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     assert main([*MOTION, '--output', str(tmp_path)]) == 0
     lines = capsys.readouterr().out.splitlines()
+    assert [line[27:].partition(':')[0] for line in lines if line.startswith('warning ')] == [
+        'the torque jumps by shares of the stall torque']
     errors = {line.split('  ')[0].strip() or line[:28].strip(): line for line in lines
               if 'torque only' in line}
     arrival = {name: float(line[28:].split()[0]) for name, line in errors.items()}

@@ -114,6 +114,30 @@ def test_plan_is_told_with_its_costs_peaks_and_certificate(planned: Outcome,
     assert planned.number('re-simulated tip error') < 0.01
 
 
+def test_warnings_are_told_with_a_plan_and_with_a_largest_payload(
+        planned: Outcome, searched: Outcome) -> None:
+    assert planned.rows['warning'].startswith('the torque jumps by shares of the stall torque: ')
+    lines = [line for line in searched.out.splitlines() if line.startswith('warning ')]
+    report = recorded(searched.rows['recording'])['plan_report']
+    assert report.warning_kinds == ['TORQUE_JUMPS', 'BRAKING_TORQUE']
+    assert [line[27:] for line in lines] == report.warnings
+
+
+def test_large_bending_is_refused_unless_it_is_allowed(tmp_path: Path) -> None:
+    soft = tmp_path / 'soft.yaml'
+    soft.write_text('name: soft\nlinks: [{length: 0.5, linear_density: 0.2, modes: 1, '
+                    'flexural_rigidity: 0.3, mode_family: clamped_free}]\n'
+                    'joints: [motor: {stall_torque: 5.0}]\nnodes: [{inertia: 0.01}, {}]\n')
+    motion = ['--from-angles', '0', '--to-angles', '90', '--duration', '0.7', '--payload', '0.1']
+    refused = run('plan', str(soft), *motion, *DRY)
+    assert refused.code == 1
+    assert refused.reason.startswith('flex-planner: solved, but links bend further than the model '
+                                     'of the arm holds: link 1 bends by 50% of its length at ')
+    allowed = run('plan', str(soft), *motion, *DRY, '--allow-large-bending')
+    assert (allowed.code, allowed.rows['status']) == (0, 'solved and certified')
+    assert f'{"warning":<26} link 1 bends by 50% of its length at ' in allowed.out
+
+
 def test_progress_is_a_line_per_phase(planned: Outcome, searched: Outcome) -> None:
     for outcome, phase in ((planned, 'cold start'), (searched, 'payload at a rising price')):
         lines = outcome.err.splitlines()

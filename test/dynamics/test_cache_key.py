@@ -21,7 +21,7 @@ def test_key_of_an_arm_holds_all_that_is_compiled_and_no_more(workshop_arm: Arm)
     arms = [dataclasses.replace(workshop_arm, links=(changed, workshop_arm.links[1]))
             for changed in links]
     stiffer = dataclasses.replace(joint, viscous_friction=0.4)
-    limited = dataclasses.replace(joint, motor=Motor(), upper_limit=1.0)
+    limited = dataclasses.replace(joint, motor=Motor(max_speed=2.0), upper_limit=1.0)
     arms += [dataclasses.replace(workshop_arm, **change) for change in (
         {'name': 'other'}, {'gravity': [0.0, 0.0]}, {'nodes': (Node(),) * 3},
         {'joints': (stiffer, workshop_arm.joints[1])},

@@ -53,7 +53,7 @@ PAPER = {
 }
 PAPER_CASES = [(*arm, *case) for arm, cases in PAPER.items() for case in cases]
 DE_LUCA = {'start_positions': [0.0, 0.0], 'goal_positions': [1.0, 1.0], 'payload_mass': 0.1,
-           'payload_inertia': 0.0005}
+           'payload_inertia': 0.0005, 'allow_large_bending': True}
 SINGLE = {'start_positions': [0.0], 'goal_positions': [1.5], 'payload_mass': 0.1,
           'payload_inertia': 0.0005}
 THREE = {'start_positions': [0.0, 0.5, 0.5], 'goal_positions': [1.0, 1.0, -0.5],

@@ -1,5 +1,5 @@
 """
-Whether another kind of motion is cheaper than the one that a plan has found.
+Whether another kind of motion is cheaper than the one that a plan has found, or keeps limits.
 
 Newton's method explores the rigid arm from paths with detours and zero costates on a coarse mesh,
 which takes some ten milliseconds a start. What is cheaper there is solved for the arm itself.
@@ -24,6 +24,7 @@ from flex_planner.planning.kinds.explorer import ExploredMotion, Explorer, sampl
 from flex_planner.planning.kinds.paths import JointPath
 from flex_planner.planning.kinds.search import has_settled, rigid_twin, starting_paths
 from flex_planner.planning.strategies.initial_guesses import lift
+from flex_planner.planning.verdict import find_refusal
 import numpy as np
 
 # of the coarse mesh, and of Newton's method on it
@@ -45,7 +46,8 @@ class CheapestMotion:
     Attributes
     ----------
     result : CollocationResult
-        Of the problem; the one that was given unless another is cheaper.
+        Of the problem; the one that was given unless another is cheaper, or keeps the arm's
+        limits where that one does not.
     kinds : tuple of KindOfMotion
         Its own kind first, then the others that were met.
     starts : int
@@ -79,14 +81,17 @@ def find_cheaper(problem: MotionProblem, found: CollocationResult,
         return CheapestMotion(result=found, kinds=(own,), starts=1)
     motions, starts = _explore(problem, rigid, own, solver)
     kinds = cluster(motions, lambda value, other: value < other)
-    for kind in _cheaper_kinds(kinds, own)[:_SOLVED]:
+    refused = find_refusal(problem, found.solution) is not None
+    for kind in _worth_solving(kinds, own, refused):
         result = solver.solve(problem, _guess(problem, kind.motion.solution, solver))
         if result.status in INTERRUPTED:
             break
-        if result.converged:
-            other = _as_kind(problem, result.solution)
-            if other.value < own.value:
-                found, own = result, other
+        if not result.converged:
+            continue
+        other = _as_kind(problem, result.solution)
+        kept = find_refusal(problem, result.solution) is None
+        if kept and (refused or other.value < own.value):
+            found, own, refused = result, other, False
     others = [kind for kind in kinds if not are_alike(kind.motion.angles, own.motion.angles)]
     same = sum(kind.met for kind in kinds if kind not in others)
     return CheapestMotion(result=found, starts=starts,
@@ -101,7 +106,8 @@ def _explore(problem: MotionProblem, rigid: MotionProblem, own: KindOfMotion,
     motions, starts = _explore_by_newton(
         rigid, paths[is_rigid:], [own.motion] if is_rigid else [],
         _RIGID_BUDGET if is_rigid else _FLEXIBLE_BUDGET * solver.monitor.iteration, solver)
-    if is_rigid and len(motions) < _FEW * starts and not solver.monitor.stop_reason():
+    few = len(motions) < _FEW * starts or find_refusal(problem, own.motion.solution) is not None
+    if is_rigid and few and not solver.monitor.stop_reason():
         explorer = Explorer(rigid, Free.NOTHING, solver.monitor)
         met = [explorer.explore(path) for path in paths[:_BY_IPOPT]]
         motions += [motion for motion in met if motion is not None]
@@ -150,11 +156,19 @@ def _as_kind(problem: MotionProblem, solution: CollocationSolution) -> KindOfMot
         problem=problem, solution=solution))
 
 
-def _cheaper_kinds(kinds: list[KindOfMotion], own: KindOfMotion) -> list[KindOfMotion]:
-    """Return the kinds that are cheaper than the plan's own, both taken as rigid if possible."""
+def _worth_solving(kinds: list[KindOfMotion], own: KindOfMotion,
+                   refused: bool) -> list[KindOfMotion]:
+    """
+    Return the kinds that may be better than the plan's own.
+
+    Cheaper ones, both taken as rigid if possible; all others if the arm may not do its own.
+
+    """
     mine = next((kind for kind in kinds if are_alike(kind.motion.angles, own.motion.angles)), own)
-    return [kind for kind in kinds if kind is not mine
-            and kind.value < (1 - _CHEAPER) * mine.value]
+    others = [kind for kind in kinds if kind is not mine]
+    if refused:
+        return others
+    return [kind for kind in others if kind.value < (1 - _CHEAPER) * mine.value][:_SOLVED]
 
 
 def _guess(problem: MotionProblem, rigid: CollocationSolution,

@@ -15,6 +15,7 @@ from flex_planner.planning.kinds.clusters import cluster, kind_of, KindOfMotion,
 from flex_planner.planning.kinds.explorer import ExploredMotion, Explorer
 from flex_planner.planning.kinds.paths import fixed_paths, JointPath, random_paths
 from flex_planner.planning.strategies.initial_guesses import rigid_problem
+from flex_planner.planning.way_limits import find_limit_violations
 import numpy as np
 
 # kinds that are confirmed on finer meshes, and how many are tried for that
@@ -42,8 +43,9 @@ def find_kinds(problem: MotionProblem, free: Free, starts: int,
     Returns
     -------
     list of KindOfMotion
-        Values that stand on a mesh twice as fine; empty where the rigid arm cannot do the task,
-        or the goal is approached at a price only.
+        Values that stand on a mesh twice as fine, those that keep the arm's limits on the way
+        before those that do not; empty where the rigid arm cannot do the task, or the goal is
+        approached at a price only.
 
     Raises
     ------
@@ -60,7 +62,9 @@ def find_kinds(problem: MotionProblem, free: Free, starts: int,
     explorer = Explorer(rigid, free, monitor, most)
     motions = list(_explore(explorer, rigid, free, starts, monitor))
     better = is_better(free)
-    return _confirm(explorer, cluster(motions, better), better)
+    kinds = _confirm(explorer, cluster(motions, better), better)
+    return sorted(kinds, key=lambda kind: bool(find_limit_violations(
+        kind.motion.problem, kind.motion.solution)))
 
 
 def is_better(free: Free) -> Callable[[float, float], bool]:

@@ -43,8 +43,8 @@ _NEWTON, _EXACT = 30, 1e-7
 # the gap that is wanted
 _FIRST, _DEARER, _SURE, _LEAST_FACTOR = 4.0, 16.0, 0.8, 1.5
 
-# a jump in price where Newton's method has stalled: to this share of the gap wanted, within bounds,
-# on a mesh of so many intervals
+# a jump in price where Newton's method has stalled: to this share of the gap wanted, within
+# bounds, on a mesh of so many intervals
 _SURE_JUMP, _LEAST_JUMP, _JUMP, _JUMP_INTERVALS = 0.5, 4.0, 64.0, 60
 
 

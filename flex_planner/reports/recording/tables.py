@@ -6,8 +6,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
-from flex_planner.arms.arm import Arm
+from flex_planner.arms.arm import Arm, Joint
 from flex_planner.planning.certificate import CertificateLimits
+from flex_planner.planning.warnings import WarningKind
 from flex_planner.reports.recording.check import MotionCheck
 from flex_planner.reports.recording.contents import RecordedRequest
 from flex_planner.reports.recording.frequencies import NaturalFrequencies
@@ -56,7 +57,7 @@ def verdict(request: RecordedRequest, check: MotionCheck | None = None) -> str:
 def tables(request: RecordedRequest, check: MotionCheck | None = None,
            frequencies: NaturalFrequencies | None = None) -> list[ReportTable]:
     """Return the tables of a report."""
-    found = [_task(request), _outcome(request), *_kinds(request)]
+    found = [_task(request), _outcome(request), *_kinds(request), *_warnings(request.report)]
     if request.solved:
         found.append(_certificate(request))
     if check is not None:
@@ -99,6 +100,8 @@ def _task(request: RecordedRequest) -> ReportTable:
             ('weights W1', numbers(task.position_weights)),
             ('weights W2', numbers(task.velocity_weights)),
             ('tolerance, eq. (17)', f'{request.tolerance:g}')]
+    if getattr(task, 'allow_large_bending', False):  # older recordings do not have it
+        rows.append(('large bending', 'allowed'))
     for name in ('max_joint_speeds', 'max_torque_shares', 'max_modal_rates'):
         if len(getattr(task, name)):
             rows.append((name.replace('_', ' '), numbers(getattr(task, name))))
@@ -136,6 +139,14 @@ def _kinds(request: RecordedRequest) -> list[ReportTable]:
         title=f'Kinds of motion, from {report.kind_starts} starts',
         columns=(unit, 'how it moves', 'met'),
         rows=tuple((f'{value:.6g}', words, str(count)) for value, words, count in rows))]
+
+
+def _warnings(report: Any) -> list[ReportTable]:
+    """Return what is to be known of the plan; none where there is nothing."""
+    kinds = getattr(report, 'warning_kinds', ())  # older recordings do not have them
+    rows = tuple((WarningKind[kind].value if kind in WarningKind.__members__ else kind, sentence)
+                 for kind, sentence in zip(kinds, getattr(report, 'warnings', ()), strict=True))
+    return [ReportTable(title='Warnings', rows=rows)] if rows else []
 
 
 def _certificate(request: RecordedRequest) -> ReportTable:
@@ -226,11 +237,20 @@ def _arm(arm: Arm) -> list[ReportTable]:
                  if link.modes else 'rigid', f'{link.damping_ratio:g}')
                 for i, link in enumerate(arm.links, 1))),
         ReportTable(title='Joints', columns=(
-            'joint', 'stall torque [N m]', 'no-load speed [rad/s]', 'friction [N m s/rad]',
-            'mass at it [kg]'), rows=tuple(
+            'joint', 'stall torque [N m]', 'no-load speed [rad/s]', 'largest speed [rad/s]',
+            'angles [deg]', 'friction [N m s/rad]', 'mass at it [kg]'), rows=tuple(
                 (str(i), f'{joint.motor.stall_torque:g}', f'{joint.motor.no_load_speed:g}',
-                 f'{joint.viscous_friction:g}', f'{node.mass:g}')
+                 f'{joint.motor.max_speed:g}', _angles(joint), f'{joint.viscous_friction:g}',
+                 f'{node.mass:g}')
                 for i, (joint, node) in enumerate(zip(arm.joints, arm.nodes, strict=False), 1)))]
+
+
+def _angles(joint: Joint) -> str:
+    """Return the limits of a joint's angle, or a dash."""
+    limits = joint.lower_limit, joint.upper_limit
+    if not np.isfinite(limits).any():
+        return '–'
+    return ' to '.join(f'{angle:.4g}' for angle in np.degrees(limits))
 
 
 def _settings(request: RecordedRequest) -> ReportTable:

@@ -10,6 +10,7 @@ from flex_planner.capacity.results import MaxPayload, PayloadMethod
 from flex_planner.optimal_control.task import MAX_PAYLOAD
 from flex_planner.ros.messages.plans import (
     add_kinds,
+    add_warnings,
     failure_report,
     report_from_plan,
     STATUS_CODES,
@@ -97,6 +98,7 @@ def report_from_search(found: MaxPayload) -> PlanReport:
         report = failure_report(STATUS_CODES[found.status],
                                 f'{found.status.value}: {found.message}')
         report.strategy = found.method.value
+        add_warnings(report, found.warnings)
     report.iterations = found.iterations
     if found.kinds:
         add_kinds(report, found.kinds, found.starts)

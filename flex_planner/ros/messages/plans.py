@@ -23,6 +23,7 @@ from flex_planner.planning.kinds.clusters import KindOfMotion
 from flex_planner.planning.objectives import Objectives
 from flex_planner.planning.plan import peaks, Plan, PlanStatus, Samples
 from flex_planner.planning.sampling import SampledPlan
+from flex_planner.planning.warnings import PlanWarning
 from flex_planner.ros.settings.planner import PlannerSettings
 from flex_planner_interfaces.msg import (
     FlexiblePoint,
@@ -79,7 +80,8 @@ def task_from_message(message: MotionTask, arm: Arm, settings: PlannerSettings) 
         effort_weights=np.asarray(message.effort_weights or settings.effort_weights),
         position_weights=np.asarray(message.position_weights),
         velocity_weights=np.asarray(message.velocity_weights),
-        tolerance=tolerance or settings.tolerance)
+        tolerance=tolerance or settings.tolerance,
+        allow_large_bending=message.allow_large_bending)
 
 
 def objectives_from_message(message: MotionTask) -> Objectives | None:
@@ -145,6 +147,7 @@ def report_from_plan(plan: Plan) -> PlanReport:
         setattr(report, name, float(getattr(plan.certificate, name)))
     report.switching_times = plan.switching_times.tolist()
     report.saturation = plan.saturation.tolist()
+    add_warnings(report, plan.warnings)
     report.velocity_weights = plan.task.velocity_weights.tolist()
     report.effort_weights = plan.task.effort_weights.tolist()
     add_kinds(report, plan.kinds, plan.starts)
@@ -161,6 +164,12 @@ def add_kinds(report: PlanReport, kinds: Sequence[KindOfMotion], starts: int) ->
     report.kind_sentences = [kind.sentence for kind in kinds]
     report.kind_counts = [kind.met for kind in kinds]
     report.kind_starts = starts
+
+
+def add_warnings(report: PlanReport, warnings: Sequence[PlanWarning]) -> None:
+    """Add warnings to a report: identifiers and sentences."""
+    report.warning_kinds = [one.kind.name for one in warnings]
+    report.warnings = [one.sentence for one in warnings]
 
 
 def add_reference(report: PlanReport, plan: Plan, reference: SampledPlan) -> None:

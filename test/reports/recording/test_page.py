@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 import re
 import shutil
 import subprocess
+from types import SimpleNamespace
 from typing import Any
 
 from flex_planner.base.errors import RecordingError
@@ -108,6 +109,21 @@ def test_page_loads_nothing_and_names_nothing_by_its_content(plan: Path, failure
         assert not [name for _, attributes in page.tags for name in attributes
                     if name in ('src', 'href')]
         assert not re.search(r'https?:|import\(|@import|url\(', text)
+
+
+def test_page_lists_the_warnings_and_older_recordings_have_none(
+        request_of_plan: RecordedRequest) -> None:
+    def warned(request: RecordedRequest) -> list[list[str]]:
+        found = Page(report_page(request)).data['tables']
+        return [row for table in found if table['title'] == 'Warnings' for row in table['rows']]
+
+    (row,) = warned(request_of_plan)
+    assert row[0] == 'the torque jumps'
+    assert row[1].startswith('the torque jumps by shares of the stall torque: ')
+    older = SimpleNamespace(**{name: getattr(request_of_plan.report, name)
+                               for name in dir(request_of_plan.report) if name[0] != '_'
+                               and not name.startswith('warning')})
+    assert warned(replace(request_of_plan, report=older)) == []
 
 
 def test_page_of_a_failure_tells_the_error(failure: Path) -> None:

@@ -164,6 +164,18 @@ def test_report_of_a_search_is_that_of_its_plan(direct: MaxPayload) -> None:
     assert (report.error_code, report.error_msg) == (PlanReport.NONE, '')
 
 
+def test_report_of_a_search_has_the_warnings_of_its_plan_or_of_the_arm(
+        direct: MaxPayload, crane_arm: Arm) -> None:
+    report = report_from_search(direct)
+    assert report.warning_kinds == ['TORQUE_JUMPS', 'BRAKING_TORQUE']
+    assert report.warnings == [one.sentence for one in direct.warnings]
+    light = replace(crane_arm, nodes=())
+    task = Task(arm=light, start_positions=[0, 1], goal_positions=[1, 1], duration=1.0)
+    failed = MaxPayload(task=task, method=PayloadMethod.DIRECT, status=PlanStatus.NOT_CONVERGED,
+                        message='lost')
+    assert report_from_search(failed).warning_kinds == ['JOINT_WITHOUT_INERTIA']
+
+
 @pytest.mark.parametrize('status', [s for s in PlanStatus if s is not PlanStatus.SOLVED])
 def test_report_of_a_failed_search_says_why(paper: Task, status: PlanStatus) -> None:
     report = report_from_search(MaxPayload(task=paper, method=PayloadMethod.INCREMENTAL,

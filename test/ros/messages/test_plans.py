@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import takewhile
 import math
+import re
 from typing import Any
 
-from flex_planner.arms.arm import Arm, Joint, Link
+from flex_planner.arms.arm import Arm, Joint, Link, Motor
 from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.errors import (
     FlexPlannerError,
@@ -24,6 +26,8 @@ from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.sampling import sample_plan, SampledPlan, SamplingSettings
+from flex_planner.planning.warnings import WarningKind
+from flex_planner.recording import definition_folder
 from flex_planner.ros.messages.plans import (
     add_reference,
     duration_message,
@@ -77,18 +81,19 @@ def test_empty_fields_take_the_defaults_of_the_parameters(ei50_arm: Arm,
     assert made.effort_weights.tolist() == [0.25, 0.5]
     assert made.position_weights.tolist() == made.velocity_weights.tolist() == [0.0] * 6
     assert made.tolerance == 2e-4
-    assert made.payload_mass == 0.0
+    assert (made.payload_mass, made.allow_large_bending) == (0.0, False)
     assert planning_time_limit(message, settings) == 7.0
 
 
 def test_fields_that_are_given_count(ei50_arm: Arm, settings: PlannerSettings) -> None:
     message = MotionTask(**JOINT_TASK, duration=2.0, payload_mass=0.7, effort_weights=[2.0, 3.0],
                          position_weights=[1.0] * 6, velocity_weights=[4.0, 5.0],
-                         tolerance=1e-5, allowed_planning_time=0.5)
+                         tolerance=1e-5, allowed_planning_time=0.5, allow_large_bending=True)
     made = task_from_message(message, ei50_arm, settings)
     assert made.start_positions.tolist() == [0.1, 0.2]
     assert made.goal_positions.tolist() == [0.3, 0.4]
     assert (made.duration, made.payload_mass, made.tolerance) == (2.0, 0.7, 1e-5)
+    assert made.allow_large_bending
     assert made.effort_weights.tolist() == [2.0, 3.0]
     assert made.position_weights.tolist() == [1.0] * 6
     assert made.velocity_weights.tolist() == [4.0, 5.0, 0.0, 0.0, 0.0, 0.0]
@@ -176,6 +181,34 @@ def test_report_of_an_impossible_motion_names_the_limit(rigid_arm: Arm, rigid_mo
     assert report.error_code == PlanReport.INFEASIBLE
     assert 'carries at most 5.855 kg' in report.error_msg
     assert report.cost == math.inf
+
+
+def test_warnings_are_told_by_stable_names_and_in_sentences(plan: Plan) -> None:
+    report = report_from_plan(plan)
+    assert report.error_code == PlanReport.NONE
+    assert report.warning_kinds == ['TORQUE_JUMPS']
+    assert report.warnings == [plan.warnings[0].sentence]
+
+
+def test_every_kind_of_warning_is_explained_beside_its_field() -> None:
+    folder = definition_folder('flex_planner_interfaces')
+    lines = (folder / 'msg' / 'PlanReport.msg').read_text().splitlines()
+    end = lines.index('string[] warning_kinds')
+    comment = ' '.join(takewhile(lambda line: line.startswith('#'), lines[end - 1::-1]))
+    assert set(re.findall('[A-Z_]{6,}', comment)) == {kind.name for kind in WarningKind}
+
+
+def test_report_of_a_limit_on_the_way_has_its_code(rigid_arm: Arm, rigid_model: ArmModel,
+                                                   paper_task: Any) -> None:
+    joint = replace(rigid_arm.joints[0], motor=Motor(stall_torque=8.0, no_load_speed=3.5,
+                                                     max_speed=0.9))
+    slow = replace(rigid_arm, joints=(joint, rigid_arm.joints[1]))
+    plan = plan_path(paper_task(slow), model=rigid_model)
+    report = report_from_plan(plan)
+    assert report.error_code == PlanReport.LIMIT_VIOLATED
+    assert report.error_msg.startswith('solved, but the motion leaves a limit of the arm on its '
+                                       'way: joint 1 turns at 1.022 rad/s at ')
+    assert report.cost == plan.cost
 
 
 @pytest.mark.parametrize(('monitor', 'code', 'word'), [

@@ -1,0 +1,76 @@
+"""The verdict on a motion that solves its task: whether the arm may do it, and what to know."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from flex_planner.collocation import CollocationSolution
+from flex_planner.optimal_control.motion_problem import MotionProblem
+from flex_planner.planning.bending import find_largest_bending, LARGEST
+from flex_planner.planning.plan import Plan, PlanStatus
+from flex_planner.planning.warnings import find_warnings
+from flex_planner.planning.way_limits import find_limit_violations
+import numpy as np
+
+
+def judge(plan: Plan) -> Plan:
+    """
+    Return a certified plan with its status, message and warnings.
+
+    Parameters
+    ----------
+    plan : Plan
+        With a solution that passed its certificate; both are kept whatever the verdict is.
+
+    """
+    assert plan.solution is not None
+    refused = find_refusal(plan.problem, plan.solution)
+    status, message = refused or (PlanStatus.SOLVED, plan.message)
+    return replace(plan, status=status, message=message,
+                   warnings=find_warnings(plan.problem, plan.solution))
+
+
+def find_refusal(problem: MotionProblem,
+                 solution: CollocationSolution) -> tuple[PlanStatus, str] | None:
+    """
+    Return why the arm may not do a motion that solves its task; None if it may.
+
+    Parameters
+    ----------
+    problem : MotionProblem
+        The task says whether links may bend far.
+    solution : CollocationSolution
+        The motion.
+
+    Returns
+    -------
+    tuple of PlanStatus and str, or None
+        ``LIMIT_VIOLATED`` or ``BENT_TOO_FAR``, and a sentence with link or joint, time and by how
+        much.
+
+    """
+    violations = find_limit_violations(problem, solution)
+    if violations:
+        others = len(violations) - 1
+        more = f' ({others} more limit{"s are" if others > 1 else " is"} passed)' if others else ''
+        return PlanStatus.LIMIT_VIOLATED, (
+            f'{violations[0]}{more}; another duration, another posture at start or goal, or '
+            'weights on positions or speeds may lead past')
+    return None if problem.task.allow_large_bending else _find_bent_link(problem, solution)
+
+
+def _find_bent_link(problem: MotionProblem,
+                    solution: CollocationSolution) -> tuple[PlanStatus, str] | None:
+    """Refuse a motion whose links bend further than their model holds."""
+    arm = problem.model.arm
+    if not arm.n_modes:
+        return None
+    z = np.concatenate([solution.stage_values().reshape(-1, problem.size), solution.nodes])
+    found = find_largest_bending(arm, z[:, :arm.n_coordinates])
+    if found.share <= LARGEST:
+        return None
+    times = np.concatenate([solution.stage_times().ravel(), solution.mesh])
+    return PlanStatus.BENT_TOO_FAR, (
+        f'link {found.link + 1} bends by {found.share:.0%} of its length at '
+        f'{times[found.moment]:.4g} s, and beams are linear up to {LARGEST:.0%} at most: a longer '
+        'duration bends it less, and allow_large_bending in the task accepts it')

@@ -1,0 +1,98 @@
+"""How far links bend for their length, and which motions are refused for it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from flex_planner.arms.arm import Arm, Joint, Link, Motor, Node
+from flex_planner.arms.kinematics import link_points
+from flex_planner.optimal_control.task import Task
+from flex_planner.planning.bending import find_largest_bending
+from flex_planner.planning.certificate import CertificateLimits
+from flex_planner.planning.plan import Plan, PlanStatus
+from flex_planner.planning.plan_path import plan_path
+from flex_planner.planning.verdict import find_refusal
+from flex_planner.planning.warnings import WarningKind
+import numpy as np
+from plan_checks import solution_of
+import pytest
+
+
+def test_pinned_link_bends_from_its_chord(ei50_arm: Arm) -> None:
+    # a sine of 40 mm on 0.5 m at the second of two moments
+    q = np.zeros((2, 6))
+    q[0, 2], q[1, 4] = 0.03, -0.04
+    found = find_largest_bending(ei50_arm, q)
+    assert (found.link, found.moment) == (1, 1)
+    assert found.share == pytest.approx(0.08, rel=1e-12)
+
+
+def test_clamped_link_bends_from_the_tangent_at_its_base(crane_arm: Arm) -> None:
+    q = np.array([[0.3, 0.2, 0.02, 0.004, 0.01]])
+    found = find_largest_bending(crane_arm, q)
+    points = link_points(crane_arm, q, stations=21)[0, 0]
+    across = np.array([-np.sin(0.3), np.cos(0.3)])
+    assert found.link == 0
+    assert found.share == pytest.approx(np.abs(points @ across).max() / 0.6, rel=1e-12)
+
+
+def test_rigid_links_do_not_bend(rigid_arm: Arm) -> None:
+    assert find_largest_bending(rigid_arm, np.ones((3, 2))).share == 0
+
+
+# A link that is thrown about: it bends by 47, 25 and 4 % of its length in 0.7, 1 and 2 s
+
+
+def soft_plan(duration: float, allowed: bool) -> Plan:
+    link = Link(length=0.5, linear_density=0.2, flexural_rigidity=0.3, modes=1,
+                mode_family='clamped_free')
+    arm = Arm(name='soft', links=(link,), joints=(Joint(motor=Motor(stall_torque=5.0)),),
+              nodes=(Node(inertia=0.01), Node()))
+    return plan_path(Task(arm=arm, start_positions=[0.0], goal_positions=[1.5], payload_mass=0.1,
+                          duration=duration, allow_large_bending=allowed))
+
+
+@pytest.fixture(scope='module')
+def refused() -> Plan:
+    return soft_plan(0.7, allowed=False)
+
+
+def largest(plan: Plan) -> float:
+    return find_largest_bending(plan.arm, plan.uniform_samples(4001).coordinates).share
+
+
+def test_link_that_bends_further_than_its_model_is_refused(refused: Plan) -> None:
+    assert largest(refused) > 0.3
+    assert (refused.status, refused.certified) == (PlanStatus.BENT_TOO_FAR, True)
+    assert refused.message.startswith(f'link 1 bends by {largest(refused):.0%} of its length at ')
+    assert refused.message.endswith('and allow_large_bending in the task accepts it')
+    # what was found is kept, with its certificate and warnings
+    assert CertificateLimits().violations(refused.certificate) == []
+    assert WarningKind.BENDING in {one.kind for one in refused.warnings}
+
+
+def test_large_bending_may_be_allowed(refused: Plan) -> None:
+    plan = soft_plan(0.7, allowed=True)
+    assert plan.solved, plan.message
+    assert plan.cost == refused.cost
+    (told,) = [one for one in plan.warnings if one.kind is WarningKind.BENDING]
+    assert told.value == pytest.approx(largest(plan), rel=1e-3)
+    assert told.time is not None
+    assert f'{told.value:.0%} of its length at {told.time:.4g} s' in told.sentence
+
+
+def test_what_bends_less_is_solved_with_a_warning_or_without() -> None:
+    for duration, warned in ((1.0, True), (2.0, False)):
+        plan = soft_plan(duration, allowed=False)
+        assert plan.solved, plan.message
+        assert (largest(plan) > 0.1) is warned
+        assert (WarningKind.BENDING in {one.kind for one in plan.warnings}) is warned
+
+
+def test_limit_on_the_way_is_told_before_bending(refused: Plan) -> None:
+    joint = replace(refused.arm.joints[0], motor=Motor(stall_torque=5.0, max_speed=1.0))
+    task = replace(refused.task, arm=replace(refused.arm, joints=(joint,)))
+    problem = type(refused.problem)(refused.model, task, refused.problem.parameters)
+    found = find_refusal(problem, solution_of(refused))
+    assert found is not None
+    assert found[0] is PlanStatus.LIMIT_VIOLATED
