@@ -28,8 +28,9 @@ _SINGULAR = 1e-3
 # relative to the reach
 _EXACT = 1e-9
 _CANDIDATES = 12
-# of the reach, and of the width of the workspace: so far within it an arm is clear of its edge
-_INSIDE, _INSIDE_NARROW = 5e-3, 0.25
+# of the reach, and of the width of the workspace: so far within it, an arm that sags is still on
+# the branch of the unbent one
+_INSIDE, _INSIDE_NARROW = 5e-2, 0.25
 # on the distance from the wanted posture, less and less
 _WEIGHTS = (1e-1, 1e-2, 1e-4, 0.0)
 

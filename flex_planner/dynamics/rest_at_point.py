@@ -84,7 +84,8 @@ class _BentArm:
                  parameters: PhysicalParameters) -> None:
         self.arm, self._dynamics, self._parameters = arm, dynamics, parameters
         self._reference, (self._lower, self._upper) = reference, arm.angle_limits()
-        self._directions = jacobian(arm, reference).T / arm.reach  # (n, 2)
+        unbent = jacobian(arm, reference)
+        self.side, self._directions = _side(unbent), unbent.T / arm.reach  # (n, 2)
         self._keeps_limits = arm.n_joints > 2  # others have no joint to spare
 
     def at(self, turned: Array) -> tuple[Array, Array, Array]:
@@ -118,11 +119,10 @@ def _approach(posture: _BentArm, point: Array) -> Array:
     """Bring the tip from where it rests in the reference posture to a point, in steps."""
     turned: Array = np.zeros(2)
     way, step = 0.0, 1.0
-    first, _, moves = posture.tip(turned)
-    side = _side(moves)
+    first = posture.tip(turned)[0]
     while way < 1:
         there = min(way + step, 1.0)
-        found = _newton(posture, turned, first + there * (point - first), side)
+        found = _newton(posture, turned, first + there * (point - first))
         if found is None:
             step /= 2
             if step < _SHORTEST_STEP:
@@ -134,7 +134,7 @@ def _approach(posture: _BentArm, point: Array) -> Array:
     return turned
 
 
-def _newton(posture: _BentArm, start: Array, point: Array, side: float) -> Array | None:
+def _newton(posture: _BentArm, start: Array, point: Array) -> Array | None:
     """Solve for a near point; None if that fails, or ends on the other branch."""
     turned, last = start, np.inf
     for _ in range(_MAX_ITERATIONS):
@@ -144,7 +144,7 @@ def _newton(posture: _BentArm, start: Array, point: Array, side: float) -> Array
             return None
         miss = float(np.linalg.norm(tip - point))
         if miss <= _EXACT * posture.arm.reach:
-            return turned if _side(moves) == side else None
+            return turned if _side(moves) == posture.side else None
         if miss > _SLOW * last:
             return None
         change, last = np.linalg.lstsq(slope, point - tip, rcond=None)[0], miss

@@ -64,8 +64,9 @@ def _plan(options: argparse.Namespace) -> int:
     outputs = Outputs.of(options, request)
 
     def work(model: ArmModel, monitor: Monitor) -> Plan:
-        return plan_path(request.task, model=model, monitor=monitor,
-                         objectives=request.objectives)
+        with translate_errors():
+            return plan_path(request.task, model=model, monitor=monitor,
+                             objectives=request.objectives)
 
     plan = run_with_progress(request.task.arm, request.time_limit, work)
     reference, most = _sample(request, plan)
