@@ -173,9 +173,11 @@ class PayloadEnds:
         bends = task.arm.bends_at_rest
         self._bent = bends and not task.start_modal_displacements.size, bends
 
-    def at(self, end: int, payload: float) -> tuple[Array, Array]:
+    def at(self, end: int, payload: float) -> tuple[Array, Array, Array]:
         """
-        Return state and its derivative by the payload at the start (0) or the goal (1).
+        Return the state at the start (0) or the goal (1), and two derivatives by the payload.
+
+        Shape (2 n_t,) each; the second one is as exact as Newton's method needs it, 1e-4.
 
         Raises
         ------
@@ -186,10 +188,10 @@ class PayloadEnds:
         """
         given = self._given[end]
         if not self._bent[end]:
-            return given, np.zeros_like(given)
-        states = [self._state(end, payload + change) for change in (0.0, -_NUDGE, _NUDGE)]
-        change: Array = (states[2] - states[1]) / (2 * _NUDGE)
-        return states[0], change
+            return given, np.zeros_like(given), np.zeros_like(given)
+        here, less, more = (self._state(end, payload + change)
+                            for change in (0.0, -_NUDGE, _NUDGE))
+        return here, (more - less) / (2 * _NUDGE), (more - 2 * here + less) / _NUDGE**2
 
     def _state(self, end: int, payload: float) -> Array:
         parameters = replace(self._parameters, payload_mass=payload)

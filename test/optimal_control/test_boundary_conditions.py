@@ -144,7 +144,7 @@ def test_ends_are_those_of_the_task_with_that_payload(crane_model: ArmModel, tas
         ends = ends_of(crane_model, replace(task, payload_mass=payload))
         return (ends.start, ends.goal)[end]
 
-    found, slope = payload_ends(crane_model, task).at(end, 0.3)
+    found, slope, _ = payload_ends(crane_model, task).at(end, 0.3)
     assert np.array_equal(found, state(0.3))
     # truncation: the sag is nearly linear in the payload; rounding of 1e-13 m over 1e-3 kg
     difference = (state(0.301) - state(0.299)) / 2e-3
@@ -185,7 +185,7 @@ def test_posture_at_a_point_follows_the_payload(crane_model: ArmModel, between_p
         ends = ends_of(crane_model, replace(between_points, payload_mass=payload))
         return (ends.start, ends.goal)[end]
 
-    found, slope = payload_ends(crane_model, between_points).at(end, 0.3)
+    found, slope, _ = payload_ends(crane_model, between_points).at(end, 0.3)
     assert np.array_equal(found, state(0.3))
     difference = (state(0.301) - state(0.299)) / 2e-3
     # of second order in 1e-3 kg; the tip is exact to 1e-12 m, over 1e-4 kg
@@ -234,9 +234,10 @@ def test_start_that_moves_is_that_of_the_task_for_any_payload(crane_model: ArmMo
     expected = [-1.6, 0.2, 0.01, -0.02, 0.03, 0.1, 0.2, 0.3, 0.4, 0.5]
     assert ends_of(crane_model, moving).start.tolist() == expected
     ends = payload_ends(crane_model, moving)
-    state, slope = ends.at(0, 3.0)
+    state, slope, bend = ends.at(0, 3.0)
     assert state.tolist() == expected
     assert not slope.any()
+    assert not bend.any()
     assert ends.at(1, 0.3)[1].any()
 
 
