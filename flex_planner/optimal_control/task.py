@@ -7,7 +7,7 @@ from typing import Any, TYPE_CHECKING
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.inverse_kinematics import check_angle_limits
-from flex_planner.base.errors import InvalidTaskError
+from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.validation import Array, number, vector
 from flex_planner.optimal_control.ends_at_points import ends_at_points
 import numpy as np
@@ -67,8 +67,6 @@ class Task:
     ------
     InvalidValueError
         Naming field, value and bound.
-    InvalidTaskError
-        If modal displacements are given for a start at a point, where the arm is at rest.
 
     """
 
@@ -132,6 +130,29 @@ class Task:
         return cls(arm=arm, duration=duration, **others,
                    **ends_at_points(arm, start, goal, elbow))
 
+    @classmethod
+    def to_point(cls, arm: Arm, start_positions: ArrayLike, goal: ArrayLike, *, duration: float,
+                 elbow: int = -1, **others: Any) -> Task:
+        """
+        Return the motion from given joint angles to a point where the tip rests.
+
+        Parameters
+        ----------
+        start_positions : array_like, shape (n,)
+            Joint angles [rad].
+        arm, goal, duration, elbow, others
+            As of `between_points`.
+
+        Raises
+        ------
+        UnreachableError, SingularError, InvalidValueError
+            See `posture_near_point`; the message says which point.
+
+        """
+        start = vector('start_positions', start_positions, arm.n_joints, unit='rad')
+        return cls(arm=arm, duration=duration, start_positions=start, **others,
+                   **ends_at_points(arm, None, goal, elbow, start))
+
     def __post_init__(self) -> None:
         n, n_t = self.arm.n_joints, self.arm.n_coordinates
         for name in ('start_positions', 'goal_positions'):
@@ -181,8 +202,8 @@ class Task:
                          at_least=-MAX_DISPLACEMENT, at_most=MAX_DISPLACEMENT, unit='m')
         self._set(name, bending)
         if bending.size and self.start_point.size:
-            raise InvalidTaskError('start_modal_displacements must be left out where start_point '
-                                   'is given: there the arm is at rest')
+            raise InvalidValueError(name, 'given', 'left out where the start is a point: there '
+                                    'the arm rests')
 
     def _set(self, name: str, value: Array) -> None:
         object.__setattr__(self, name, value)

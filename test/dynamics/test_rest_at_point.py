@@ -1,4 +1,4 @@
-"""Inverse kinematics of bent arms: the tip at rest is where it was asked for, or that is refused."""
+"""Inverse kinematics of bent arms: where the tip rests is what was asked for, or is refused."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Planning again from a moving, bent arm: the rest of a plan of least cost is the plan of the rest."""
+"""Planning again from a moving, bent arm: the rest of the best motion is the best rest."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from scipy.integrate import simpson
 
 @pytest.fixture(scope='module')
 def plan(crane_model: ArmModel) -> Plan:
-    """Return a quick motion under gravity, of clamped links with damping, motors on their limit."""
+    """Return a quick motion under gravity of links with damping, motors on their limit."""
     return crane_plan(crane_model)
 
 
