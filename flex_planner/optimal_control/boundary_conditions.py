@@ -20,6 +20,8 @@ import numpy as np
 
 # share of its stall torque by which a motor is said to be too weak for a buckled arm
 _OVERLOADED = 1e3
+# just below the payload that is held, motors are loaded by nearly all of their torque: as shares
+_BELOW, _NEARLY = 1e-9, 1e-5
 # of a payload, for differences [kg]
 _NUDGE = 1e-4
 
@@ -128,7 +130,8 @@ def holding_limit(model: ArmModel, task: Task, parameters: Parameters) -> tuple[
     """
     Return the payload [kg] that the motors just hold at the goal, and the joint that is first.
 
-    The payload is infinite where gravity does not load the joints, or motors have no limits.
+    The payload is infinite where gravity does not load the joints, where motors have no limits,
+    and where the links give way before the motors do.
 
     """
     from scipy.optimize import brentq  # a tenth of a second, and few tasks need it
@@ -150,7 +153,8 @@ def holding_limit(model: ArmModel, task: Task, parameters: Parameters) -> tuple[
         if heavy > MAX_PAYLOAD:
             return np.inf, 0
     limit = float(brentq(lambda payload: load(payload).max() - 1, light, heavy, xtol=1e-12))
-    return limit, int(load(limit).argmax())
+    below = load(limit * (1 - _BELOW))
+    return (limit, int(below.argmax())) if abs(below.max() - 1) < _NEARLY else (np.inf, 0)
 
 
 class PayloadEnds:

@@ -60,6 +60,8 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
     InvalidTaskError
         If a motor is too weak to hold the arm at the goal, or an objective or the model does
         not go with the task.
+    UnreachableError, SingularError
+        If the arm, bent by gravity, cannot rest at a point of the task.
     ValueError
         If there are no strategies.
 

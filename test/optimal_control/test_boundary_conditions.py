@@ -116,6 +116,17 @@ def test_joint_that_holds_least_is_named(torques: tuple[float, float], joint: in
     assert (limit, first) == (pytest.approx(expected, rel=1e-9), joint)
 
 
+@pytest.mark.parametrize('stall_torque', [9.0, 1e4])
+def test_motors_that_outlast_the_links_do_not_say_what_is_held(
+        crane_model: ArmModel, crane_arm: Arm, task: Task, stall_torque: float) -> None:
+    joint = Joint(motor=Motor(stall_torque=stall_torque))
+    strong = replace(task, arm=replace(crane_arm, joints=(joint, joint)))
+    limit, _ = holding_limit(crane_model, strong, task_parameters(strong))
+    with pytest.raises(NoEquilibriumError):
+        payload_ends(crane_model, task).at(1, 100.0)
+    assert (limit < 10) if stall_torque == 9 else (limit == inf)
+
+
 @pytest.mark.parametrize('changes', [{'gravity': [0.0, 0.0]}, {'joints': (Joint(),)}], ids=str)
 def test_any_payload_is_held_without_gravity_or_without_limits(changes: dict[str, Any]) -> None:
     task = lifted_to(0.0, 2.0)
