@@ -141,8 +141,9 @@ def posture_near_point(arm: Arm, point: ArrayLike, elbow: int,
     """
     Return joint angles from which those of the arm at rest with its tip at a point are found.
 
-    They are those of `inverse_kinematics`, unless gravity bends the arm and only the unbent arm
-    is kept from the point, by its length or its joint limits.
+    They are those of `inverse_kinematics`. Where gravity bends the arm they are so for the nearest
+    point that is clear of the edges of the workspace, and without joint limits if those keep only
+    the unbent arm from it: the bent one may come to where the other cannot.
 
     Parameters
     ----------

@@ -13,8 +13,8 @@ from flex_planner.dynamics.statics import equilibrium
 import numpy as np
 
 _MAX_ITERATIONS = 20
-# of the reach: distance of the tip from the point, and what an arm with one joint may miss
-_EXACT, _ON_CURVE = 1e-12, 1e-9
+# of the reach: distance of the tip from the point, also where joints at limits leave no better
+_EXACT, _ENOUGH = 1e-12, 1e-9
 # of the way from where the tip rests in the first posture to the point
 _SHORTEST_STEP = 1 / 64
 _SLOW = 0.5
@@ -143,9 +143,10 @@ def _newton(posture: _BentArm, start: Array, point: Array) -> Array | None:
         except NoEquilibriumError:
             return None
         miss = float(np.linalg.norm(tip - point))
-        if miss <= _EXACT * posture.arm.reach:
+        exact = _ENOUGH if miss > _SLOW * last else _EXACT
+        if miss <= exact * posture.arm.reach:
             return turned if _side(moves) == posture.side else None
-        if miss > _SLOW * last:
+        if exact == _ENOUGH:
             return None
         change, last = np.linalg.lstsq(slope, point - tip, rcond=None)[0], miss
         turned = turned + change
@@ -167,7 +168,7 @@ def _nearest(posture: _BentArm, point: Array) -> Array:
         if np.abs(change).max() <= _EXACT:
             break
     tip = posture.tip(turned)[0]
-    if np.linalg.norm(tip - point) > _ON_CURVE * posture.arm.reach:
+    if np.linalg.norm(tip - point) > _ENOUGH * posture.arm.reach:
         raise UnreachableError(
             f'the tip of the arm, bent by gravity, rests at ({tip[0]:.9g}, {tip[1]:.9g}) m at '
             f'nearest: with one joint it does not come to ({point[0]:.9g}, {point[1]:.9g}) m')

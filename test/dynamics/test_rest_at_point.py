@@ -111,6 +111,20 @@ def test_joint_that_meets_its_limit_stays_there_while_others_turn() -> None:
     np.testing.assert_allclose(tip_at_rest(arm, found), point, rtol=0, atol=EXACT)
 
 
+def test_joints_on_their_limits_need_not_be_more_exact_than_inverse_kinematics() -> None:
+    # two of three joints are at limits: the third cannot take back what the search left
+    rigid = slender_arm(3).rigid()
+    arm = replace(rigid, joints=(Joint(), Joint(upper_limit=0.5), Joint(upper_limit=0.5)))
+    angles = np.array([0.1, 0.5, 0.5])
+    point = tip_position(arm, angles) + [0.0, 5e-10]
+    found, _ = rest_at_point(LightModel(arm), arm, point, angles,  # type: ignore
+                             PhysicalParameters.of_arm(arm))
+    np.testing.assert_allclose(tip_position(arm, found), point, rtol=0, atol=1.2e-9)
+    with pytest.raises(UnreachableError):
+        rest_at_point(LightModel(arm), arm, point + 1e-6, angles,  # type: ignore
+                      PhysicalParameters.of_arm(arm))
+
+
 def test_arm_without_a_joint_to_spare_is_refused_by_its_limits() -> None:
     arm = slender_arm(limit=1.6)  # the unbent arm would be at 1.571
     reference = posture_near_point(arm, (0.6, -0.6), 1)
