@@ -21,17 +21,16 @@ from flex_planner.cli.request import Request
 from flex_planner.planning.sampling import sample_plan
 from flex_planner.recording import definition_folder, MessageTypes, read_recording
 from flex_planner.reports.recording import check_motion, RecordedRequest, verdict, write_report
-import numpy as np
 
 FOLDER = Path('output')
 
 
 def record_plan() -> Path:
     """Plan a motion, record it as the node would, and return the folder."""
-    arm, points = load_arm('korayem_ei50'), (np.array([0.5, 0.0]), np.array([0.5, 0.5]))
-    task = Task.between_points(arm, *points, duration=1.0, payload_mass=1.0,
+    arm = load_arm('korayem_ei50')
+    task = Task.between_points(arm, (0.5, 0.0), (0.5, 0.5), duration=1.0, payload_mass=1.0,
                                effort_weights=[1 / 8, 1 / 8])
-    request = Request(task=task, points=points, elbow=-1, time_limit=30.0)
+    request = Request(task=task, elbow=-1, time_limit=30.0)
     plan = plan_path(task)
     if not plan.solved:
         sys.exit(plan.message)

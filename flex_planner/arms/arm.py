@@ -272,6 +272,11 @@ class Arm:
         """Return the distance of the tip from the base with the arm stretched out [m]."""
         return sum(link.length for link in self.links)
 
+    @property
+    def bends_at_rest(self) -> bool:
+        """Return whether gravity bends links, so that the tip at rest is not where it would be."""
+        return bool(self.n_modes) and bool(self.gravity.any())
+
     def flexural_rigidities(self) -> Array:
         """Return E I of each link, shape (n,) [N m^2]; 0 for a link without modes."""
         return np.array([link.flexural_rigidity if link.modes else 0.0 for link in self.links])

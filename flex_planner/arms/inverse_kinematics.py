@@ -1,12 +1,16 @@
 """
 Joint angles that put the tip at a point, and condition (I) of the paper.
 
-The arm is taken unbent, as at rest in a horizontal plane. Closed form for one and two links;
-for more the posture nearest to a given one, found numerically within the joint limits.
+The arm is taken unbent, as at rest in a horizontal plane; where gravity bends it,
+`flex_planner.dynamics.rest_at_point` goes on from here. Closed form for one and two links; for
+more the posture nearest to a given one, found numerically within the joint limits.
 
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
+import math
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import jacobian, tip_position
@@ -24,6 +28,9 @@ _SINGULAR = 1e-3
 # relative to the reach
 _EXACT = 1e-9
 _CANDIDATES = 12
+# of the reach, and of the width of the workspace: so far within it, an arm that sags is still on
+# the branch of the unbent one
+_INSIDE, _INSIDE_NARROW = 5e-2, 0.25
 # on the distance from the wanted posture, less and less
 _WEIGHTS = (1e-1, 1e-2, 1e-4, 0.0)
 
@@ -44,11 +51,20 @@ def check_angle_limits(arm: Arm, field: str, positions: Array) -> None:
                 f'{joint.upper_limit:g} rad')
 
 
-def check_singularity(arm: Arm, positions: ArrayLike) -> None:
+def check_singularity(arm: Arm, positions: ArrayLike, moves: Array | None = None) -> None:
     """
     Apply the second half of condition (I): the Jacobian must not lose rank.
 
     An arm with one joint moves its tip along a circle only and is never refused.
+
+    Parameters
+    ----------
+    arm : Arm
+        n joints.
+    positions : array_like, shape (n,)
+        Joint angles [rad].
+    moves : numpy.ndarray, shape (2, n), optional
+        The Jacobian; that of the unbent arm if it is not given [m/rad].
 
     Raises
     ------
@@ -59,7 +75,7 @@ def check_singularity(arm: Arm, positions: ArrayLike) -> None:
     if arm.n_joints < 2:
         return
     angles = np.asarray(positions, dtype=float)
-    J = jacobian(arm, angles)
+    J = jacobian(arm, angles) if moves is None else moves
     # for two joints this is |det J|
     measure = float(np.sqrt(max(np.linalg.det(J @ J.T), 0.0)))
     limit = _SINGULAR * arm.reach**2
@@ -118,6 +134,56 @@ def inverse_kinematics(arm: Arm, point: ArrayLike, elbow: int,
     positions = _turn_into_limits(arm, positions, near)
     check_singularity(arm, positions)
     return positions
+
+
+def posture_near_point(arm: Arm, point: ArrayLike, elbow: int,
+                       near: Array | None = None) -> Array:
+    """
+    Return joint angles from which those of the arm at rest with its tip at a point are found.
+
+    They are those of `inverse_kinematics`. Where gravity bends the arm they are so for the nearest
+    point that is clear of the edges of the workspace, and without joint limits if those keep only
+    the unbent arm from it: the bent one may come to where the other cannot.
+
+    Parameters
+    ----------
+    arm, point, elbow, near
+        As of `inverse_kinematics`.
+
+    Returns
+    -------
+    numpy.ndarray, shape (n,)
+        Outside the joint limits only where the unbent arm would have to leave them [rad].
+
+    Raises
+    ------
+    UnreachableError, SingularError, InvalidValueError
+        See `inverse_kinematics`.
+
+    """
+    if not arm.bends_at_rest:
+        return inverse_kinematics(arm, point, elbow, near)
+    inside = _move_inside(arm, np.asarray(point, dtype=float))
+    try:
+        return inverse_kinematics(arm, inside, elbow, near)
+    except UnreachableError:
+        free = replace(arm, joints=tuple(
+            replace(joint, lower_limit=-math.inf, upper_limit=math.inf) for joint in arm.joints))
+        angles = inverse_kinematics(free, inside, elbow, near)
+    turns = np.round((np.clip(angles, *arm.angle_limits()) - angles) / (2 * np.pi))
+    return angles + 2 * np.pi * turns
+
+
+def _move_inside(arm: Arm, point: Array) -> Array:
+    """Return the nearest point that is clear of the edges of the unbent arm's workspace."""
+    near, far = workspace(arm)
+    margin = min(_INSIDE * arm.reach, _INSIDE_NARROW * (far - near))
+    distance = float(np.hypot(*point))
+    wanted = float(np.clip(distance, near + margin, far - margin))
+    if wanted == distance:
+        return point
+    direction = point / distance if distance else np.array([1.0, 0.0])
+    return wanted * direction
 
 
 def _check_workspace(arm: Arm, point: Array) -> None:

@@ -91,6 +91,12 @@ def jacobian(arm: Arm, positions: Array) -> Array:
     return np.cumsum(parts[:, ::-1], axis=1)[:, ::-1]
 
 
+def tip_jacobian(arm: Arm, coordinates: Array) -> Array:
+    """Return the Jacobian of the tip of the bent arm at q (n_t,), shape (2, n_t) [m/rad, m/m]."""
+    n_t = arm.n_coordinates
+    return tip_velocity(arm, np.broadcast_to(coordinates, (n_t, n_t)), np.eye(n_t)).T
+
+
 def tip_velocity(arm: Arm, coordinates: Array, rates: Array) -> Array:
     """
     Return the velocity of the tip of the bent arm, eq. (22).

@@ -6,8 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 import time
 
+from flex_planner.base.validation import Array
 from flex_planner.capacity.results import MaxPayload
 from flex_planner.cli.request import Request
+from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.sampling import SampledPlan
 from flex_planner.ros.messages.payload_searches import (
@@ -100,11 +102,25 @@ def task_message(request: Request) -> MotionTask:
         allow_large_bending=task.allow_large_bending, allowed_planning_time=request.time_limit)
     for name in OBJECTIVE_FIELDS if request.objectives else ():
         setattr(message, name, getattr(request.objectives, name).tolist())
-    if request.points is None:
-        message.start_positions = task.start_positions.tolist()
+    _fill_start(message, task)
+    if task.goal_point.size:
+        message.goal_point = _point(task.goal_point)
+        message.space = (MotionTask.CARTESIAN if task.start_point.size
+                         else MotionTask.CARTESIAN_GOAL)
+    else:
         message.goal_positions = task.goal_positions.tolist()
-        return message
-    message.space = MotionTask.CARTESIAN
-    message.start_point, message.goal_point = (
-        Point(x=float(x), y=float(y)) for x, y in request.points)
     return message
+
+
+def _fill_start(message: MotionTask, task: Task) -> None:
+    """Enter the state at the start."""
+    message.start_velocities = task.start_velocities.tolist()
+    message.start_modal_displacements = task.start_modal_displacements.tolist()
+    if task.start_point.size:
+        message.start_point = _point(task.start_point)
+    else:
+        message.start_positions = task.start_positions.tolist()
+
+
+def _point(values: Array) -> Point:
+    return Point(x=float(values[0]), y=float(values[1]))

@@ -18,7 +18,8 @@ from flex_planner.base.errors import (
 )
 from flex_planner.base.validation import Array, number
 from flex_planner.cli.options import add_arm, angles, numbers
-from flex_planner.optimal_control.task import postures_from_points, Task
+from flex_planner.optimal_control.ends_at_points import ends_at_points
+from flex_planner.optimal_control.task import Task
 from flex_planner.planning.objectives import Objectives
 from flex_planner.planning.sampling import MAX_SAMPLES, SamplingSettings
 import numpy as np
@@ -39,8 +40,6 @@ class Request:
     ----------
     task : Task
         The motion.
-    points : tuple of numpy.ndarray, shape (2,), or None
-        Start and goal of the tip [m]; None if joint angles were given.
     elbow : int
         Branch of the inverse kinematics.
     time_limit : float
@@ -51,7 +50,6 @@ class Request:
     """
 
     task: Task
-    points: tuple[Array, Array] | None
     elbow: int
     time_limit: float
     objectives: Objectives | None = None
@@ -71,16 +69,13 @@ class Request:
         with translate_errors():
             limit = number('time_limit', options.time_limit, above=0, at_most=MAX_TIME_LIMIT,
                            unit='s')
-            points = _points(options)
-            start, goal = (_angles(options, arm) if points is None
-                           else postures_from_points(arm, *points, elbow=options.elbow))
             task = Task(
-                arm=arm, start_positions=start, goal_positions=goal, duration=options.duration,
+                arm=arm, **_ends(options, arm), **_start(options, arm), duration=options.duration,
                 payload_mass=options.payload_mass, payload_inertia=options.payload_inertia,
                 tolerance=options.tolerance, allow_large_bending=options.allow_large_bending,
                 **_weights(options, arm))
             objectives = _objectives(options, task)
-        return cls(task=task, points=points, elbow=options.elbow, time_limit=limit,
+        return cls(task=task, elbow=options.elbow, time_limit=limit,
                    objectives=objectives)
 
     @property
@@ -92,25 +87,26 @@ class Request:
 
     def __str__(self) -> str:
         """Return the motion in words."""
-        if self.points is None:
-            ends, unit = (np.degrees(self.task.start_positions),
-                          np.degrees(self.task.goal_positions)), 'deg'
-        else:
-            ends, unit = self.points, 'm'
-        start, goal = (', '.join(f'{value:.6g}' for value in end) for end in ends)
-        return f'({start}) {unit} to ({goal}) {unit} in {self.task.duration:g} s'
+        ends = ' to '.join(_say_end(self.task, name) for name in ('start', 'goal'))
+        return f'{ends} in {self.task.duration:g} s'
 
 
 def add_task(parser: argparse.ArgumentParser, payload: str) -> None:
     """Add the options that describe a motion; `payload` says what the payload is for."""
     add_arm(parser)
     add = parser.add_argument
-    add('--from', dest='start_point', metavar='X,Y', help='tip at the start [m]')
-    add('--to', dest='goal_point', metavar='X,Y', help='tip at the goal [m]')
+    add('--from', dest='start_point', metavar='X,Y',
+        help='tip at the start, where it rests as gravity bends the arm [m]')
+    add('--to', dest='goal_point', metavar='X,Y', help='tip at the goal, likewise [m]')
     add('--from-angles', dest='start_positions', metavar='DEG,DEG,...',
-        help='joint angles at the start, instead of points')
+        help='joint angles at the start, instead of a point')
     add('--to-angles', dest='goal_positions', metavar='DEG,DEG,...',
         help='joint angles at the goal')
+    add('--start-velocities', metavar='V,V,...',
+        help='velocities at the start, one per joint [rad/s] or one per coordinate, modes too '
+        '[m/s] (default: zeros)')
+    add('--start-modal-displacements', metavar='M,M,...',
+        help='modal displacements at the start, with --from-angles (default: those at rest)')
     add('--elbow', type=int, default=-1, metavar='SIGN',
         help='sign of the second joint angle at the points, 1 or -1 (default: -1)')
     add('--duration', type=float, required=True, metavar='S',
@@ -164,25 +160,38 @@ def _option(field: str) -> str:
     return _RENAMED.get(name, f'--{name.replace("_", "-")}') + bracket + index
 
 
-def _points(options: argparse.Namespace) -> tuple[Array, Array] | None:
-    """Return start and goal points; None if angles are given."""
+def _ends(options: argparse.Namespace, arm: Arm) -> dict[str, Any]:
+    """Return start and goal as they are given, with the postures that belong to points."""
     ends = {**_POINTS, **_ANGLES}
     given = [name for name in ends if getattr(options, name) is not None]
-    if given == list(_POINTS):
-        return (numbers('--from', options.start_point, 2, 'm'),
-                numbers('--to', options.goal_point, 2, 'm'))
-    if given == list(_ANGLES):
-        return None
-    found = ', '.join(ends[name] for name in given) or 'none of them'
-    raise InvalidTaskError('start and goal must be given either by --from and --to or by '
-                           f'--from-angles and --to-angles, but the command has {found}')
+    if given not in (['start_point', 'goal_point'], ['start_positions', 'goal_positions'],
+                     ['goal_point', 'start_positions']):
+        found = ', '.join(ends[name] for name in given) or 'none of them'
+        raise InvalidTaskError('start and goal must be given by --from and --to, by --from-angles '
+                               f'and --to-angles, or by --from-angles and --to, but the command '
+                               f'has {found}')
+    fields: dict[str, Any] = {name: angles(_ANGLES[name], getattr(options, name), arm.n_joints)
+                              for name in given if name in _ANGLES}
+    points = {name: numbers(_POINTS[name], getattr(options, name), 2, 'm')
+              for name in given if name in _POINTS}
+    return fields | ends_at_points(arm, points.get('start_point'), points.get('goal_point'),
+                                   options.elbow, fields.get('start_positions'))
 
 
-def _angles(options: argparse.Namespace, arm: Arm) -> tuple[Array, Array]:
-    """Return joint angles of start and goal."""
-    start, goal = (angles(option, getattr(options, name), arm.n_joints)
-                   for name, option in _ANGLES.items())
-    return start, goal
+def _start(options: argparse.Namespace, arm: Arm) -> dict[str, Any]:
+    """Return what is given of the state at the start besides positions."""
+    sizes = {'start_velocities': sorted({arm.n_joints, arm.n_coordinates}),
+             'start_modal_displacements': [arm.n_modes]}
+    return {name: numbers(f'--{name.replace("_", "-")}', getattr(options, name), size)
+            for name, size in sizes.items() if getattr(options, name) is not None}
+
+
+def _say_end(task: Task, name: str) -> str:
+    """Return start or goal in words."""
+    point: Array = getattr(task, f'{name}_point')
+    values, unit = (point, 'm') if point.size else (
+        np.degrees(getattr(task, f'{name}_positions')), 'deg')
+    return f'({", ".join(f"{value:.6g}" for value in values)}) {unit}'
 
 
 def _objectives(options: argparse.Namespace, task: Task) -> Objectives | None:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from flex_planner.arms.arm import Arm
-from flex_planner.arms.inverse_kinematics import check_angle_limits, inverse_kinematics, workspace
+from flex_planner.arms.inverse_kinematics import check_angle_limits, posture_near_point, workspace
 from flex_planner.base.errors import InvalidValueError, SingularError, UnreachableError
 from flex_planner.base.validation import Array, number, vector
 from flex_planner.maps.axes import Axis, MAX_COORDINATE
@@ -81,7 +81,7 @@ class End:
     def posture(self, arm: Arm, values: Mapping[str, float], elbow: int,
                 near: Array | None) -> Array:
         """
-        Return the joint angles (n,) for values of the axes, see `inverse_kinematics` [rad].
+        Return the joint angles (n,) for values of the axes, see `posture_near_point` [rad].
 
         Raises
         ------
@@ -92,7 +92,7 @@ class End:
         if self.angles.size:
             return self.angles
         try:
-            return inverse_kinematics(arm, self.at(values), elbow, near)
+            return posture_near_point(arm, self.at(values), elbow, near)
         except (UnreachableError, SingularError) as error:
             raise type(error)(f'{self.name}: {error}') from None
 
@@ -121,7 +121,7 @@ def middle_posture(arm: Arm, end: End, axes: tuple[Axis, ...], elbow: int) -> Ar
     for place in np.argsort(distances, kind='stable'):
         try:
             values = dict(zip(given, points[place].tolist(), strict=True))
-            return inverse_kinematics(arm, end.at(values), elbow)
+            return posture_near_point(arm, end.at(values), elbow)
         except (UnreachableError, SingularError):
             continue
     return None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from flex_planner.arms.arm import Arm
 from flex_planner.base.validation import Array
@@ -24,7 +25,7 @@ class StudyMotion:
     duration, payload_mass, effort_weights, velocity_weights, tolerance
         As of `Task`, where no axis gives them. The duration is a first guess for MIN_DURATION.
     elbow : int
-        Of every posture, see `inverse_kinematics`.
+        Of every posture, see `posture_near_point`.
 
     """
 
@@ -47,10 +48,12 @@ class StudyMotion:
         return values.get('payload_mass', self.payload_mass)
 
     def task(self, arm: Arm, values: Mapping[str, float], start: Array, goal: Array) -> Task:
-        """Return the task between two postures (n,) for values of the axes."""
+        """Return the task between two ends, whose postures are (n,), for values of the axes."""
         weight = values.get('velocity_weight')
+        points: dict[str, Any] = {f'{end.name}_point': end.at(values)
+                                  for end in self.ends if not end.angles.size}
         return Task(
-            arm=arm, start_positions=start, goal_positions=goal,
+            arm=arm, start_positions=start, goal_positions=goal, **points,
             duration=values.get('duration', self.duration), payload_mass=self.payload(values),
             effort_weights=self.effort_weights, tolerance=self.tolerance,
             velocity_weights=(self.velocity_weights if weight is None

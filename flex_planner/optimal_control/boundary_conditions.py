@@ -4,8 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from flex_planner.base.errors import InvalidTaskError, NoEquilibriumError
+from flex_planner.base.errors import (
+    InvalidTaskError,
+    NoEquilibriumError,
+    SingularError,
+    UnreachableError,
+)
 from flex_planner.base.validation import Array
+from flex_planner.dynamics.rest_at_point import rest_at_point
 from flex_planner.dynamics.statics import equilibrium
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.parameters import Parameters
@@ -14,6 +20,8 @@ import numpy as np
 
 # share of its stall torque by which a motor is said to be too weak for a buckled arm
 _OVERLOADED = 1e3
+# just below the payload that is held, motors are loaded by nearly all of their torque: as shares
+_BELOW, _NEARLY = 1e-9, 1e-5
 # of a payload, for differences [kg]
 _NUDGE = 1e-4
 
@@ -38,7 +46,8 @@ class BoundaryConditions:
     Attributes
     ----------
     start, goal : numpy.ndarray, shape (2 n_t,)
-        States at both ends, bent as gravity bends the arm at rest.
+        States at both ends: bent as gravity bends the arm at rest, its tip at the point where one
+        is given, or at the start as the task says.
     goal_weights : numpy.ndarray, shape (2 n_t,)
         Diagonals of W_p and W_v of eq. (6); infinite where the goal must be met.
     holding_torque : numpy.ndarray, shape (n,)
@@ -48,16 +57,17 @@ class BoundaryConditions:
     ------
     InvalidTaskError
         If a motor is too weak to hold the arm at a goal where it comes to rest.
+    UnreachableError, SingularError
+        If the bent arm cannot rest at a point; the message says which.
 
     """
 
     def __init__(self, model: ArmModel, task: Task, parameters: Parameters) -> None:
         n_t = model.arm.n_coordinates
-        start, _ = equilibrium(model, task.start_positions, parameters)
-        goal, self.holding_torque = equilibrium(model, task.goal_positions, parameters)
+        self.start = _start_state(model, task, parameters)
+        goal, self.holding_torque = _rest(model, task, 'goal', parameters)
         if task.ends_at_rest:
             _check_holding(self.holding_torque, parameters)
-        self.start = np.concatenate([start, task.start_velocities])
         self.goal = np.concatenate([goal, task.goal_velocities])
         self.goal_weights = np.concatenate([task.goal_position_weights,
                                             task.goal_velocity_weights])
@@ -80,6 +90,26 @@ class BoundaryConditions:
         return np.where(np.isinf(self.goal_weights), self.goal, end)
 
 
+def _start_state(model: ArmModel, task: Task, parameters: Parameters) -> Array:
+    """Return the state (2 n_t,) at the start."""
+    if task.start_modal_displacements.size:
+        coordinates = np.concatenate([task.start_positions, task.start_modal_displacements])
+    else:
+        coordinates, _ = _rest(model, task, 'start', parameters)
+    return np.concatenate([coordinates, task.start_velocities])
+
+
+def _rest(model: ArmModel, task: Task, end: str, parameters: Parameters) -> tuple[Array, Array]:
+    """Return the coordinates (n_t,) of the arm at rest at start or goal, and what holds it."""
+    positions, point = getattr(task, f'{end}_positions'), getattr(task, f'{end}_point')
+    if not point.size:
+        return equilibrium(model, positions, parameters)
+    try:
+        return rest_at_point(model, task.arm, point, positions, parameters)
+    except (UnreachableError, SingularError) as error:
+        raise type(error)(f'{end}_point: {error}') from None
+
+
 def _transversality(weights: Array) -> Array:
     """Return the rows of ``x - goal = 0``, or of ``psi - W (x - goal) = 0`` for finite W."""
     given = np.isinf(weights)
@@ -100,7 +130,8 @@ def holding_limit(model: ArmModel, task: Task, parameters: Parameters) -> tuple[
     """
     Return the payload [kg] that the motors just hold at the goal, and the joint that is first.
 
-    The payload is infinite where gravity does not load the joints, or motors have no limits.
+    The payload is infinite where gravity does not load the joints, where motors have no limits,
+    and where the links give way before the motors do.
 
     """
     from scipy.optimize import brentq  # a tenth of a second, and few tasks need it
@@ -108,9 +139,8 @@ def holding_limit(model: ArmModel, task: Task, parameters: Parameters) -> tuple[
     def load(payload: float) -> Array:
         """Return the share of the stall torque that each motor needs."""
         try:
-            torque = equilibrium(model, task.goal_positions,
-                                 replace(parameters, payload_mass=payload))[1]
-        except NoEquilibriumError:
+            torque = _rest(model, task, 'goal', replace(parameters, payload_mass=payload))[1]
+        except (NoEquilibriumError, SingularError, UnreachableError):
             return np.full(model.arm.n_joints, _OVERLOADED)
         share: Array = np.abs(torque) / parameters.stall_torque
         return share
@@ -123,7 +153,8 @@ def holding_limit(model: ArmModel, task: Task, parameters: Parameters) -> tuple[
         if heavy > MAX_PAYLOAD:
             return np.inf, 0
     limit = float(brentq(lambda payload: load(payload).max() - 1, light, heavy, xtol=1e-12))
-    return limit, int(load(limit).argmax())
+    below = load(limit * (1 - _BELOW))
+    return (limit, int(below.argmax())) if abs(below.max() - 1) < _NEARLY else (np.inf, 0)
 
 
 class PayloadEnds:
@@ -143,28 +174,35 @@ class PayloadEnds:
                  conditions: BoundaryConditions) -> None:
         self._model, self._task, self._parameters = model, task, parameters
         self._given = conditions.start, conditions.goal
-        self._bent = bool(model.arm.n_modes and model.arm.gravity.any())
+        bends = task.arm.bends_at_rest
+        self._bent = bends and not task.start_modal_displacements.size, bends
 
-    def at(self, end: int, payload: float) -> tuple[Array, Array]:
+    def at(self, end: int, payload: float) -> tuple[Array, Array, Array]:
         """
-        Return state and its derivative by the payload at the start (0) or the goal (1).
+        Return the state at the start (0) or the goal (1), and two derivatives by the payload.
+
+        Shape (2 n_t,) each; the second one is as exact as Newton's method needs it, 1e-4.
 
         Raises
         ------
         NoEquilibriumError
-            If the arm does not come to rest with that payload, or a little more or less.
+            If the arm does not come to rest with that payload, or a little more or less, or not
+            at its point.
 
         """
         given = self._given[end]
-        if not self._bent:
-            return given, np.zeros_like(given)
-        states = [self._state(end, payload + change) for change in (0.0, -_NUDGE, _NUDGE)]
-        change: Array = (states[2] - states[1]) / (2 * _NUDGE)
-        return states[0], change
+        if not self._bent[end]:
+            return given, np.zeros_like(given), np.zeros_like(given)
+        here, less, more = (self._state(end, payload + change)
+                            for change in (0.0, -_NUDGE, _NUDGE))
+        return here, (more - less) / (2 * _NUDGE), (more - 2 * here + less) / _NUDGE**2
 
     def _state(self, end: int, payload: float) -> Array:
-        task = self._task
-        positions = (task.start_positions, task.goal_positions)[end]
-        rates = (task.start_velocities, task.goal_velocities)[end]
         parameters = replace(self._parameters, payload_mass=payload)
-        return np.concatenate([equilibrium(self._model, positions, parameters)[0], rates])
+        name, velocities = (('start', self._task.start_velocities),
+                            ('goal', self._task.goal_velocities))[end]
+        try:
+            coordinates, _ = _rest(self._model, self._task, name, parameters)
+        except (SingularError, UnreachableError) as error:
+            raise NoEquilibriumError(str(error)) from None
+        return np.concatenate([coordinates, velocities])

@@ -78,20 +78,20 @@ class FreePayloadProblem:
     def left(self, z: Array) -> tuple[Array, Array]:
         """Return the initial conditions."""
         half, size = self.motion.goal.size, self.motion.size
-        state, change = self._rest(0, z)
+        state, change, bend = self._rest(0, z)
         rows = np.zeros((half + 1, self.size))
         rows[:half, :half], rows[:half, -2] = np.eye(half), -change
-        rows[half, half:size], rows[half, -1] = change, 1
+        rows[half, half:size], rows[half, -2:] = change, (z[half:size] @ bend, 1)
         return np.append(z[:half] - state, z[half:size] @ change + z[-1]), rows
 
     def right(self, z: Array) -> tuple[Array, Array]:
         """Return the final conditions."""
         half, size = self.motion.goal.size, self.motion.size
-        state, change = self._rest(1, z)
+        state, change, bend = self._rest(1, z)
         _, inner = self.motion.right(z[:-2])
         rows = np.zeros((half + 1, self.size))
         rows[:half, :size], rows[:half, -2] = inner, -inner[:, :half] @ change
-        rows[half, half:size], rows[half, -1] = change, 1
+        rows[half, half:size], rows[half, -2:] = change, (z[half:size] @ bend, 1)
         miss = np.concatenate([z[:half] - state, z[half:size]])
         return np.append(inner @ miss, z[half:size] @ change + z[-1] + self._price), rows
 
@@ -124,8 +124,8 @@ class FreePayloadProblem:
         """Return the same motion with its payload given."""
         return self.motion.with_changes(payload_mass=payload)
 
-    def _rest(self, end: int, z: Array) -> tuple[Array, Array]:
-        """Return the state at an end and its derivative by the payload of an iterate."""
+    def _rest(self, end: int, z: Array) -> tuple[Array, Array, Array]:
+        """Return the state at an end and its derivatives by the payload of an iterate."""
         try:
             return self._ends.at(end, float(z[-2]))
         except NoEquilibriumError as error:  # it may be absurd: Newton's step is too long

@@ -51,6 +51,8 @@ class MotionProblem:
     ------
     InvalidTaskError
         If a motor is too weak to hold the arm at a goal where it comes to rest.
+    UnreachableError, SingularError
+        If the bent arm cannot rest at a point; the message says which.
 
     """
 

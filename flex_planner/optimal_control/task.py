@@ -6,9 +6,10 @@ from dataclasses import dataclass, field
 from typing import Any, TYPE_CHECKING
 
 from flex_planner.arms.arm import Arm
-from flex_planner.arms.inverse_kinematics import check_angle_limits, inverse_kinematics
-from flex_planner.base.errors import SingularError, UnreachableError
+from flex_planner.arms.inverse_kinematics import check_angle_limits
+from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.validation import Array, number, vector
+from flex_planner.optimal_control.ends_at_points import ends_at_points
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -16,6 +17,7 @@ MAX_JOINT_ANGLE = 100.0
 MAX_DURATION = 1000.0
 MAX_PAYLOAD = 1e6
 MAX_VELOCITY = 1e3
+MAX_DISPLACEMENT = 1e2
 MAX_TIME_WEIGHT = 1e9
 
 
@@ -31,7 +33,11 @@ class Task:
     arm : Arm
         n joints, n_t coordinates.
     start_positions, goal_positions : array_like, shape (n,)
-        Joint angles, within +-100 rad.
+        Joint angles, within +-100 rad. Where a point is given they only say from which posture
+        that of the bent arm is found, see `posture_near_point`.
+    start_point, goal_point : array_like, shape (2,)
+        Where the tip of the arm is at rest, bent by gravity with its payload, in the base frame
+        [m]; empty where joint angles are given. `MotionProblem` finds the posture.
     duration : float
         t_f, > 0 and at most 1000 [s]; a first guess of it if `time_weight` is not 0.
     payload_mass : float
@@ -44,6 +50,9 @@ class Task:
         Diagonals of W_1 and W_2, >= 0; empty for zeros, n entries for the joints alone.
     start_velocities, goal_velocities : array_like, shape (n,) or (n_t,)
         Rates at both ends [rad/s, m/s]; empty for zeros, n entries for the joints alone.
+    start_modal_displacements : array_like, shape (n_f,)
+        Of all links at the start, with joint angles and velocities the whole state of an arm that
+        moves, within +-100 m; empty for those of the arm at rest.
     goal_position_weights, goal_velocity_weights : array_like, shape (n,) or (n_t,)
         Diagonals of W_p and W_v of eq. (6): the goal is approached at this price, and is free
         where the weight is 0. ``inf`` means that it must be met, and is the default; n entries
@@ -75,6 +84,9 @@ class Task:
     velocity_weights: Array = field(default_factory=lambda: np.zeros(0))
     start_velocities: Array = field(default_factory=lambda: np.zeros(0))
     goal_velocities: Array = field(default_factory=lambda: np.zeros(0))
+    start_modal_displacements: Array = field(default_factory=lambda: np.zeros(0))
+    start_point: Array = field(default_factory=lambda: np.zeros(0))
+    goal_point: Array = field(default_factory=lambda: np.zeros(0))
     goal_position_weights: Array = field(default_factory=lambda: np.zeros(0))
     goal_velocity_weights: Array = field(default_factory=lambda: np.zeros(0))
     time_weight: float = 0.0
@@ -88,23 +100,25 @@ class Task:
                 duration: float, payload_mass: float = ..., payload_inertia: float = ...,
                 effort_weights: ArrayLike = ..., position_weights: ArrayLike = ...,
                 velocity_weights: ArrayLike = ..., start_velocities: ArrayLike = ...,
-                goal_velocities: ArrayLike = ..., goal_position_weights: ArrayLike = ...,
-                goal_velocity_weights: ArrayLike = ..., time_weight: float = ...,
-                tolerance: float = ..., allow_large_bending: bool = ...) -> None:
+                goal_velocities: ArrayLike = ..., start_modal_displacements: ArrayLike = ...,
+                start_point: ArrayLike = ..., goal_point: ArrayLike = ...,
+                goal_position_weights: ArrayLike = ..., goal_velocity_weights: ArrayLike = ...,
+                time_weight: float = ..., tolerance: float = ...,
+                allow_large_bending: bool = ...) -> None:
             """Accept lists where arrays are kept."""
 
     @classmethod
     def between_points(cls, arm: Arm, start: ArrayLike, goal: ArrayLike, *, duration: float,
                        elbow: int = -1, **others: Any) -> Task:
         """
-        Return the motion between two points of the tip, see `postures_from_points`.
+        Return the motion between two points where the tip rests, see `ends_at_points`.
 
         Parameters
         ----------
         arm : Arm
             n joints.
         start, goal : array_like, shape (2,)
-            Tip positions of the unbent arm in the base frame [m].
+            Tip positions of the arm at rest, bent by gravity, in the base frame [m].
         duration : float
             As of `Task`.
         elbow : int
@@ -115,19 +129,44 @@ class Task:
         Raises
         ------
         UnreachableError, SingularError, InvalidValueError
-            See `inverse_kinematics`; the message says which point.
+            See `posture_near_point`; the message says which point.
 
         """
-        postures = postures_from_points(arm, start, goal, elbow)
-        return cls(arm=arm, start_positions=postures[0], goal_positions=postures[1],
-                   duration=duration, **others)
+        return cls(arm=arm, duration=duration, **others,
+                   **ends_at_points(arm, start, goal, elbow))
+
+    @classmethod
+    def to_point(cls, arm: Arm, start_positions: ArrayLike, goal: ArrayLike, *, duration: float,
+                 elbow: int = -1, **others: Any) -> Task:
+        """
+        Return the motion from given joint angles to a point where the tip rests.
+
+        Parameters
+        ----------
+        start_positions : array_like, shape (n,)
+            Joint angles [rad].
+        arm, goal, duration, elbow, others
+            As of `between_points`.
+
+        Raises
+        ------
+        UnreachableError, SingularError, InvalidValueError
+            See `posture_near_point`; the message says which point.
+
+        """
+        start = vector('start_positions', start_positions, arm.n_joints, unit='rad')
+        return cls(arm=arm, duration=duration, start_positions=start, **others,
+                   **ends_at_points(arm, None, goal, elbow, start))
 
     def __post_init__(self) -> None:
         n, n_t = self.arm.n_joints, self.arm.n_coordinates
         for name in ('start_positions', 'goal_positions'):
             self._set(name, vector(name, getattr(self, name), n, at_least=-MAX_JOINT_ANGLE,
                                    at_most=MAX_JOINT_ANGLE, unit='rad'))
-            check_angle_limits(self.arm, name, getattr(self, name))
+            point = name.replace('positions', 'point')
+            self._set(point, vector(point, getattr(self, point), (0, 2), unit='m'))
+            if not (getattr(self, point).size and self.arm.bends_at_rest):
+                check_angle_limits(self.arm, name, getattr(self, name))
         number('duration', self.duration, above=0, at_most=MAX_DURATION, unit='s')
         number('payload_mass', self.payload_mass, at_least=0, at_most=MAX_PAYLOAD, unit='kg')
         number('payload_inertia', self.payload_inertia, at_least=0, at_most=MAX_PAYLOAD,
@@ -143,12 +182,33 @@ class Task:
                                  at_least=-MAX_VELOCITY, at_most=MAX_VELOCITY))
         for name in ('goal_position_weights', 'goal_velocity_weights'):
             self._set(name, _goal_weights(name, getattr(self, name), n, n_t))
+        self._set_bending()
 
     @property
     def ends_at_rest(self) -> bool:
         """Return whether the arm must come to rest at the goal, bent as gravity bends it."""
         hard = np.isinf(self.goal_position_weights) & np.isinf(self.goal_velocity_weights)
         return bool(hard.all()) and not bool(self.goal_velocities.any())
+
+    @property
+    def starts_at_rest(self) -> bool:
+        """Return whether the arm rests at the start, bent as gravity bends it."""
+        return not (self.start_modal_displacements.size or self.start_velocities.any())
+
+    @property
+    def must_reach_point(self) -> bool:
+        """Return whether the tip must come to a point: not if it may pass by at a price."""
+        return bool(self.goal_point.size) and bool(np.isinf(self.goal_position_weights).all())
+
+    def _set_bending(self) -> None:
+        """Check the modal displacements at the start."""
+        name = 'start_modal_displacements'
+        bending = vector(name, getattr(self, name), (0, self.arm.n_modes),
+                         at_least=-MAX_DISPLACEMENT, at_most=MAX_DISPLACEMENT, unit='m')
+        self._set(name, bending)
+        if bending.size and self.start_point.size:
+            raise InvalidValueError(name, 'given', 'left out where the start is a point: there '
+                                    'the arm rests')
 
     def _set(self, name: str, value: Array) -> None:
         object.__setattr__(self, name, value)
@@ -181,39 +241,11 @@ def _goal_weights(name: str, values: ArrayLike, n: int, n_t: int) -> Array:
 def postures_from_points(arm: Arm, start: ArrayLike, goal: ArrayLike,
                          elbow: int) -> tuple[Array, Array]:
     """
-    Return start and goal joint angles of a motion between two points of the tip.
+    Return the joint angles (n,) at start and goal of `ends_at_points` [rad].
 
-    The goal is the posture nearest to the start, so that the arm does not make a needless full
-    turn.
-
-    Parameters
-    ----------
-    arm : Arm
-        n joints.
-    start, goal : array_like, shape (2,)
-        Tip positions in the base frame [m].
-    elbow : int
-        See :func:`flex_planner.arms.inverse_kinematics.inverse_kinematics`, +1 or -1.
-
-    Returns
-    -------
-    tuple of numpy.ndarray, shape (n,)
-        [rad].
-
-    Raises
-    ------
-    UnreachableError, SingularError, InvalidValueError
-        See `inverse_kinematics`; the message says which point.
+    They put the tip of the unbent arm at the points; a task with nothing but these angles rests
+    elsewhere where gravity bends the arm.
 
     """
-    first = _posture(arm, 'start_point', start, elbow, None)
-    return first, _posture(arm, 'goal_point', goal, elbow, first)
-
-
-def _posture(arm: Arm, name: str, point: ArrayLike, elbow: int, near: Array | None) -> Array:
-    """Return the posture of one point; errors say which."""
-    checked = vector(name, point, 2, unit='m')
-    try:
-        return inverse_kinematics(arm, checked, elbow, near)
-    except (UnreachableError, SingularError) as error:
-        raise type(error)(f'{name}: {error}') from None
+    fields = ends_at_points(arm, start, goal, elbow)
+    return fields['start_positions'], fields['goal_positions']

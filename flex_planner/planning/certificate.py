@@ -29,7 +29,8 @@ class Certificate:
     hamiltonian_drift : float
         Spread of H over the motion relative to its largest term; 0 on an extremal.
     tip_error : float
-        Distance of the re-simulated tip from the goal [m].
+        Distance of the re-simulated tip from the point that was asked for, or else from where the
+        goal's joint angles have it [m].
     residual_vibration : float
         Largest bending after the joints are locked at the end of the re-simulation [m].
     state_error, costate_error : float
@@ -92,11 +93,13 @@ def certify(problem: MotionProblem, result: CollocationResult, monitor: Monitor,
         return Certificate(collocation_residual=result.residual)
     arm, n_t = problem.model.arm, problem.model.arm.n_coordinates
     miss = final - reached
-    tips = tip_position(arm, np.stack([final[:n_t], reached[:n_t]]))
+    tip, asked = tip_position(arm, final[:n_t]), tip_position(arm, reached[:n_t])
+    if problem.task.must_reach_point:
+        asked = problem.task.goal_point
     return Certificate(
         collocation_residual=result.residual, boundary_error=float(miss @ miss / 2),
         hamiltonian_drift=hamiltonian_drift(problem, result.solution),
-        tip_error=float(np.linalg.norm(tips[0] - tips[1])),
+        tip_error=float(np.linalg.norm(tip - asked)),
         residual_vibration=residual_vibration(problem.model, _at_rest(problem) + miss,
                                               problem.goal[:n_t], problem.parameters),
         state_error=float(result.errors[:2 * n_t].max()),

@@ -71,6 +71,8 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
     ------
     InvalidTaskError
         If an objective or the model does not go with the task, or the links buckle at rest.
+    UnreachableError, SingularError
+        If the arm, bent by gravity, cannot rest at a point of the task.
     ValueError
         If there are no strategies.
 

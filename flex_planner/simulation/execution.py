@@ -152,7 +152,9 @@ def execute_plan(mode: ExecutionMode, plan: Plan, sampled: SampledPlan,
         setting.model, Control(gains=gains, rate=setting.rate,
                                feedforward=mode is not ExecutionMode.PD_ONLY),
         payload_mass=setting.payload_mass, payload_inertia=plan.task.payload_inertia,
-        positions=plan.task.start_positions)
+        positions=plan.problem.start[:n])
+    if not plan.task.starts_at_rest:
+        plant.state = _moving_start(plan, plant.state)
     plant.follow(reference)
     arrival = plan.task.duration
     execution, bending = _watch(plant, arrival, setting)
@@ -166,6 +168,15 @@ def execute_plan(mode: ExecutionMode, plan: Plan, sampled: SampledPlan,
         final_error=float(error[execution.times >= end].max()), bending=bending,
         residual=ResidualVibration.of(plant.model.arm, execution.coordinates[after:]),
         tracking_error=float(tracking), execution=execution)
+
+
+def _moving_start(plan: Plan, rest: Array) -> Array:
+    """Return the state at the start of a plan, of the joints alone where it has no modes."""
+    state, start, n = rest.copy(), plan.problem.start, plan.arm.n_joints
+    if start.size == rest.size:
+        return start.copy()
+    state[rest.size // 2:rest.size // 2 + n] = start[n:]
+    return state
 
 
 def _watch(plant: Plant, arrival: float, setting: Setting) -> tuple[SimulatedMotion, float]:

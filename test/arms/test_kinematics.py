@@ -7,6 +7,7 @@ from flex_planner.arms.kinematics import (
     frame_angles,
     jacobian,
     link_points,
+    tip_jacobian,
     tip_position,
     tip_velocity,
 )
@@ -81,6 +82,13 @@ def test_clamped_link_carries_the_next_one_on_its_bent_tip(crane_arm: Arm) -> No
     np.testing.assert_allclose(points[1, 0], joint, atol=1e-15)
     np.testing.assert_allclose(frame_angles(crane_arm, q), [0.4, 0.4 + slope - 1.1], atol=1e-15)
     assert min(abs(bend), abs(slope)) > 1e-3
+
+
+def test_jacobian_of_the_bent_arm_is_the_derivative_of_its_tip(crane_arm: Arm) -> None:
+    q = np.random.default_rng(4).normal(size=crane_arm.n_coordinates)
+    steps = q + 1e-20j * np.eye(q.size)  # complex step: exact
+    np.testing.assert_allclose(tip_jacobian(crane_arm, q),
+                               tip_position(crane_arm, steps).imag.T / 1e-20, atol=1e-14)
 
 
 def test_tip_velocity_is_the_rate_of_the_tip_position(crane_arm: Arm, workshop_arm: Arm) -> None:

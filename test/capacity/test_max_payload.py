@@ -8,14 +8,18 @@ from typing import Any
 
 from factories import SearchFactory, TaskFactory
 from flex_planner.arms.arm import Arm, Joint, Link, Motor
+from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.errors import InvalidTaskError, InvalidValueError
 from flex_planner.base.progress import Monitor
 from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.capacity.results import PayloadMethod
 from flex_planner.collocation import Solver, SolverSettings
 from flex_planner.dynamics.integration import PiecewisePolynomial, simulate
+from flex_planner.dynamics.statics import equilibrium
 from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.boundary_conditions import holding_limit
 from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectResult, DirectSettings
+from flex_planner.optimal_control.motion_problem import task_parameters
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import PlanStatus
 from flex_planner.planning.plan_path import plan_path
@@ -308,6 +312,30 @@ def test_joint_that_can_hold_no_more_is_named() -> None:
     assert found.solved, found.message
     assert (found.held, found.limiting_joint) == (True, 1)
     assert found.local_upper == pytest.approx((4 / G - 0.125) / 0.5, rel=1e-9)
+
+
+@pytest.mark.parametrize('method', PayloadMethod)
+def test_tip_of_the_bent_arm_rests_at_its_points_with_the_largest_payload(
+        crane_model: ArmModel, method: PayloadMethod) -> None:
+    points = np.array([[0.1, -0.8], [0.3, -0.75]])
+    task = Task.between_points(crane_model.arm, *points, elbow=1, duration=0.5, payload_mass=0.2)
+    found = find_max_payload(task, model=crane_model, method=method, accuracy=0.05)
+    assert found.solved, found.message
+    assert found.payload > 0.5
+    assert found.plan is not None
+    ends = found.plan.problem.start, found.plan.problem.goal
+    for state, point in zip(ends, points, strict=True):
+        q, _ = equilibrium(crane_model, state[:2], found.plan.problem.parameters)
+        np.testing.assert_allclose(tip_position(crane_model.arm, q), point, rtol=0, atol=1e-9)
+        lighter, _ = equilibrium(crane_model, state[:2], task_parameters(task))
+        assert np.linalg.norm(tip_position(crane_model.arm, lighter) - point) > 1e-3
+    # the same joint angles carry the same
+    angles = replace(task, start_point=[], goal_point=[], start_positions=ends[0][:2],
+                     goal_positions=ends[1][:2])
+    limit, joint = holding_limit(crane_model, angles, task_parameters(angles))
+    if method is PayloadMethod.DIRECT:
+        assert (found.held, found.limiting_joint) == (True, joint)
+        assert found.upper == pytest.approx(limit, rel=1e-7)
 
 
 def test_goal_that_the_motor_cannot_hold_with_the_first_payload_is_refused() -> None:

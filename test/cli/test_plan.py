@@ -217,6 +217,33 @@ def test_joint_angles_say_the_same_as_points(planned: Outcome, tmp_path: Path) -
     assert task.goal_positions.tolist() == pytest.approx([1.5708, -1.5708], abs=1e-4)
 
 
+def test_angles_at_the_start_go_with_a_point_at_the_goal(planned: Outcome) -> None:
+    outcome = run('plan', 'korayem_rigid', '--from-angles', '60,-120', '--to', '0.5,0.5',
+                  '--duration', '1', *WEIGHTS, '--payload', '1', *DRY)
+    assert outcome.rows['motion'] == '(60, -120) deg to (0.5, 0.5) m in 1 s with 1 kg'
+    assert outcome.rows['cost J'] == planned.rows['cost J']
+
+
+@pytest.mark.parametrize('command', ['plan', 'payload'])
+def test_point_that_the_bent_arm_cannot_reach_is_named_by_its_option(command: str,
+                                                                     tmp_path: Path) -> None:
+    path = tmp_path / 'arm.yaml'
+    path.write_text("""
+        {name: soft, gravity: [0, -9.81], joints: [{motor: {stall_torque: 9}}, {}], links: [
+          {length: 0.5, mass: 0.5, flexural_rigidity: 20, modes: 1, mode_family: clamped_free},
+          {length: 0.5, mass: 0.5, flexural_rigidity: 20, modes: 1, mode_family: clamped_free}]}
+        """)
+    outcome = run(command, str(path), '--from', '0.5,0', '--to', '0.9,0.8', '--duration', '1',
+                  *DRY)
+    assert outcome.code == 1
+    assert outcome.err.splitlines()[-1] == (
+        'flex-planner: --to: no posture was found in which the arm, bent by gravity, rests with '
+        'its tip at (0.9, 0.8) m')
+    outcome = run('plan', str(path), '--from', '0.5,0', '--to', '0.5,0.5', '--duration', '1',
+                  '--start-modal-displacements', '0,0', *DRY)
+    assert "--start-modal-displacements is 'given', but must be left out" in outcome.err
+
+
 def test_nothing_is_written_if_told_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert run('plan', 'korayem_rigid', *MOTION, *DRY).code == 0
@@ -261,6 +288,10 @@ def test_time_limit_is_named_where_it_ends_a_search() -> None:
     ([*MOTION, '--effort-weights', '1'], '--effort-weights has 1 numbers, but must be a list of'),
     ([*MOTION, '--velocity-weights', '-1,0'], '--velocity-weights[0] is -1.0, but must be'),
     ([*MOTION, '--position-weights', '1,2,3'], '--position-weights has 3 numbers'),
+    (['--from', '0.5,0', '--to-angles', '0,1', '--duration', '1'],
+     'but the command has --from, --to-angles'),
+    ([*MOTION, '--start-velocities', '1'], '--start-velocities has 1 numbers, but must be a list'),
+    ([*MOTION, '--start-modal-displacements', '1'], '--start-modal-displacements has 1 numbers'),
     (['--from-angles', '0,90', '--to-angles', '0,1e5', '--duration', '1'],
      '--to-angles[1] is 100000.0, but must be a number >= -5729.58 and <= 5729.58 deg')])
 def test_bad_option_is_answered_by_one_line_that_names_it(arguments: list[str],

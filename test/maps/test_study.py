@@ -196,6 +196,7 @@ def test_cell_is_the_task_of_its_values(tmp_path: Path) -> None:
     start, goal = postures_from_points(study.arm, (0.5, 0.0), (0.25, 0.5), elbow=-1)
     assert task.start_positions.tolist() == start.tolist()
     assert task.goal_positions.tolist() == goal.tolist()
+    assert (task.start_point.tolist(), task.goal_point.tolist()) == ([0.5, 0.0], [0.25, 0.5])
     assert (task.arm, task.duration, task.payload_mass) == (study.arm, 1.0, 3.0)
     assert task.effort_weights.tolist() == [0.125, 0.25]
     assert task.velocity_weights.tolist() == [1.0, 2.0, 0.0, 0.0]

@@ -8,9 +8,11 @@ import math
 from typing import Any
 
 from flex_planner.arms.arm import Arm, Joint, Link, Motor
-from flex_planner.base.errors import InvalidTaskError, NoEquilibriumError
+from flex_planner.arms.kinematics import tip_jacobian, tip_position
+from flex_planner.base.errors import InvalidTaskError, NoEquilibriumError, UnreachableError
 from flex_planner.base.validation import Array
 from flex_planner.collocation.linear import SingularSystemError
+from flex_planner.dynamics.statics import equilibrium
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.boundary_conditions import (
     BoundaryConditions,
@@ -114,6 +116,17 @@ def test_joint_that_holds_least_is_named(torques: tuple[float, float], joint: in
     assert (limit, first) == (pytest.approx(expected, rel=1e-9), joint)
 
 
+@pytest.mark.parametrize('stall_torque', [9.0, 1e4])
+def test_motors_that_outlast_the_links_do_not_say_what_is_held(
+        crane_model: ArmModel, crane_arm: Arm, task: Task, stall_torque: float) -> None:
+    joint = Joint(motor=Motor(stall_torque=stall_torque))
+    strong = replace(task, arm=replace(crane_arm, joints=(joint, joint)))
+    limit, _ = holding_limit(crane_model, strong, task_parameters(strong))
+    with pytest.raises(NoEquilibriumError):
+        payload_ends(crane_model, task).at(1, 100.0)
+    assert (limit < 10) if stall_torque == 9 else (limit == inf)
+
+
 @pytest.mark.parametrize('changes', [{'gravity': [0.0, 0.0]}, {'joints': (Joint(),)}], ids=str)
 def test_any_payload_is_held_without_gravity_or_without_limits(changes: dict[str, Any]) -> None:
     task = lifted_to(0.0, 2.0)
@@ -142,13 +155,101 @@ def test_ends_are_those_of_the_task_with_that_payload(crane_model: ArmModel, tas
         ends = ends_of(crane_model, replace(task, payload_mass=payload))
         return (ends.start, ends.goal)[end]
 
-    found, slope = payload_ends(crane_model, task).at(end, 0.3)
+    found, slope, _ = payload_ends(crane_model, task).at(end, 0.3)
     assert np.array_equal(found, state(0.3))
     # truncation: the sag is nearly linear in the payload; rounding of 1e-13 m over 1e-3 kg
     difference = (state(0.301) - state(0.299)) / 2e-3
     np.testing.assert_allclose(slope, difference, rtol=1e-5, atol=1e-9)
     assert slope[2:5].all()
     assert not slope[[0, 1, *range(5, 10)]].any()  # joints and speeds are given
+
+
+# Points where the tip rests
+
+
+@pytest.fixture
+def between_points(crane_arm: Arm) -> Task:
+    """Return a motion between points under gravity."""
+    return Task.between_points(crane_arm, (0.1, -0.8), (0.3, -0.75), duration=1.0, elbow=1,
+                               payload_mass=0.2)
+
+
+@pytest.mark.parametrize('payload', [0.2, 0.0, 0.5])
+def test_tip_rests_at_both_points_whatever_it_carries(crane_model: ArmModel, payload: float,
+                                                      between_points: Task) -> None:
+    task = replace(between_points, payload_mass=payload)
+    ends = ends_of(crane_model, task)
+    unbent = np.array([task.start_positions, task.goal_positions])
+    for state, angles, point in zip((ends.start, ends.goal), unbent,
+                                    (task.start_point, task.goal_point), strict=True):
+        q, torque = equilibrium(crane_model, state[:2], task_parameters(task))
+        np.testing.assert_allclose(tip_position(crane_model.arm, q), point, rtol=0, atol=1e-11)
+        assert np.abs(state[:2] - angles).max() > 1e-3  # the unbent arm would miss
+        assert not state[5:].any()
+    np.testing.assert_allclose(ends.holding_torque, torque, rtol=1e-9)
+
+
+@pytest.mark.parametrize('end', [0, 1])
+def test_posture_at_a_point_follows_the_payload(crane_model: ArmModel, between_points: Task,
+                                                end: int) -> None:
+    def state(payload: float) -> Array:
+        ends = ends_of(crane_model, replace(between_points, payload_mass=payload))
+        return (ends.start, ends.goal)[end]
+
+    found, slope, _ = payload_ends(crane_model, between_points).at(end, 0.3)
+    assert np.array_equal(found, state(0.3))
+    difference = (state(0.301) - state(0.299)) / 2e-3
+    # of second order in 1e-3 kg; the tip is exact to 1e-12 m, over 1e-4 kg
+    np.testing.assert_allclose(slope, difference, rtol=1e-5, atol=1e-7)
+    assert slope[:5].all()
+    # the tip stays where it is
+    tip = tip_jacobian(crane_model.arm, found[:5]) @ slope[:5]
+    np.testing.assert_allclose(tip, 0, atol=1e-7)
+
+
+def test_payload_is_held_in_the_posture_that_it_bends_the_arm_to(crane_model: ArmModel,
+                                                                 between_points: Task) -> None:
+    parameters = task_parameters(between_points)
+    limit, joint = holding_limit(crane_model, between_points, parameters)
+    ends = ends_of(crane_model, replace(between_points, payload_mass=limit * (1 - 1e-9)))
+    shares = np.abs(ends.holding_torque) / parameters.stall_torque
+    assert (shares.argmax(), shares.max()) == (joint, pytest.approx(1, abs=1e-8))
+    unbent, _ = holding_limit(crane_model, replace(between_points, goal_point=[]), parameters)
+    assert abs(limit / unbent - 1) > 1e-3
+
+
+@pytest.mark.parametrize(('name', 'point', 'error'), [
+    ('start', (0.9, 0.8), UnreachableError), ('goal', (2.0, 0.0), UnreachableError)])
+def test_point_that_the_bent_arm_cannot_reach_is_named(
+        crane_model: ArmModel, between_points: Task, name: str, point: tuple[float, float],
+        error: type[Exception]) -> None:
+    task = replace(between_points, **{f'{name}_point': point})  # type: ignore[arg-type]
+    with pytest.raises(error, match=f'^{name}_point: no posture was found in which the arm, bent'):
+        ends_of(crane_model, task)
+
+
+def test_payload_that_cannot_rest_at_its_point_leaves_no_ends(crane_model: ArmModel,
+                                                              between_points: Task) -> None:
+    ends = payload_ends(crane_model, between_points)
+    with pytest.raises(NoEquilibriumError):
+        ends.at(1, 100.0)
+
+
+# A start that moves
+
+
+def test_start_that_moves_is_that_of_the_task_for_any_payload(crane_model: ArmModel,
+                                                              task: Task) -> None:
+    moving = replace(task, start_modal_displacements=[0.01, -0.02, 0.03],
+                     start_velocities=[0.1, 0.2, 0.3, 0.4, 0.5])
+    expected = [-1.6, 0.2, 0.01, -0.02, 0.03, 0.1, 0.2, 0.3, 0.4, 0.5]
+    assert ends_of(crane_model, moving).start.tolist() == expected
+    ends = payload_ends(crane_model, moving)
+    state, slope, bend = ends.at(0, 3.0)
+    assert state.tolist() == expected
+    assert not slope.any()
+    assert not bend.any()
+    assert ends.at(1, 0.3)[1].any()
 
 
 def test_payload_that_buckles_the_links_leaves_no_ends(crane_model: ArmModel,

@@ -22,7 +22,8 @@ GAP = 1e-2
 CASES = ['rigid', 'ei5', 'crane']
 every_case = pytest.mark.parametrize('name', CASES)
 GOALS: list[dict[str, list[float]]] = [
-    {}, {'goal_position_weights': [10, 20], 'goal_velocity_weights': [1, inf]}]
+    {}, {'goal_position_weights': [10, 20], 'goal_velocity_weights': [1, inf]},
+    {'goal_point': [-0.1, -0.8]}]
 
 
 def smooth_points(problem: Extended, solution: CollocationSolution,
@@ -75,16 +76,15 @@ def with_goal(plan: Plan, goal: dict[str, list[float]], which: type[Any]) -> Ext
             else FreePayloadProblem(problem, 3.0))
 
 
-def forget_the_bend_of_the_sag(rows: Array, found: Array, z: Array) -> None:
-    """Check that the second derivative of the sag is small and left out, and leave it out."""
-    # some millimetres a square kilogram
-    assert abs(found[-1, -2]) < 0.02 * np.abs(z).max()
-    assert rows[-1, -2] == 0
-    found[-1, -2] = 0
+def check_bend_of_the_ends(rows: Array, found: Array, z: Array) -> None:
+    """Check the second derivative of the state at an end, and leave it out."""
+    # rounding of 1e-15 over the square of 1e-4 kg, times the costates; measured 1e-7
+    assert rows[-1, -2] == pytest.approx(found[-1, -2], rel=1e-3, abs=1e-6 * np.abs(z).max())
+    rows[-1, -2] = found[-1, -2] = 0
 
 
 @every_case
-@pytest.mark.parametrize('goal', GOALS, ids=['given', 'weighted'])
+@pytest.mark.parametrize('goal', GOALS, ids=['given', 'weighted', 'at a point'])
 @pytest.mark.parametrize('which', [FreeDurationProblem, FreePayloadProblem])
 def test_rows_are_derivatives_of_the_conditions(
         saturated: Callable[[str], Plan], name: str, goal: dict[str, list[float]],
@@ -99,7 +99,7 @@ def test_rows_are_derivatives_of_the_conditions(
         residual, rows = side(z)
         found = differences(lambda at, side=side: side(at)[0], z, steps)
         if which is FreePayloadProblem:
-            forget_the_bend_of_the_sag(rows, found, z)
+            check_bend_of_the_ends(rows, found, z)
         assert rows.shape == (residual.size, made.size)
         np.testing.assert_allclose(rows, found, rtol=1e-7, atol=atol)
     assert made.left(z)[0].size + made.right(z)[0].size == made.size

@@ -12,7 +12,8 @@ from flex_planner.base.errors import InvalidSizeError, InvalidValueError, NotFin
 from flex_planner.base.validation import Array
 from flex_planner.collocation import Solver, SolverSettings
 from flex_planner.optimal_control.arm_model import ArmModel
-from flex_planner.optimal_control.task import Task
+from flex_planner.optimal_control.ends_at_points import ends_at_points
+from flex_planner.optimal_control.task import postures_from_points, Task
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_path import plan_path
 import numpy as np
@@ -316,6 +317,14 @@ def test_derivative_of_the_cost_by_the_payload_is_the_integral_of_its_share(
      'start_velocities has 1 numbers, but must be a list of 0 or 2 or 6 numbers'),
     ({'start_velocities': [0.0, 1001.0]}, InvalidValueError,
      'start_velocities[1] is 1001.0, but must be a number >= -1000 and <= 1000'),
+    ({'start_modal_displacements': [0.0] * 3}, InvalidSizeError,
+     'start_modal_displacements has 3 numbers, but must be a list of 0 or 4 numbers'),
+    ({'start_modal_displacements': [0.0, 0.0, -101.0, 0.0]}, InvalidValueError,
+     'start_modal_displacements[2] is -101.0, but must be a number >= -100 and <= 100 m'),
+    ({'start_point': [0.5]}, InvalidSizeError,
+     'start_point has 1 numbers, but must be a list of 0 or 2 numbers'),
+    ({'goal_point': [0.5, math.nan]}, NotFiniteError,
+     'goal_point[1] is nan, but must be a finite number m'),
     ({'goal_velocities': [-1001.0, 0.0]}, InvalidValueError,
      'goal_velocities[0] is -1001.0, but must be a number >= -1000 and <= 1000'),
     ({'goal_velocities': [math.nan, 0.0]}, NotFiniteError,
@@ -357,8 +366,41 @@ def test_values_are_padded_and_read_only(ei5_arm: Arm, paper_task: TaskFactory) 
     assert task.start_velocities.tolist() == [1, 2, 0, 0, 0, 0]
     assert task.goal_velocities.tolist() == [0] * 6
     assert task.goal_position_weights.tolist() == [3, inf, inf, inf, inf, inf]
+    task = replace(task, start_modal_displacements=[0.1] * 4, goal_point=[0.5, 0.5])
     for name in ('start_velocities', 'goal_velocities', 'goal_position_weights',
-                 'goal_velocity_weights'):
+                 'goal_velocity_weights', 'start_modal_displacements', 'goal_point'):
         with pytest.raises(ValueError, match='read-only'):
             getattr(task, name)[0] = 0
     assert replace(task, duration=2.0).goal_position_weights.tolist() == [3] + [inf] * 5
+
+
+def test_points_are_kept_beside_the_postures_they_are_looked_for_from(ei5_arm: Arm) -> None:
+    task = Task.between_points(ei5_arm, (0.5, 0.0), (0.5, 0.5), duration=1.0)
+    assert (task.start_point.tolist(), task.goal_point.tolist()) == ([0.5, 0.0], [0.5, 0.5])
+    start, goal = postures_from_points(ei5_arm, (0.5, 0.0), (0.5, 0.5), elbow=-1)
+    assert task.start_positions.tolist() == start.tolist()
+    assert task.goal_positions.tolist() == goal.tolist()
+
+
+def test_goal_at_a_point_is_near_a_start_of_given_angles(rigid_arm: Arm) -> None:
+    start = np.array([1.0 + 2 * np.pi, -2.0])
+    ends = ends_at_points(rigid_arm, None, (0.5, 0.5), -1, start)
+    assert set(ends) == {'goal_point', 'goal_positions'}
+    task = Task.to_point(rigid_arm, start, (0.5, 0.5), duration=1.0)
+    assert task.start_positions.tolist() == start.tolist()
+    assert task.goal_positions.tolist() == ends['goal_positions'].tolist()
+    assert np.abs(ends['goal_positions'] - start).max() < np.pi
+
+
+def test_arm_at_rest_at_a_point_is_bent_by_gravity_alone(crane_arm: Arm) -> None:
+    task = Task.between_points(crane_arm, (0.1, -0.8), (0.3, -0.75), duration=1.0)
+    with pytest.raises(InvalidValueError, match='^start_modal_displacements is .* left out where'):
+        replace(task, start_modal_displacements=[0.0] * 3)
+
+
+@pytest.mark.parametrize(('changes', 'at_rest'), [
+    ({}, True), ({'start_modal_displacements': [0.0] * 4}, False),
+    ({'start_velocities': [0.0, 0.1]}, False), ({'start_velocities': [0.0, 0.0]}, True)], ids=str)
+def test_task_knows_whether_the_arm_rests_at_the_start(
+        ei5_arm: Arm, paper_task: TaskFactory, changes: dict[str, Any], at_rest: bool) -> None:
+    assert paper_task(ei5_arm, **changes).starts_at_rest == at_rest

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import fields, replace
 import math
 
 from factories import PlanFactory
+from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.progress import Monitor
 from flex_planner.collocation import CollocationResult, CollocationSolution, SolverStatus
+from flex_planner.dynamics.statics import equilibrium
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.task import Task
 from flex_planner.planning.certificate import (
     Certificate,
     CertificateLimits,
@@ -15,6 +20,7 @@ from flex_planner.planning.certificate import (
     hamiltonian_drift,
 )
 from flex_planner.planning.plan import Plan
+from flex_planner.planning.plan_path import plan_path
 import numpy as np
 from plan_checks import solution_of
 import pytest
@@ -75,3 +81,35 @@ def test_limits_name_what_they_refuse(name: str, value: float) -> None:
 
 def test_certificate_of_a_plan_without_solution_is_infinite() -> None:
     assert all(getattr(Certificate(), entry.name) == math.inf for entry in fields(Certificate))
+
+
+@pytest.fixture(scope='module')
+def to_a_point(crane_model: ArmModel) -> Plan:
+    """Return a motion under gravity between points."""
+    return plan_path(Task.between_points(crane_model.arm, (0.1, -0.8), (0.3, -0.75), elbow=1,
+                                         duration=1.2, payload_mass=0.2), model=crane_model)
+
+
+def test_tip_of_a_plan_under_gravity_rests_at_the_point(to_a_point: Plan) -> None:
+    plan = to_a_point
+    assert plan.solved, plan.message
+    for time, point in ((0.0, (0.1, -0.8)), (1.2, (0.3, -0.75))):
+        q, _ = equilibrium(plan.model, plan.sample(time).coordinates[0, :2],
+                           plan.problem.parameters)
+        np.testing.assert_allclose(tip_position(plan.arm, q), point, rtol=0, atol=1e-6)
+    unbent = np.concatenate([plan.task.goal_positions, np.zeros(3)])
+    missed, _ = equilibrium(plan.model, unbent[:2], plan.problem.parameters)
+    assert np.linalg.norm(tip_position(plan.arm, missed) - (0.3, -0.75)) > 5e-3
+
+
+def test_tip_error_is_measured_from_the_point(to_a_point: Plan) -> None:
+    plan = to_a_point
+    result = altered(plan, 1.0)
+    assert certify(plan.problem, result, Monitor()).tip_error < 1e-8
+    problem = copy(plan.problem)
+    problem.task = replace(plan.task, goal_point=plan.task.goal_point + [3e-4, 4e-4])
+    assert certify(problem, result, Monitor()).tip_error == pytest.approx(5e-4, rel=1e-3)
+    # without a point, and where the tip may end beside it at a price, the goal is the state
+    for changes in ({'goal_point': []}, {'goal_position_weights': [1.0, 1.0]}):
+        problem.task = replace(problem.task, **changes)  # type: ignore[arg-type]
+        assert certify(problem, result, Monitor()).tip_error < 1e-8

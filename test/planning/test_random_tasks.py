@@ -56,7 +56,10 @@ def tasks(draw: st.DrawFn, arms: dict[str, Arm]) -> Task:
         return draw(st.lists(st.floats(low, high), min_size=2, max_size=2))
 
     start = np.array(entries(-reach, reach)) + (-np.pi / 2 * hanging, 0.0)
+    bending = st.floats(-2e-3, 2e-3)
     optional: dict[str, Any] = {
+        'start_modal_displacements': draw(st.lists(bending, min_size=arm.n_modes,
+                                                   max_size=arm.n_modes)),
         'effort_weights': entries(0.1, 2.0), 'velocity_weights': entries(0.0, 20.0),
         'start_velocities': entries(-0.5, 0.5), 'goal_velocities': entries(-0.3, 0.3),
         'goal_position_weights': [draw(st.floats(1.0, 1e4)), math.inf],

@@ -64,6 +64,22 @@ def test_rigid_plan_is_as_wrong_by_another_integrator(compared: Comparison) -> N
     assert result.bending == pytest.approx(bending, rel=1e-3)
 
 
+def test_arm_that_moves_at_the_start_is_simulated_from_there(ei5_arm: Arm, ei5_model: ArmModel,
+                                                             paper_task: Any) -> None:
+    task = paper_task(ei5_arm, start_velocities=[0.3, -0.5, 0.01, 0.0, 0.0, 0.02],
+                      start_modal_displacements=[2e-3, 0.0, -1e-3, 0.0])
+    found = compare(task, model=ei5_model, rate=4000.0, settling=0.3)
+    flexible, rigid = (found.of(mode) for mode in (ExecutionMode.FLEXIBLE_OPEN,
+                                                   ExecutionMode.RIGID_OPEN))
+    assert flexible.execution.coordinates[0].tolist() == [*task.start_positions, 2e-3, 0, -1e-3, 0]
+    # the torque is held for 0.25 ms
+    assert flexible.arrival_error < 1e-3 * MM
+    # a rigid plan knows of the joints' speeds alone
+    assert not rigid.execution.coordinates[0, 2:].any()
+    assert found.rigid.problem.start.tolist() == [*task.start_positions, 0.3, -0.5]
+    assert rigid.arrival_error > 0.1 * MM
+
+
 def test_errors_are_those_of_the_recorded_motion(compared: Comparison) -> None:
     for result in compared.results:
         times, tip = result.execution.times, result.execution.tip

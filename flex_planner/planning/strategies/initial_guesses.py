@@ -101,7 +101,11 @@ def coarse_mesh(problem: MotionProblem, solver: Solver) -> Attempt:
 
 def rigid_problem(problem: MotionProblem) -> MotionProblem:
     """
-    Return the task for the same arm made rigid, with the weights of the joints.
+    Return the task for the same arm made rigid, with the weights and ends of the joints.
+
+    The joints begin and end where those of the flexible arm do, also where that puts the tip
+    of the rigid one beside the point that was asked for: what is lifted from its motion then
+    meets the boundary conditions.
 
     Raises
     ------
@@ -109,11 +113,13 @@ def rigid_problem(problem: MotionProblem) -> MotionProblem:
         If a motor is too weak to hold the rigid arm at the goal.
 
     """
-    task, n = problem.task, problem.task.arm.n_joints
+    task, n, none = problem.task, problem.task.arm.n_joints, np.zeros(0)
     entries = ('position_weights', 'velocity_weights', 'start_velocities', 'goal_velocities',
                'goal_position_weights', 'goal_velocity_weights')
-    rigid_task = replace(task, arm=task.arm.rigid(), **{
-        name: getattr(task, name)[:n] for name in entries})
+    rigid_task = replace(
+        task, arm=task.arm.rigid(), start_positions=problem.start[:n],
+        goal_positions=problem.goal[:n], start_point=none, goal_point=none,
+        start_modal_displacements=none, **{name: getattr(task, name)[:n] for name in entries})
     return MotionProblem(ArmModel.of(rigid_task.arm), rigid_task,
                          problem.parameters.drop_modes())
 

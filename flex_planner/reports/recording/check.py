@@ -145,7 +145,8 @@ def check_motion(request: RecordedRequest, model: ArmModel | None = None,
         raise RecordingError(f'{request.path} has no motion to check: '
                              f'{request.report.error_msg or "it failed"}')
     model, limits = model or ArmModel(request.arm), limits or CheckLimits()
-    ends = [_at_rest(model, row, parameters) for row in motion.coordinates[[0, -1]]]
+    ends = [_start_state(model, request, motion),
+            _at_rest(model, motion.coordinates[-1], parameters)]
     states = integrate(model, parameters.physical, ends[0],
                        LinearTorque(motion.times, motion.torques), monitor, rtol=_RTOL,
                        atol=_RTOL / 100)
@@ -153,9 +154,20 @@ def check_motion(request: RecordedRequest, model: ArmModel | None = None,
     return MotionCheck(tip=tip, findings=(
         *_resimulation(request, motion, states[-1] - ends[1], tip, limits),
         _joint_path(motion, states, request.arm.n_joints, limits),
-        *_deviation_from_rest(motion, ends, limits),
+        *_deviation_at_ends(request, motion, ends, limits),
         *_deviation_from_request(request, motion, limits),
         *_optimality(model, motion, parameters, limits)))
+
+
+def _start_state(model: ArmModel, request: RecordedRequest, motion: RecordedMotion) -> Array:
+    """Return the state at the start: at rest with the joint angles, or as the request has it."""
+    task, state = request.task, _at_rest(model, motion.coordinates[0], request.parameters)
+    n, n_t = model.arm.n_joints, model.arm.n_coordinates
+    if len(task.start_modal_displacements):
+        state[:n] = task.start_positions
+        state[n:n_t] = task.start_modal_displacements
+    state[n_t:n_t + len(task.start_velocities)] = task.start_velocities
+    return state
 
 
 def _at_rest(model: ArmModel, coordinates: Array, parameters: Parameters) -> Array:
@@ -188,30 +200,33 @@ def _joint_path(motion: RecordedMotion, states: Array, n: int, limits: CheckLimi
                    value=float(np.max(shares)))
 
 
-def _deviation_from_rest(motion: RecordedMotion, ends: list[Array],
-                         limits: CheckLimits) -> list[Finding]:
-    """Return the distances of the first and the last sample from rest."""
-    samples = np.hstack([motion.coordinates, motion.rates])[[0, -1]]
-    return [Finding(name=f'deviation from rest, {name}', unit='', limit=limits.end_error,
+def _deviation_at_ends(request: RecordedRequest, motion: RecordedMotion, ends: list[Array],
+                       limits: CheckLimits) -> list[Finding]:
+    """Return the distances of the first and the last sample from rest, or from a moving start."""
+    task, samples = request.task, np.hstack([motion.coordinates, motion.rates])[[0, -1]]
+    moves = len(task.start_modal_displacements) or np.any(task.start_velocities)
+    names = 'its state, start' if moves else 'rest, start', 'rest, goal'
+    return [Finding(name=f'deviation from {name}', unit='', limit=limits.end_error,
                     value=float(np.abs(sample - end).max()))
-            for name, sample, end in zip(('start', 'goal'), samples, ends, strict=True)]
+            for name, sample, end in zip(names, samples, ends, strict=True)]
 
 
 def _deviation_from_request(request: RecordedRequest, motion: RecordedMotion,
                             limits: CheckLimits) -> list[Finding]:
-    """Return the distances of both ends from the request: joint angles, or the unbent tip."""
+    """Return the distances of both ends from the request: joint angles, or the resting tip."""
     task, n = request.task, request.arm.n_joints
-    joints = motion.coordinates[[0, -1], :n]
-    if task.space == task.JOINT:
-        found, unit = joints, 'rad'
-        asked = np.array([task.start_positions, task.goal_positions])
-    else:
-        unbent = np.hstack([joints, np.zeros((2, request.arm.n_modes))])
-        found, unit = tip_position(request.arm, unbent), 'm'
-        asked = np.array([(point.x, point.y) for point in (task.start_point, task.goal_point)])
-    return [Finding(name=f'deviation from task, {name}', unit=unit, limit=limits.end_error,
-                    value=float(np.abs(miss).max()))
-            for name, miss in zip(('start', 'goal'), found - asked, strict=True)]
+    found = motion.coordinates[[0, -1]]
+    tips = tip_position(request.arm, found)
+    ends = (('start', task.space != task.CARTESIAN), ('goal', task.space == task.JOINT))
+    findings = []
+    for (name, by_angles), coordinates, tip in zip(ends, found, tips, strict=True):
+        point = getattr(task, f'{name}_point')
+        miss = (coordinates[:n] - getattr(task, f'{name}_positions') if by_angles
+                else tip - (point.x, point.y))
+        findings.append(Finding(
+            name=f'deviation from task, {name}', unit='rad' if by_angles else 'm',
+            limit=limits.end_error, value=float(np.abs(miss).max())))
+    return findings
 
 
 def _optimality(model: ArmModel, motion: RecordedMotion, parameters: Parameters,

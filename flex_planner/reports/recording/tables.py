@@ -89,11 +89,8 @@ def numbers(values: Iterable[float]) -> str:
 def _task(request: RecordedRequest) -> ReportTable:
     """Return the task of the request."""
     task = request.task
-    if task.space == task.CARTESIAN:
-        ends = [f'({point.x:g}, {point.y:g}) m' for point in (task.start_point, task.goal_point)]
-    else:
-        ends = [f'({numbers(np.degrees(angles))}) deg'
-                for angles in (task.start_positions, task.goal_positions)]
+    ends = [_say_end(task, 'start', task.space == task.CARTESIAN),
+            _say_end(task, 'goal', task.space != task.JOINT)]
     rows = [('start', ends[0]), ('goal', ends[1]), ('duration', f'{task.duration:g} s'),
             ('payload', f'{task.payload_mass:g} kg, {task.payload_inertia:g} kg m²'),
             ('weights R', numbers(task.effort_weights)),
@@ -102,10 +99,21 @@ def _task(request: RecordedRequest) -> ReportTable:
             ('tolerance, eq. (17)', f'{request.tolerance:g}')]
     if getattr(task, 'allow_large_bending', False):  # older recordings do not have it
         rows.append(('large bending', 'allowed'))
+    for name in ('start_velocities', 'start_modal_displacements'):
+        if np.any(getattr(task, name)):
+            rows.append((name.replace('_', ' '), numbers(getattr(task, name))))
     for name in ('max_joint_speeds', 'max_torque_shares', 'max_modal_rates'):
         if len(getattr(task, name)):
             rows.append((name.replace('_', ' '), numbers(getattr(task, name))))
     return ReportTable(title='Task', rows=tuple(rows))
+
+
+def _say_end(task: Any, name: str, is_point: bool) -> str:
+    """Return start or goal in words."""
+    if is_point:
+        point = getattr(task, f'{name}_point')
+        return f'({point.x:g}, {point.y:g}) m'
+    return f'({numbers(np.degrees(getattr(task, f"{name}_positions")))}) deg'
 
 
 def _outcome(request: RecordedRequest) -> ReportTable:

@@ -17,8 +17,9 @@ from flex_planner.base.errors import (
     UnreachableError,
 )
 from flex_planner.base.progress import StopReason
-from flex_planner.base.validation import Array, number
-from flex_planner.optimal_control.task import postures_from_points, Task
+from flex_planner.base.validation import number, vector
+from flex_planner.optimal_control.ends_at_points import ends_at_points
+from flex_planner.optimal_control.task import Task
 from flex_planner.planning.kinds.clusters import KindOfMotion
 from flex_planner.planning.objectives import Objectives
 from flex_planner.planning.plan import peaks, Plan, PlanStatus, Samples
@@ -72,10 +73,11 @@ def task_from_message(message: MotionTask, arm: Arm, settings: PlannerSettings) 
         One of `ERROR_CODES`, naming field, value and bound.
 
     """
-    start, goal = _postures(message, arm, settings)
     tolerance = number('tolerance', message.tolerance, at_least=0, at_most=1)
     return Task(
-        arm=arm, start_positions=start, goal_positions=goal, duration=message.duration,
+        arm=arm, **_ends(message, arm, settings), duration=message.duration,
+        start_velocities=np.asarray(message.start_velocities),
+        start_modal_displacements=np.asarray(message.start_modal_displacements),
         payload_mass=message.payload_mass, payload_inertia=message.payload_inertia,
         effort_weights=np.asarray(message.effort_weights or settings.effort_weights),
         position_weights=np.asarray(message.position_weights),
@@ -105,18 +107,23 @@ def planning_time_limit(message: MotionTask, settings: PlannerSettings) -> float
     return limit or settings.allowed_planning_time
 
 
-def _postures(message: MotionTask, arm: Arm,
-              settings: PlannerSettings) -> tuple[Array, Array]:
-    """Return start and goal joint angles as they were given or follow from points."""
+def _ends(message: MotionTask, arm: Arm, settings: PlannerSettings) -> dict[str, Any]:
+    """Return start and goal as they are given, with the postures that belong to points."""
+    angles = {name: np.asarray(getattr(message, name))
+              for name in ('start_positions', 'goal_positions')}
     if message.space == MotionTask.JOINT:
-        return np.asarray(message.start_positions), np.asarray(message.goal_positions)
-    if message.space != MotionTask.CARTESIAN:
-        raise InvalidValueError('space', message.space, '0 (JOINT) or 1 (CARTESIAN)')
+        return angles
+    if message.space not in (MotionTask.CARTESIAN, MotionTask.CARTESIAN_GOAL):
+        raise InvalidValueError('space', message.space,
+                                '0 (JOINT), 1 (CARTESIAN) or 2 (CARTESIAN_GOAL)')
     if message.elbow not in (-1, 0, 1):
         raise InvalidValueError('elbow', message.elbow, '-1, +1, or 0 for the default')
-    start, goal = message.start_point, message.goal_point
-    return postures_from_points(arm, (start.x, start.y), (goal.x, goal.y),
-                                elbow=message.elbow or settings.elbow)
+    elbow = message.elbow or settings.elbow
+    start, goal = ((point.x, point.y) for point in (message.start_point, message.goal_point))
+    if message.space == MotionTask.CARTESIAN:
+        return ends_at_points(arm, start, goal, elbow)
+    return angles | ends_at_points(arm, None, goal, elbow, vector(
+        'start_positions', angles['start_positions'], arm.n_joints, unit='rad'))
 
 
 def error_code(error: Exception) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 from flex_planner.base.errors import RecordingError
@@ -22,6 +23,23 @@ from flex_planner.recording import (
 from flex_planner.reports.recording import check_motion, RecordedRequest
 import numpy as np
 import pytest
+
+# two clamped aluminium links that sag by millimetres
+SAGGING = """
+name: Sagging
+gravity: [0.0, -9.81]
+links:
+  - &link {length: 0.6, density: 2700, youngs_modulus: 69.0e+9, modes: 1,
+           section: {width: 0.04, thickness: 0.005}, mode_family: clamped_free}
+  - *link
+joints:
+  - &joint {motor: {stall_torque: 20, no_load_speed: 4}}
+  - *joint
+nodes:
+  - &node {mass: 0.8, inertia: 0.05}
+  - *node
+  - {}
+"""
 
 
 def failed_findings(request: RecordedRequest, model: ArmModel) -> set[str]:
@@ -45,6 +63,48 @@ def test_recorded_plans_pass_their_check(name: str, model: str,
     assert found['tip error at the end'].value < 1e-4
     assert found['torques against eq. (14)'].value < 1e-9
     assert found['boundary error (eq. 17)'].recorded == recording.report.boundary_error
+
+
+@pytest.fixture(scope='module')
+def bent(tmp_path_factory: pytest.TempPathFactory) -> RecordedRequest:
+    """Return the recording of an arm under gravity that moves and rings at the start."""
+    folder = tmp_path_factory.mktemp('bent')
+    (folder / 'arm.yaml').write_text(SAGGING)
+    main(['plan', str(folder / 'arm.yaml'), '--from-angles', '-110,80', '--to', '0.6,-0.6',
+          '--elbow', '1', '--start-velocities', '0.3,-0.2,0.01,0', '--payload', '0.3',
+          '--start-modal-displacements', '0.004,-0.006', '--duration', '2', '--no-plot',
+          '--output', str(folder)])
+    (path,) = (folder / 'recordings').iterdir()
+    return RecordedRequest.read(path)
+
+
+def test_goal_is_where_the_bent_tip_rests_and_the_start_as_it_moves(bent: RecordedRequest) -> None:
+    check = check_motion(bent)
+    assert check.passed, [str(finding) for finding in check.findings if not finding.passed]
+    values = {finding.name: finding.value for finding in check.findings}
+    assert values['deviation from task, goal'] < 1e-9
+    assert values['deviation from task, start'] < 1e-9
+    assert values['deviation from its state, start'] < 1e-9
+    assert bent.task.space == bent.task.CARTESIAN_GOAL
+    assert bent.motion is not None
+    assert bent.motion.coordinates[0, 2:].tolist() == [0.004, -0.006]
+    assert bent.motion.rates[0].tolist() == [0.3, -0.2, 0.01, 0.0]
+
+
+@pytest.mark.parametrize(('field', 'value', 'name'), [
+    ('start_velocities', [0.3, -0.2, 0.0, 0.0], 'its state, start'),
+    ('start_modal_displacements', [0.004, 0.0], 'its state, start'),
+    ('start_positions', [-1.9, 1.4], 'task, start'),
+    ('goal_point', SimpleNamespace(x=0.6, y=-0.6001), 'task, goal')])
+def test_motion_from_another_state_is_found_out(bent: RecordedRequest, field: str, value: Any,
+                                                name: str) -> None:
+    original = getattr(bent.task, field)
+    setattr(bent.task, field, value)
+    try:
+        failed = {finding.name for finding in check_motion(bent).findings if not finding.passed}
+        assert f'deviation from {name}' in failed
+    finally:
+        setattr(bent.task, field, original)
 
 
 @pytest.mark.parametrize(('change', 'expected'), [

@@ -40,6 +40,7 @@ from flex_planner.ros.messages.plans import (
     STATUS_CODES,
     task_from_message,
 )
+from flex_planner.ros.messages.trajectory_rules import trajectory_violations
 from flex_planner.ros.planner.outcome import busy_outcome, unknown_failure
 from flex_planner.ros.settings.planner import PlannerSettings
 from flex_planner_interfaces.msg import MotionTask, PlanReport
@@ -47,6 +48,7 @@ from geometry_msgs.msg import Point
 import numpy as np
 import pytest
 from ros_support import task
+from scipy.integrate import simpson
 
 NAMES = ['joint1', 'joint2']
 JOINT_TASK = {'space': MotionTask.JOINT, 'start_positions': [0.1, 0.2],
@@ -136,6 +138,62 @@ def test_points_determine_the_postures_of_three_links_too() -> None:
 def test_bad_time_limit_is_refused(settings: PlannerSettings, value: float) -> None:
     with pytest.raises(InvalidValueError, match='allowed_planning_time'):
         planning_time_limit(task(allowed_planning_time=value), settings)
+
+
+def test_start_in_angles_goes_with_a_goal_at_a_point(ei50_arm: Arm,
+                                                     settings: PlannerSettings) -> None:
+    message = task(space=MotionTask.CARTESIAN_GOAL, start_positions=[1.1, -2.0], elbow=-1,
+                   start_velocities=[0.1, 0.2], start_modal_displacements=[1.0, 2.0, 3.0, 4.0])
+    made = task_from_message(message, ei50_arm, settings)
+    assert made.start_positions.tolist() == [1.1, -2.0]
+    assert (made.start_point.size, made.goal_point.tolist()) == (0, [0.5, 0.5])
+    assert made.start_velocities.tolist() == [0.1, 0.2, 0.0, 0.0, 0.0, 0.0]
+    assert made.start_modal_displacements.tolist() == [1.0, 2.0, 3.0, 4.0]
+    points = task_from_message(task(), ei50_arm, settings)
+    assert (points.start_point.tolist(), points.goal_point.tolist()) == ([0.5, 0], [0.5, 0.5])
+
+
+@pytest.mark.parametrize(('fields', 'error', 'text'), [
+    ({'start_modal_displacements': [0.0] * 4}, InvalidValueError,
+     'start_modal_displacements is .* left out where the start is a point'),
+    ({'start_velocities': [0.0] * 3}, InvalidSizeError, 'start_velocities'),
+    ({'space': MotionTask.CARTESIAN_GOAL}, InvalidSizeError, 'start_positions'),
+    ({'space': MotionTask.CARTESIAN_GOAL, 'start_positions': [0.0, math.nan]}, NotFiniteError,
+     r'start_positions\[1\]')])
+def test_bad_start_raises_with_the_name_of_its_field(
+        ei50_arm: Arm, settings: PlannerSettings, text: str, fields: dict[str, Any],
+        error: type[FlexPlannerError]) -> None:
+    with pytest.raises(error, match=text) as caught:
+        task_from_message(task(**fields), ei50_arm, settings)
+    assert type(caught.value) is error
+
+
+def test_rest_of_a_published_motion_is_planned_again_as_it_was(crane_model: ArmModel) -> None:
+    # Bellman's principle, under gravity, from the messages alone
+    arm, settings = crane_model.arm, PlannerSettings.for_arm(crane_model.arm)
+    fields: dict[str, Any] = {
+        'start_point': Point(x=0.1, y=-0.8), 'goal_point': Point(x=0.3, y=-0.75), 'elbow': 1,
+        'payload_mass': 0.2, 'effort_weights': []}
+    first = plan_path(task_from_message(task(duration=0.6, **fields), arm, settings),
+                      model=crane_model)
+    sampled = sample_plan(first, SamplingSettings())
+    joints = joint_trajectory(sampled, NAMES)
+    bent = flexible_trajectory(first, sampled, joints, 'base_link').points
+    k = len(bent) // 2
+    here, bending = joints.points[k], bent[k]
+    time = here.time_from_start.nanosec * 1e-9
+    rest = task(duration=0.6 - time, space=MotionTask.CARTESIAN_GOAL,
+                start_positions=here.positions,
+                start_velocities=[*here.velocities, *bending.modal_rates],
+                start_modal_displacements=bending.modal_displacements, **fields)
+    again = plan_path(task_from_message(rest, arm, settings), model=crane_model)
+    assert again.solved, again.message
+    later = first.sample(np.linspace(time, 0.6, 20001))
+    cost_to_go = simpson((later.torques**2).sum(axis=1) / 2, x=later.times)
+    assert again.cost == pytest.approx(float(cost_to_go), rel=1e-6)
+    published = joint_trajectory(sample_plan(again, SamplingSettings()), NAMES)
+    assert published.points[0].velocities == here.velocities
+    assert trajectory_violations(published, NAMES) == []
 
 
 # Errors and failed plans

@@ -164,6 +164,23 @@ def test_flexible_trajectory_belongs_to_the_joints_trajectory(flexible: Planner)
     assert trajectory.header.frame_id == 'base_link'
 
 
+def test_rest_of_a_motion_is_planned_again_from_the_moving_arm(flexible: Planner) -> None:
+    first = flexible.plan().trajectory
+    joints, bending = first.joint_trajectory.points, first.points
+    k = len(joints) // 2
+    rest = flexible.plan(
+        space=MotionTask.CARTESIAN_GOAL, start_point=Point(), start_positions=joints[k].positions,
+        start_velocities=[*joints[k].velocities, *bending[k].modal_rates],
+        start_modal_displacements=bending[k].modal_displacements,
+        duration=1 - joints[k].time_from_start.nanosec * 1e-9)
+    assert rest.report.error_code == PlanReport.NONE
+    again = rest.trajectory.joint_trajectory.points
+    assert (again[0].positions, again[0].velocities) == (joints[k].positions, joints[k].velocities)
+    # the same motors' torques, but for errors of the mesh
+    assert list(again[0].effort) == pytest.approx(list(joints[k].effort), abs=1e-4)
+    assert list(again[-1].positions) == pytest.approx(list(joints[-1].positions), abs=1e-12)
+
+
 def test_motion_to_where_the_arm_is_stays_there(rigid: Planner) -> None:
     answer = rigid.plan(goal_point=Point(x=0.5, y=0.0))
     assert answer.report.error_code == PlanReport.NONE
@@ -233,7 +250,7 @@ JOINT_TASK = {'space': MotionTask.JOINT, 'start_positions': [0.0, 1.0],
     ({'allowed_planning_time': -1.0}, PlanReport.OUT_OF_RANGE, 'allowed_planning_time'),
     ({'allowed_planning_time': 1e9}, PlanReport.OUT_OF_RANGE, 'allowed_planning_time'),
     ({'allowed_planning_time': math.inf}, PlanReport.NOT_FINITE, 'allowed_planning_time'),
-    ({'space': 2}, PlanReport.OUT_OF_RANGE, 'space is 2'),
+    ({'space': 3}, PlanReport.OUT_OF_RANGE, 'space is 3'),
     ({'elbow': 3}, PlanReport.OUT_OF_RANGE, 'elbow is 3'),
     ({'start_point': Point(x=math.nan)}, PlanReport.NOT_FINITE, 'start_point[0]'),
     ({'goal_point': Point(y=-math.inf)}, PlanReport.NOT_FINITE, 'goal_point[1]'),
