@@ -19,6 +19,7 @@ from flex_planner.planning.kinds.clusters import KindOfMotion
 from flex_planner.planning.kinds.effort import SearchEffort
 from flex_planner.planning.kinds.lift import solve_best_kind, walk_back
 from flex_planner.planning.kinds.search import find_kinds
+from flex_planner.planning.kinds.windings import other_windings, say_turns, turn_goal
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_problem import INTERRUPTED_STATUS, plan_problem
 from flex_planner.planning.strategies.catalogue import CATALOGUE, QUICK
@@ -35,6 +36,8 @@ from flex_planner.planning.strategies.strategy import Attempt, Strategy
 
 # a search has finished a kind of motion if it comes to this share of its value
 _KEPT = 0.01
+# starts for each other way round to a point
+_OTHER_WAY = 3
 
 
 class Failure(NamedTuple):
@@ -165,6 +168,7 @@ class LimitSearch:
         self.warm = known is not None
         if known is None:
             known = self._explore(bare, solver)
+            bare = drop_weights(self._problem)  # its goal may be turned
             if known is not None and not known.interrupted:
                 self._follow_kind(bare, known, solver)
                 return
@@ -193,12 +197,29 @@ class LimitSearch:
 
     def _explore(self, bare: MotionProblem, solver: Solver) -> Extremal | None:
         """Look for kinds of motion, and return the motion that the best one leads to."""
-        self.starts = self._effort.starts
-        self.kinds = find_kinds(bare, self._parameter.unknown, self.starts,
-                                self._solver.monitor)
+        home, kinds = self._find_kinds(bare)
+        if home is not bare:
+            self._problem = turn_goal(self._problem, home)
         self._announce()
-        easiest = self._parameter.easiest(bare)
-        return solve_best_kind(self._parameter, easiest, self.kinds, solver)
+        return solve_best_kind(self._parameter, self._parameter.easiest(home), kinds, solver)
+
+    def _find_kinds(self, bare: MotionProblem) -> tuple[MotionProblem, list[KindOfMotion]]:
+        """Note all kinds of motion; return those of the best way round to the goal."""
+        unknown, monitor = self._parameter.unknown, self._solver.monitor
+        ways = other_windings(bare) if self._effort.explores else []
+        self.starts = self._effort.starts + _OTHER_WAY * len(ways)
+        found = {bare: find_kinds(bare, unknown, self._effort.starts, monitor)}
+        for way in ways:
+            found[way] = [replace(kind, sentence=say_turns(bare, way)) for kind in find_kinds(
+                way, unknown, _OTHER_WAY, monitor)]
+        best = bare
+        for way in ways:
+            if found[way] and (not found[best] or self._parameter.improves(
+                    found[way][0].value, found[best][0].value)):
+                best = way
+        others = [kind for way, kinds in found.items() if way is not best for kind in kinds]
+        self.kinds = [*found[best], *others]
+        return best, found[best]
 
     def _approach_from_plan(self) -> Failure | None:
         """Collect extremals from a motion that takes all strategies to find."""

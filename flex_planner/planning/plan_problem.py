@@ -59,7 +59,7 @@ def plan_problem(problem: MotionProblem, solver: Solver,
         else:
             strategy, attempt = _solve_first(problem, solver, strategies)
         if effort.explores and strategy != WARM_START and attempt.result.converged:
-            attempt = _look_for_cheaper(problem, attempt, solver)
+            problem, attempt = _look_for_cheaper(problem, attempt, solver)
             if problem.task.time_weight:
                 problem, result = free_duration(problem, attempt.result, solver)
                 attempt = replace(attempt, result=result)
@@ -73,13 +73,15 @@ def plan_problem(problem: MotionProblem, solver: Solver,
                    planning_time=solver.monitor.elapsed)
 
 
-def _look_for_cheaper(problem: MotionProblem, attempt: Attempt, solver: Solver) -> Attempt:
+def _look_for_cheaper(problem: MotionProblem, attempt: Attempt,
+                      solver: Solver) -> tuple[MotionProblem, Attempt]:
     """Return the cheapest motion of other kinds, too, with the kinds that were met."""
     cheapest = find_cheaper(problem, attempt.result, solver)
     others = [kind for kind in attempt.kinds if not any(
         are_alike(kind.motion.angles, one.motion.angles) for one in cheapest.kinds)]
-    return Attempt(result=cheapest.result, kinds=(*cheapest.kinds, *others),
-                   starts=cheapest.starts + attempt.starts - 1)
+    return cheapest.problem, Attempt(
+        result=cheapest.result, kinds=(*cheapest.kinds, *others),
+        starts=cheapest.starts + attempt.starts - 1)
 
 
 def _solve_in_any_time(problem: MotionProblem, solver: Solver, strategies: Sequence[Strategy],

@@ -23,6 +23,7 @@ from flex_planner.planning.kinds.clusters import (
 from flex_planner.planning.kinds.explorer import ExploredMotion, Explorer, sample_angles
 from flex_planner.planning.kinds.paths import JointPath
 from flex_planner.planning.kinds.search import has_settled, rigid_twin, starting_paths
+from flex_planner.planning.kinds.windings import other_windings, say_turns
 from flex_planner.planning.strategies.initial_guesses import lift
 from flex_planner.planning.verdict import find_refusal
 import numpy as np
@@ -45,6 +46,8 @@ class CheapestMotion:
 
     Attributes
     ----------
+    problem : MotionProblem
+        The one that was given, or the same with its goal turned: another way round to a point.
     result : CollocationResult
         Of the problem; the one that was given unless another is cheaper, or keeps the arm's
         limits where that one does not.
@@ -55,6 +58,7 @@ class CheapestMotion:
 
     """
 
+    problem: MotionProblem
     result: CollocationResult
     kinds: tuple[KindOfMotion, ...]
     starts: int
@@ -78,24 +82,73 @@ def find_cheaper(problem: MotionProblem, found: CollocationResult,
     rigid = rigid_twin(problem)
     own = _as_kind(problem, found.solution)
     if rigid is None:
-        return CheapestMotion(result=found, kinds=(own,), starts=1)
+        return CheapestMotion(problem=problem, result=found, kinds=(own,), starts=1)
     motions, starts = _explore(problem, rigid, own, solver)
-    kinds = cluster(motions, lambda value, other: value < other)
-    refused = find_refusal(problem, found.solution) is not None
-    for kind in _worth_solving(kinds, own, refused):
-        result = solver.solve(problem, _guess(problem, kind.motion.solution, solver))
+    ways = _explore_other_ways(problem, solver)
+    kinds = cluster([*motions, *(way.motion for way in ways)],
+                    lambda value, other: value < other)
+    kinds = [_with_turns(kind, problem, ways) for kind in kinds]
+    best = _Best(problem=problem, result=found, kind=own,
+                 refused=find_refusal(problem, found.solution) is not None)
+    for kind in _worth_solving(kinds, own, best.refused):
+        home = next((way.problem for way in ways if way.motion is kind.motion), problem)
+        result = solver.solve(home, _guess(home, kind.motion.solution, solver))
         if result.status in INTERRUPTED:
             break
-        if not result.converged:
-            continue
-        other = _as_kind(problem, result.solution)
-        kept = find_refusal(problem, result.solution) is None
-        if kept and (refused or other.value < own.value):
-            found, own, refused = result, other, False
-    others = [kind for kind in kinds if not are_alike(kind.motion.angles, own.motion.angles)]
+        if result.converged:
+            best = best.or_better(home, result, kind)
+    others = [kind for kind in kinds
+              if not are_alike(kind.motion.angles, best.kind.motion.angles)]
     same = sum(kind.met for kind in kinds if kind not in others)
-    return CheapestMotion(result=found, starts=starts,
-                          kinds=(replace(own, met=max(same, 1)), *others))
+    return CheapestMotion(problem=best.problem, result=best.result, starts=starts + len(ways),
+                          kinds=(replace(best.kind, met=max(same, 1)), *others))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Best:
+    """The best motion of the arm itself so far, and whether the arm may not do it."""
+
+    problem: MotionProblem
+    result: CollocationResult
+    kind: KindOfMotion
+    refused: bool
+
+    def or_better(self, home: MotionProblem, result: CollocationResult,
+                  kind: KindOfMotion) -> _Best:
+        """Return another solution if the arm may do it and it is cheaper, or the only such."""
+        other = replace(_as_kind(home, result.solution), sentence=kind.sentence)
+        kept = find_refusal(home, result.solution) is None
+        if kept and (self.refused or other.value < self.kind.value):
+            return _Best(problem=home, result=result, kind=other, refused=False)
+        return self
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Way:
+    """Another way round to a point, and the rigid arm's motion on it."""
+
+    problem: MotionProblem
+    motion: ExploredMotion
+
+
+def _explore_other_ways(problem: MotionProblem, solver: Solver) -> list[_Way]:
+    """Return straight motions of the rigid arm to a point, the other ways round."""
+    found = []
+    for other in other_windings(problem):
+        rigid = rigid_twin(other)
+        if rigid is None or solver.monitor.stop_reason():
+            continue
+        straight = next(starting_paths(rigid, 1))
+        motion = _solve_from_path(rigid, straight, _coarse(solver))
+        if motion is not None:
+            found.append(_Way(problem=other, motion=motion))
+    return found
+
+
+def _with_turns(kind: KindOfMotion, problem: MotionProblem, ways: list[_Way]) -> KindOfMotion:
+    """Return a kind whose sentence says if it goes another way round."""
+    home = next((way.problem for way in ways if way.motion is kind.motion), problem)
+    return replace(kind, sentence=say_turns(problem, home) or kind.sentence)
 
 
 def _explore(problem: MotionProblem, rigid: MotionProblem, own: KindOfMotion,
@@ -119,10 +172,7 @@ def _explore_by_newton(rigid: MotionProblem, paths: list[JointPath],
                        motions: list[ExploredMotion], budget: int,
                        solver: Solver) -> tuple[list[ExploredMotion], int]:
     """Return motions known and met, until they have settled or a budget of iterations is used."""
-    coarse = solver.with_settings(
-        stages=_STAGES, intervals=_INTERVALS, max_intervals=_MOST_INTERVALS,
-        error_tolerance=_TOLERANCE, max_iterations=_ITERATIONS, max_meshes=_MESHES)
-    monitor, starts = solver.monitor, len(motions)
+    coarse, monitor, starts = _coarse(solver), solver.monitor, len(motions)
     began = monitor.iteration
     for path in paths:
         if (monitor.iteration - began >= budget or monitor.stop_reason()
@@ -134,6 +184,13 @@ def _explore_by_newton(rigid: MotionProblem, paths: list[JointPath],
         if motion is not None:
             motions.append(motion)
     return motions, starts
+
+
+def _coarse(solver: Solver) -> Solver:
+    """Return a solver for motions that are compared."""
+    return solver.with_settings(
+        stages=_STAGES, intervals=_INTERVALS, max_intervals=_MOST_INTERVALS,
+        error_tolerance=_TOLERANCE, max_iterations=_ITERATIONS, max_meshes=_MESHES)
 
 
 def _solve_from_path(rigid: MotionProblem, path: JointPath,
