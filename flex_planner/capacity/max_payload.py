@@ -20,7 +20,7 @@ from flex_planner.capacity.limit_search import LimitSearch, plan_near
 from flex_planner.capacity.results import MaxPayload, PayloadFront, PayloadMethod
 from flex_planner.collocation import Solver
 from flex_planner.optimal_control.arm_model import ArmModel
-from flex_planner.optimal_control.boundary_conditions import holding_limit
+from flex_planner.optimal_control.holding import holding_limit
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
 from flex_planner.optimal_control.task import MAX_PAYLOAD, Task
 from flex_planner.optimal_control.totals import integrate_totals

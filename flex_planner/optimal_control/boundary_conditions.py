@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from flex_planner.base.errors import InvalidTaskError, NoEquilibriumError
+from flex_planner.base.errors import HoldingError
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.statics import equilibrium
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.parameters import Parameters
-from flex_planner.optimal_control.task import MAX_PAYLOAD, Task
+from flex_planner.optimal_control.task import Task
 import numpy as np
 
-# share of its stall torque by which a motor is said to be too weak for a buckled arm
-_OVERLOADED = 1e3
 # of a payload, for differences [kg]
 _NUDGE = 1e-4
 
@@ -46,7 +44,7 @@ class BoundaryConditions:
 
     Raises
     ------
-    InvalidTaskError
+    HoldingError
         If a motor is too weak to hold the arm at a goal where it comes to rest.
 
     """
@@ -89,41 +87,9 @@ def _transversality(weights: Array) -> Array:
 
 def _check_holding(torque: Array, parameters: Parameters) -> None:
     """Refuse a goal at which the arm would sink as soon as it has arrived."""
-    for i, (needed, stall) in enumerate(zip(torque, parameters.stall_torque, strict=True), 1):
+    for i, (needed, stall) in enumerate(zip(torque, parameters.stall_torque, strict=True)):
         if abs(needed) > stall:
-            raise InvalidTaskError(
-                f'joint {i} needs {abs(needed):.4g} N m to hold the arm with its payload at the '
-                f'goal, but the stall torque of its motor is {stall:.4g} N m')
-
-
-def holding_limit(model: ArmModel, task: Task, parameters: Parameters) -> tuple[float, int]:
-    """
-    Return the payload [kg] that the motors just hold at the goal, and the joint that is first.
-
-    The payload is infinite where gravity does not load the joints, or motors have no limits.
-
-    """
-    from scipy.optimize import brentq  # a tenth of a second, and few tasks need it
-
-    def load(payload: float) -> Array:
-        """Return the share of the stall torque that each motor needs."""
-        try:
-            torque = equilibrium(model, task.goal_positions,
-                                 replace(parameters, payload_mass=payload))[1]
-        except NoEquilibriumError:
-            return np.full(model.arm.n_joints, _OVERLOADED)
-        share: Array = np.abs(torque) / parameters.stall_torque
-        return share
-
-    # that of the task can be held, though none may be too much where it is a counterweight
-    light = parameters.payload_mass
-    heavy = light + 1.0
-    while load(heavy).max() < 1:
-        heavy = light + 2 * (heavy - light)
-        if heavy > MAX_PAYLOAD:
-            return np.inf, 0
-    limit = float(brentq(lambda payload: load(payload).max() - 1, light, heavy, xtol=1e-12))
-    return limit, int(load(limit).argmax())
+            raise HoldingError(i, float(needed), float(stall))
 
 
 class PayloadEnds:

@@ -49,7 +49,7 @@ class MotionProblem:
 
     Raises
     ------
-    InvalidTaskError
+    HoldingError
         If a motor is too weak to hold the arm at a goal where it comes to rest.
 
     """
