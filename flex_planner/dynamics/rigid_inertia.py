@@ -1,17 +1,16 @@
 """
 The inertia of a rigid planar arm in all postures at once: bounds of its mass matrix.
 
-The velocities v_k of the joints' ends (k = 1 ... n, the last is the tip) give the kinetic energy
-as ``sum_kl T_kl v_k . v_l / 2`` with a constant T, because the velocity of a uniform link is linear
-along it. Between the absolute angles, M_ij = a_ij cos(theta_i - theta_j). What is said here of all
-postures is a consequence of these two facts, kept clear of rounding.
+The velocities v_k of the ends of the links (the last is the tip) give the kinetic energy as
+``sum_kl T_kl v_k . v_l / 2`` with a constant T, because the velocity of a uniform link is linear
+along it. Between the absolute angles, M_ij = a_ij cos(theta_i - theta_j). What is said here of
+all postures is a consequence of these two facts, kept clear of rounding.
 
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
 
 from flex_planner.arms.arm import Arm
 from flex_planner.base.validation import Array
@@ -19,10 +18,6 @@ import numpy as np
 
 # of the diagonal: a thousand times the rounding of matrices of this size
 _ROUNDING = 1e-12
-# of the angle of each of two links
-_GRID_POINTS = 48
-# an interpolation error h^2/8 a third larger, so that a grid twice as fine is never weaker
-_NESTED = 4 / 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,7 +86,17 @@ class RigidInertia:
             beyond += arm.links[i].mass
         return moments
 
-    def lower_bounds(self, grid_points: int = _GRID_POINTS) -> tuple[Array, ...]:
+    @property
+    def joint_mobilities(self) -> Array:
+        """Return the most that squares of joint speeds can be of it, (n,) [1/(kg m^2)]."""
+        n = self.lengths.size
+        if n <= 2:
+            return _largest_forms(self._extreme_postures(), np.eye(n))
+        links = np.sqrt(self.turning_mobilities)
+        joints: Array = (links + np.concatenate([[0.0], links[:-1]]))**2
+        return joints
+
+    def lower_bounds(self, torques: Array) -> tuple[Array, ...]:
         """
         Return sets of matrices (k, n, n) that lie below the mass matrices of all postures.
 
@@ -101,21 +106,33 @@ class RigidInertia:
 
         Parameters
         ----------
-        grid_points : int
-            Per turn of each angle, for three links; even.
+        torques : numpy.ndarray, shape (n,)
+            Of the motors, in any unit: the bounds are to be close for such vectors c.
+
+        """
+        if self.lengths.size <= 2:
+            return (self._extreme_postures(),)
+        # each joint has at most its mobility, so that shares of M do for each of them
+        mobilities = self.joint_mobilities
+        shares = [np.ones_like(torques), torques * np.sqrt(mobilities)]
+        return tuple(np.diag(share / share.sum() / mobilities)[None] for share in shares)
+
+    def _extreme_postures(self) -> Array:
+        """
+        Return the mass matrices of one or two links, stretched and folded, (2, n, n).
+
+        M is linear in the cosine of the one angle that matters.
 
         """
         n = self.lengths.size
-        if n <= 2:
-            # M is linear in the cosine of the one angle that matters
-            return (self._joint_matrices(np.array([[1.0] * n, [1.0] * (n - 1) + [-1.0]])),)
-        sets = [self._diagonal_bound()]
-        if n == 3:
-            sets.append(self._grid_bound(grid_points))
-        return tuple(sets)
+        folds = np.array([[1.0] * n, [1.0] * (n - 1) + [-1.0]])
+        sums = np.tril(np.ones((n, n)))
+        matrices: Array = sums.T @ (
+            self._absolute() * folds[:, :, None] * folds[:, None, :]) @ sums
+        return matrices
 
     def _weighted_points(self) -> Array:
-        """Return T with the rotary inertia, of which each link's speed is |v_k - v_(k-1)| / L_k."""
+        """Return T with the rotary inertia: a link turns at ``|v_k - v_(k-1)| / L_k``."""
         differences = np.eye(self.lengths.size) - np.eye(self.lengths.size, k=-1)
         turning: Array = differences.T @ np.diag(self.rotary / self.lengths**2) @ differences
         return self.points + turning
@@ -125,38 +142,6 @@ class RigidInertia:
         beyond = np.cumsum(np.cumsum(self.points[::-1, ::-1], axis=0), axis=1)[::-1, ::-1]
         matrix: Array = beyond * np.outer(self.lengths, self.lengths) + np.diag(self.rotary)
         return matrix
-
-    def _joint_matrices(self, signs: Array) -> Array:
-        """Return the mass matrices of arms stretched and folded as signs (k, n) say."""
-        return _between_joints(self._absolute() * signs[:, :, None] * signs[:, None, :])
-
-    def _diagonal_bound(self) -> Array:
-        """Return one diagonal matrix: each joint may be as fast as the energy lets it be alone."""
-        links = np.sqrt(self.turning_mobilities)
-        joints = links + np.concatenate([[0.0], links[:-1]])
-        return np.diag(1 / (links.size * joints**2))[None]
-
-    def _grid_bound(self, count: int) -> Array:
-        """Return the matrices on a grid of both angles, less what may be missing between."""
-        step = 2 * np.pi / count
-        # links 2 and 3 against link 1; mirror images have the same inertia
-        angles = np.array([(0.0, second, third) for second, third in product(
-            step * np.arange(count // 2 + 1), step * np.arange(count))])
-        absolute = self._absolute()
-        cosines = np.cos(angles[:, :, None] - angles[:, None, :])
-        # of cosines interpolated along one angle, or along two
-        missing = _NESTED * step**2 / 8 * np.array([[0, 1, 1], [1, 0, 2], [1, 2, 0]])
-        size = np.sqrt(np.diag(absolute))
-        # a symmetric matrix is less than the diagonal of its weighted row sums
-        margin = size * ((absolute * missing) @ (1 / size))
-        return _between_joints(absolute * cosines - np.diag(margin))
-
-
-def _between_joints(absolute: Array) -> Array:
-    """Return matrices (k, n, n) between absolute angles as those between joint angles."""
-    sums = np.tril(np.ones(absolute.shape[1:]))
-    matrices: Array = sums.T @ absolute @ sums
-    return matrices
 
 
 def largest_form(sets: tuple[Array, ...], vectors: Array) -> Array:
@@ -184,7 +169,7 @@ def _largest_forms(matrices: Array, vectors: Array) -> Array:
     """Return the largest ``c^T M^-1 c`` over matrices (..., k, n, n) of vectors (m, n)."""
     n = vectors.shape[1]
     diagonal = np.diagonal(matrices, axis1=-2, axis2=-1)
-    positive = (diagonal > 0).all(-1)
+    positive = np.asarray((diagonal > 0).all(-1))
     size = np.sqrt(np.where(positive[..., None], diagonal, 1.0))
     left = matrices / (size[..., :, None] * size[..., None, :]) - _ROUNDING * np.eye(n)
     right = vectors / size[..., None, :]  # (..., k, m, n)

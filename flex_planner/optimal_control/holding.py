@@ -24,21 +24,60 @@ def holding_limit(model: ArmModel, task: Task, parameters: Parameters) -> tuple[
     """
     Return the payload [kg] that the motors just hold at the goal, and the joint that is first.
 
-    The payload is infinite where gravity does not load the joints, or motors have no limits.
-    Where `knows_holding` is true no payload above it can be held. Elsewhere it is only the next
-    one above that of the task that cannot: links that bend further may need less torque again.
+    It is the next one above that of the task. Links that bend further may need less torque again,
+    see `holding_bound`. It is infinite where gravity does not load the joints, or motors have no
+    limits.
 
     """
-    if not model.arm.gravity.any():
+    from scipy.optimize import brentq  # a tenth of a second, and few tasks need it
+
+    def load(payload: float) -> Array:
+        """Return the share of the stall torque that each motor needs."""
+        try:
+            torque = _holding_torque(model, task, parameters, payload)
+        except NoEquilibriumError:
+            return np.full(model.arm.n_joints, _OVERLOADED)
+        share: Array = np.abs(torque) / parameters.stall_torque
+        return share
+
+    # that of the task can be held, though none may be too much where it is a counterweight
+    light = parameters.payload_mass
+    heavy = light + 1.0
+    while load(heavy).max() < 1:
+        heavy = light + 2 * (heavy - light)
+        if heavy > MAX_PAYLOAD:
+            return np.inf, 0
+    limit = float(brentq(lambda payload: load(payload).max() - 1, light, heavy, xtol=1e-12))
+    return limit, int(load(limit).argmax())
+
+
+def holding_bound(model: ArmModel, task: Task, parameters: Parameters) -> tuple[float, int]:
+    """
+    Return a payload [kg] above which none is held at the goal, and the joint that cannot.
+
+    It is infinite where that is not known, see `knows_holding`, and where `holding_limit` is.
+    Of arms that do not bend back under their payload it is that limit.
+
+    """
+    if not (model.arm.gravity.any() and knows_holding(model.arm)):
         return np.inf, 0
-    if knows_holding(model.arm):
-        return _largest_held(model, task, parameters)
-    return _next_not_held(model, task, parameters)
+    bend, scale = _square(model, task, parameters), 1.0
+    limits: Array = np.zeros(0)
+    for _ in range(3):  # b is most exact near the limit
+        bare, loaded = (_holding_torque(model, task, parameters, payload)
+                        for payload in (0.0, scale))
+        slopes = (loaded - bare - bend * scale**2) / scale
+        limits = np.array([_last_within(a, b, bend, float(stall)) for a, b, stall in zip(
+            bare, slopes, parameters.stall_torque, strict=True)])
+        scale = float(limits.min())
+        if not 0 < scale <= MAX_PAYLOAD:
+            break
+    return (scale, int(limits.argmin())) if scale <= MAX_PAYLOAD else (np.inf, 0)
 
 
 def knows_holding(arm: Arm) -> bool:
     """
-    Return whether the torque that holds an arm is a polynomial of its payload.
+    Return whether the torque that holds an arm is known for every payload: a polynomial.
 
     It is if only the last link moves the payload by its own bending: the load of a link with
     pinned modes does not bend it, and the links before a clamped one do not feel its slope.
@@ -51,21 +90,6 @@ def _carries(arm: Arm, index: int) -> bool:
     """Return whether the bending of a link moves what it carries."""
     modes = arm.links[index].mode_shapes()
     return bool(modes.tip_deflection.any() or modes.tip_slope.any())
-
-
-def _largest_held(model: ArmModel, task: Task, parameters: Parameters) -> tuple[float, int]:
-    """Return the end of all payloads that are held, from a + b m + c m^2 for each joint."""
-    bend, scale, limits = _square(model, task, parameters), 1.0, np.zeros(0)
-    for _ in range(3):  # b is most exact near the limit
-        bare, loaded = (_holding_torque(model, task, parameters, payload)
-                        for payload in (0.0, scale))
-        slopes = (loaded - bare - bend * scale**2) / scale
-        limits = np.array([_last_within(a, b, bend, float(stall)) for a, b, stall in zip(
-            bare, slopes, parameters.stall_torque, strict=True)])
-        scale = float(limits.min())
-        if not 0 < scale <= MAX_PAYLOAD:
-            break
-    return (scale if scale <= MAX_PAYLOAD else np.inf), int(limits.argmin()) * (scale < np.inf)
 
 
 def _square(model: ArmModel, task: Task, parameters: Parameters) -> float:
@@ -105,27 +129,3 @@ def _holding_torque(model: ArmModel, task: Task, parameters: Parameters, payload
     """Return the torque that holds the arm at the goal with a payload, shape (n,) [N m]."""
     loaded = replace(parameters, payload_mass=payload)
     return equilibrium(model, task.goal_positions, loaded)[1]
-
-
-def _next_not_held(model: ArmModel, task: Task, parameters: Parameters) -> tuple[float, int]:
-    """Return a payload above that of the task from which on the motors do not hold the arm."""
-    from scipy.optimize import brentq  # a tenth of a second, and few tasks need it
-
-    def load(payload: float) -> Array:
-        """Return the share of the stall torque that each motor needs."""
-        try:
-            torque = _holding_torque(model, task, parameters, payload)
-        except NoEquilibriumError:
-            return np.full(model.arm.n_joints, _OVERLOADED)
-        share: Array = np.abs(torque) / parameters.stall_torque
-        return share
-
-    # that of the task can be held, though none may be too much where it is a counterweight
-    light = parameters.payload_mass
-    heavy = light + 1.0
-    while load(heavy).max() < 1:
-        heavy = light + 2 * (heavy - light)
-        if heavy > MAX_PAYLOAD:
-            return np.inf, 0
-    limit = float(brentq(lambda payload: load(payload).max() - 1, light, heavy, xtol=1e-12))
-    return limit, int(load(limit).argmax())

@@ -15,7 +15,7 @@ import numpy as np
 # of distances and durations: a thousand times what the integrals lose to rounding
 SAFETY = 1e-6
 # slopes of bounds of the growth of energy, times the duration that they are made for
-_SLOPES = np.geomspace(0.03, 128.0, 22)
+_SLOPES = np.geomspace(0.05, 512.0, 30, dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,11 +110,12 @@ def energy_limits(facts: MotionFacts, payload: float, duration: float,
         Whether they are to hold for larger payloads, too: per inertia at the tip.
 
     """
-    sets, drag = facts.inertia(payload).lower_bounds(), np.diag(facts.drag)
+    inertia, drag = facts.inertia(payload), np.diag(facts.drag)
+    sets = inertia.lower_bounds(facts.stall)
     signs = np.array(list(product((1.0, -1.0), repeat=facts.stall.size - 1)))
     torques = facts.stall * np.hstack([np.ones((len(signs), 1)), signs])
     # with less slope than that, braking grows faster than the energy lets it
-    drained = 2 * largest_form(sets, np.diag(np.sqrt(facts.drag))).sum()
+    drained = 2 * float(facts.drag @ inertia.joint_mobilities)
     slopes = _SLOPES / duration
     driving = _growth(sets, drag, torques, slopes)
     ends = [facts.end_energy(facts.problem.start)]
@@ -149,7 +150,7 @@ def _requirements(facts: MotionFacts, limits: EnergyLimits,
                    _moving(payload, ways[i]) if i == n - 1
                    else f'moving the end of link {i + 1} by {ways[i]:.3g} m')
     turned = facts.strokes()[0]
-    mobilities = largest_form(inertia.lower_bounds(), np.eye(n))
+    mobilities = inertia.joint_mobilities
     for i in np.flatnonzero(facts.hard_joints):
         yield (_time_for(limits, turned[i], mobilities[i]),
                f'turning joint {i + 1} by {np.degrees(turned[i]):.3g} deg')

@@ -111,7 +111,7 @@ class EnergyLimits:
         """Return the least time in which the integral of sqrt(E) can reach a value [s]."""
         low, high = self._enclose(travel)
         for _ in range(4):
-            peaks = np.geomspace(low, high, 33)
+            peaks: Array = np.geomspace(low, high, 33, dtype=np.float64)
             within = self._travel(peaks) <= travel
             last = int(within.argmin()) - 1 if not within.all() else within.size - 1
             low, high = peaks[max(last, 0)], peaks[min(last + 1, within.size - 1)]
@@ -123,7 +123,8 @@ class EnergyLimits:
 
     def _enclose(self, travel: float) -> tuple[float, float]:
         """Return energies of which the first is too small for that, and the second too large."""
-        peaks = np.geomspace(1e-30, 1e30, 61) * max(self.start, self.goal, 1.0)
+        peaks: Array = np.geomspace(1e-30, 1e30, 61, dtype=np.float64)
+        peaks = peaks * max(self.start, self.goal, 1.0)
         short = self._travel(peaks) <= travel
         count = int(np.count_nonzero(short))  # it grows with the peak
         return float(peaks[max(count - 1, 0)]), float(peaks[min(count, peaks.size - 1)])

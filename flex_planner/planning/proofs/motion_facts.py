@@ -123,8 +123,9 @@ class MotionFacts:
         lowest = -weight * float(self.inertia(0.0).first_moments(self.arm, 0.0).sum())
         hangs = weight * self.arm.reach
         height = -float(self.arm.gravity @ tip_position(self.arm, state[:n_t]))
-        return EndEnergy(bare=kinetic + potential - lowest, per_payload=moving + height + hangs,
-                         size=kinetic + abs(potential) - lowest, size_per_payload=moving + 2 * hangs)
+        return EndEnergy(
+            bare=kinetic + potential - lowest, per_payload=moving + height + hangs,
+            size=kinetic + abs(potential) - lowest, size_per_payload=moving + 2 * hangs)
 
     def energy_needed(self) -> float:
         """Return by how much the energy at the goal exceeds that at the start, at least [J]."""

@@ -26,7 +26,7 @@ def payload_by_power(facts: MotionFacts) -> float:
         if not mass:
             return False
         reached = way_by_power(facts.power, start.ceiling(payload, tip_mass), mass, duration)
-        return reached < way
+        return bool(reached < way)
 
     return min(_least_excluded(excluded, 1e-9), _lifted_by_power(facts))
 
@@ -65,7 +65,7 @@ def payload_by_energy(facts: MotionFacts, known: float = MAX_PAYLOAD) -> float:
         needed = limits.least_time(way * np.sqrt((payload + tip_mass) / 2))
         return needed * (1 - SAFETY) > duration
 
-    return _least_excluded(excluded, 1e-2, known)
+    return _least_excluded(excluded, 5e-3, known)
 
 
 def _least_excluded(excluded: Callable[[float], bool], accuracy: float,

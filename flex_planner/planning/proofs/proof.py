@@ -1,8 +1,8 @@
 """
 What can be proved of all motions of a task, before one is looked for.
 
-Every bound follows from the equations of motion and the motors' limits of eq. (15). Where a premise
-does not hold there is none: payloads are then bounded by infinity, durations by 0.
+Every bound follows from the equations of motion and the motors' limits of eq. (15). Where a
+premise does not hold there is none: payloads are then bounded by infinity, durations by 0.
 
 """
 
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from flex_planner.base.errors import HoldingError
-from flex_planner.optimal_control.holding import holding_limit, knows_holding
+from flex_planner.optimal_control.holding import holding_bound
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.planning.proofs.duration_bounds import (
     bound_by_energy,
@@ -161,9 +161,9 @@ def prove_not_held(error: HoldingError, payload: float) -> Proof:
 
 def _bound_by_holding(problem: MotionProblem) -> PayloadBound:
     """Return the bound by what the motors hold at a goal where the arm comes to rest."""
-    if not (problem.task.ends_at_rest and knows_holding(problem.model.arm)):
+    if not problem.task.ends_at_rest:
         return PayloadBound()
-    limit, joint = holding_limit(problem.model, problem.task, problem.parameters)
+    limit, joint = holding_bound(problem.model, problem.task, problem.parameters)
     if not np.isfinite(limit):
         return PayloadBound()
     return PayloadBound(payload=limit * (1 + SAFETY), joint=joint, proof=Proof(
