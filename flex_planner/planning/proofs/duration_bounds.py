@@ -149,11 +149,14 @@ def _requirements(facts: MotionFacts, limits: EnergyLimits,
             yield (_time_for(limits, ways[i], mobilities[i]),
                    _moving(payload, ways[i]) if i == n - 1
                    else f'moving the end of link {i + 1} by {ways[i]:.3g} m')
-    turned = facts.strokes()[0]
-    mobilities = inertia.joint_mobilities
+    joints, links = facts.strokes()
+    of_joints, of_links = inertia.joint_mobilities, inertia.turning_mobilities
     for i in np.flatnonzero(facts.hard_joints):
-        yield (_time_for(limits, turned[i], mobilities[i]),
-               f'turning joint {i + 1} by {np.degrees(turned[i]):.3g} deg')
+        yield (_time_for(limits, joints[i], of_joints[i]),
+               f'turning joint {i + 1} by {np.degrees(joints[i]):.3g} deg')
+        if i and facts.hard_joints[:i].all():
+            yield (_time_for(limits, links[i], of_links[i]),
+                   f'turning link {i + 1} by {np.degrees(links[i]):.3g} deg')
     if facts.stops:
         ends = [facts.end_energy(state).least(payload)
                 for state in (facts.problem.start, facts.problem.goal)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from flex_planner.arms.kinematics import frame_angles, link_points, tip_position, tip_velocity
+from flex_planner.arms.kinematics import link_points, tip_position, tip_velocity
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.rigid_inertia import RigidInertia
 from flex_planner.optimal_control.motion_problem import MotionProblem
@@ -76,6 +76,8 @@ class MotionFacts:
         Whether the links are rigid, and whether there is no gravity.
     limited : bool
         Whether every motor has a stall torque.
+    hard_joints : numpy.ndarray of bool, shape (n,)
+        Which joints must reach their goal.
     reaches, stops : bool
         Whether all positions of the goal must be met, and all rates, too.
 
@@ -161,9 +163,8 @@ class MotionFacts:
 
     def strokes(self) -> tuple[Array, Array]:
         """Return how far joints and links turn, shapes (n,), of rigid arms [rad]."""
-        n = self.arm.n_joints
-        turned = (self.problem.goal - self.problem.start)[:self.arm.n_coordinates]
-        return np.abs(turned[:n]), np.abs(frame_angles(self.arm, turned))
+        turned = (self.problem.goal - self.problem.start)[:self.arm.n_joints]
+        return np.abs(turned), np.abs(np.cumsum(turned))
 
     def _energies(self, state: Array, payload: float) -> tuple[float, float]:
         """Return kinetic and potential energy of a state with a payload [J]."""
