@@ -6,9 +6,11 @@ from dataclasses import replace
 import math
 from typing import Any
 
+from factories import TaskFactory
 from flex_planner.arms.arm import Arm, FAMILIES, Joint, Link, Motor, Node
 from flex_planner.base.errors import HoldingError
 from flex_planner.base.validation import Array
+from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectSettings
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.proofs import (
@@ -18,7 +20,7 @@ from flex_planner.planning.proofs import (
     ProofName,
     prove_not_held,
 )
-from known_limits import G, lifted_to, one_link
+from known_limits import G, HEAVIEST, lifted_to, one_link, SHORTEST
 from light_model import LightModel
 import numpy as np
 import pytest
@@ -189,6 +191,32 @@ def test_payloads_that_are_carried_are_not_excluded(
     assert payload < found.payload < 23 * payload
     assert 0.25 * duration < bound_duration(problem) < duration
     assert find_proof(problem, thorough=True) is None
+
+
+@pytest.mark.parametrize('name', HEAVIEST)
+def test_limits_of_the_paper_are_not_excluded(request: pytest.FixtureRequest, name: str,
+                                              paper_task: TaskFactory) -> None:
+    arm = request.getfixturevalue(f'{name}_arm')
+    assert bound_payload(problem_of(paper_task(arm, HEAVIEST[name]))).payload > HEAVIEST[name]
+    problem = problem_of(paper_task(arm, duration=SHORTEST[name]))
+    assert 0.2 * SHORTEST[name] < bound_duration(problem) < SHORTEST[name]
+    assert find_proof(problem, thorough=True) is None
+
+
+@pytest.mark.parametrize(('task', 'close'), [
+    (with_motor(one_link(1.6), 0.1, no_load_speed=2.5), 1.04), (two_links(), 16.0),
+    (two_links(payload_inertia=0.05, duration=0.7), 28.0)], ids=['one', 'two', 'inertia'])
+def test_payloads_that_ipopt_finds_are_not_excluded(task: Task, close: float) -> None:
+    problem = problem_of(task)
+    direct = DirectProblem(problem.model, DirectSettings(intervals=24, degree=4, tolerance=1e-7,
+                                                         free_payload=True))
+    # a high price: nearly the largest payload, near the straight line that it starts from
+    found = direct.solve(problem.parameters, problem.start, problem.goal, task.duration, price=1e5)
+    assert found.converged
+    # the factors are those that were found: bounds of two links are far
+    assert found.payload < bound_payload(problem).payload < close * found.payload
+    heavy = problem_of(replace(task, payload_mass=found.payload))
+    assert 0.2 * task.duration < bound_duration(heavy) < task.duration
 
 
 def drawn_arm(rng: np.random.Generator) -> Arm:
