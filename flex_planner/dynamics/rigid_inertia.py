@@ -146,18 +146,18 @@ class RigidInertia:
 
 def largest_form(sets: tuple[Array, ...], vectors: Array) -> Array:
     """
-    Return bounds of ``c^T M^-1 c`` over all postures, for vectors (m, n), shape (m,).
+    Return bounds of ``c^T X^-1 c`` over all postures, for vectors c.
 
     Parameters
     ----------
-    sets : tuple of numpy.ndarray, shape (k, n, n)
-        Of `RigidInertia.lower_bounds`, or convex functions of them that grow with them.
+    sets : tuple of numpy.ndarray, shape (..., k, n, n)
+        Of `RigidInertia.lower_bounds`, or ``X = a M + B`` of them with a > 0, for several a.
     vectors : numpy.ndarray, shape (m, n)
         c.
 
     Returns
     -------
-    numpy.ndarray, shape (m,)
+    numpy.ndarray, shape (..., m)
         Infinite where no set has positive definite matrices only.
 
     """
