@@ -19,8 +19,8 @@ from flex_planner.base.progress import Monitor
 from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.capacity.min_duration import find_min_duration
 from flex_planner.optimal_control.arm_model import ArmModel
-from flex_planner.optimal_control.boundary_conditions import holding_limit
 from flex_planner.optimal_control.direct.unknowns import Free
+from flex_planner.optimal_control.holding import holding_limit
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.kinds.clusters import cluster

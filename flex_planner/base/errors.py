@@ -62,6 +62,29 @@ class InvalidTaskError(FlexPlannerError):
     """The parts of a task do not go together, or not with the arm."""
 
 
+class HoldingError(InvalidTaskError):
+    """
+    A motor is too weak to hold the arm at a goal where it comes to rest.
+
+    Parameters
+    ----------
+    joint : int
+        Index of the joint, from 0.
+    torque, stall : float
+        What it needs, with its sign, and the stall torque of its motor [N m].
+
+    """
+
+    def __init__(self, joint: int, torque: float, stall: float) -> None:
+        self.joint, self.torque, self.stall = joint, torque, stall
+        super().__init__(joint, torque, stall)  # so that it can be pickled
+
+    def __str__(self) -> str:
+        return (f'joint {self.joint + 1} needs {abs(self.torque):.4g} N m to hold the arm with '
+                f'its payload at the goal, but the stall torque of its motor is '
+                f'{self.stall:.4g} N m')
+
+
 class UnreachableError(FlexPlannerError):
     """The arm cannot place its tip at a point: condition (I) of the paper, first part."""
 

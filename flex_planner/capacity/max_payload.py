@@ -1,9 +1,10 @@
 """
 Maximum payload between two postures: Korayem et al. 2009, section 4.2.
 
-`find_max_payload` answers with a bracket: a payload that a certified plan carries, and one that
-is too much for the motors. What can be carried does not depend on the weights of the task: the
-direct search minimises effort alone, and the weights shape the plan at the end.
+`find_max_payload` answers with the largest payload that a certified plan carries, where its kind
+of motion ends, and what no motion can carry, as far as that is proved. What can be carried does
+not depend on the weights of the task: the direct search minimises effort alone, and the weights
+shape the plan at the end.
 
 """
 
@@ -11,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from flex_planner.base.errors import InvalidTaskError
+from flex_planner.base.errors import HoldingError, InvalidTaskError
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import number
 from flex_planner.capacity.extrapolation import Neighbours
@@ -22,6 +23,8 @@ from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
 from flex_planner.optimal_control.task import MAX_PAYLOAD, Task
 from flex_planner.planning.kinds.effort import SearchEffort
+from flex_planner.planning.plan import PlanStatus
+from flex_planner.planning.proofs import find_proof, Proof, prove_not_held
 from flex_planner.planning.strategies.extremals import SearchStart
 import numpy as np
 
@@ -72,9 +75,8 @@ def find_max_payload(task: Task, *, model: ArmModel | None = None, solver: Solve
     Raises
     ------
     InvalidTaskError
-        If no motor has a limit, if the goal is the start, if the duration is free, if the arm need
-        not come to rest at the goal, or if a motor is too weak to hold the arm with the task's
-        payload there.
+        If no motor has a limit, if the goal is the start, if the duration is free, or if the arm
+        need not come to rest at the goal.
     InvalidValueError
         If accuracy or step breaks its bound.
 
@@ -87,7 +89,13 @@ def find_max_payload(task: Task, *, model: ArmModel | None = None, solver: Solve
     model = ArmModel.for_arm(task.arm, model)  # before a clock starts
     solver = (solver or Solver()).watched_by(monitor)
     began = solver.monitor.iteration, solver.monitor.elapsed
-    problem = MotionProblem(model, task, task_parameters(task))
+    try:
+        problem = MotionProblem(model, task, task_parameters(task))
+    except HoldingError as error:
+        return _impossible(task, method, prove_not_held(error, task.payload_mass))
+    proof = find_proof(problem)
+    if proof is not None:
+        return _impossible(task, method, proof)
     if method is PayloadMethod.DIRECT:
         found = search_directly(problem, solver, accuracy, effort, start_from)
     else:
@@ -112,3 +120,9 @@ def _check(task: Task) -> None:
         raise InvalidTaskError('the largest payload is that of a motion which ends at rest: '
                                'goal_position_weights and goal_velocity_weights must be inf, '
                                'goal_velocities 0')
+
+
+def _impossible(task: Task, method: PayloadMethod, proof: Proof) -> MaxPayload:
+    """Return the outcome where no motion carries even the payload of the task."""
+    return MaxPayload(task=task, method=method, status=PlanStatus.INFEASIBLE,
+                      message=str(proof), proof=proof, proved_upper=task.payload_mass)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from flex_planner.base.errors import FlexPlannerError, InvalidTaskError
+from flex_planner.base.errors import FlexPlannerError, HoldingError, InvalidTaskError
 from flex_planner.base.progress import Monitor, StoppedError
 from flex_planner.base.validation import number, vector
 from flex_planner.capacity.extrapolation import Neighbours, step_ratio
@@ -25,7 +25,7 @@ from flex_planner.planning.kinds.clusters import MOST_KINDS
 from flex_planner.planning.kinds.effort import SearchEffort
 from flex_planner.planning.plan import PlanStatus
 from flex_planner.planning.plan_problem import STOP_STATUS
-from flex_planner.planning.proofs import bound_duration
+from flex_planner.planning.proofs import bound_duration, prove_not_held
 from flex_planner.planning.strategies.extremals import SearchStart
 from flex_planner.planning.strategies.free_parameters import DURATION
 import numpy as np
@@ -76,11 +76,18 @@ def find_min_duration(task: Task, *, model: ArmModel | None = None,
                                'shortest')
     if not task.ends_at_rest:
         raise InvalidTaskError('the shortest duration is that of a motion which ends at rest')
+    if task.starts_at_rest and (task.start_positions == task.goal_positions).all():
+        raise InvalidTaskError('goal_positions are start_positions: an arm that stays where it is '
+                               'needs no time')
     model = ArmModel.for_arm(task.arm, model)  # before a clock starts
     solver = (solver or Solver()).watched_by(monitor)
     began = solver.monitor.iteration, solver.monitor.elapsed
     fixed = replace(task, time_weight=0.0)
-    problem = MotionProblem(model, fixed, task_parameters(fixed))
+    try:
+        problem = MotionProblem(model, fixed, task_parameters(fixed))
+    except HoldingError as error:
+        return MinDuration(task=task, status=PlanStatus.INFEASIBLE, proved_lower=np.inf,
+                           message=str(prove_not_held(error, task.payload_mass)))
     neighbours = start_from if isinstance(start_from, Neighbours) else Neighbours(
         near=start_from)
     limits = LimitSearch(DURATION, problem, solver, accuracy, effort)

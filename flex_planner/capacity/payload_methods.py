@@ -22,14 +22,14 @@ from flex_planner.capacity.results import (
     PayloadMethod,
 )
 from flex_planner.collocation import CollocationSolution, Solver
-from flex_planner.optimal_control.boundary_conditions import holding_limit
+from flex_planner.optimal_control.holding import holding_limit
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.totals import integrate_totals
 from flex_planner.planning.kinds.clusters import MOST_KINDS
 from flex_planner.planning.kinds.effort import SearchEffort
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_problem import INTERRUPTED_STATUS, plan_problem, STOP_STATUS
-from flex_planner.planning.proofs import bound_payload, Proof, ProofName
+from flex_planner.planning.proofs import bound_payload
 from flex_planner.planning.strategies.catalogue import QUICK
 from flex_planner.planning.strategies.extremals import Extremal, SearchStart
 from flex_planner.planning.strategies.free_parameters import PAYLOAD
@@ -37,6 +37,8 @@ import numpy as np
 
 # of the payload that the motors can just hold, kept clear of rounding
 _HELD = 1 - 1e-9
+# of a bound that is reached
+_ROUNDING = 1e-6
 # Newton iterations of a first try with that payload
 _FIRST_TRY = 15
 # time to certify what a search has when its own is over [s]
@@ -187,11 +189,6 @@ def search_in_steps(problem: MotionProblem, solver: Solver, step: float,
 
 def _with_bound(found: MaxPayload, problem: MotionProblem) -> MaxPayload:
     """Return an outcome with what is proved from above."""
-    if found.held:
-        joint = found.limiting_joint or 0
-        proof = Proof(name=ProofName.HOLDING, sentence=(
-            f'joint {joint + 1} can hold no more at the goal: no motion ends there'))
-        return replace(found, proved_upper=found.local_upper, proof=proof)
     bound = bound_payload(problem)
     return replace(found, proved_upper=bound.payload, proof=bound.proof)
 
@@ -231,9 +228,10 @@ def _describe(found: MaxPayload) -> MaxPayload:
     if found.status is not PlanStatus.SOLVED:
         return replace(found, message=f'{found.message} ({found.payload:.6g} kg are certified)')
     if found.held:
+        proved = found.proved_upper <= found.local_upper * (1 + _ROUNDING)
         return replace(found, message=(
             f'{found.payload:.6g} kg can be carried, certified; joint {joint + 1} can hold no '
-            'more at the goal: no motion carries more'))
+            f'more at the goal{": no motion carries more" if proved else ""}'))
     words = [f'{found.payload:.6g} kg can be carried, certified{describe_kinds(found)}',
              f'this kind of motion ends at {found.local_upper:.6g} kg: the motor of joint '
              f'{joint + 1} is on its limit for {shares[joint]:.1%} of the time']

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from flex_planner.base.errors import (
-    InvalidTaskError,
+    HoldingError,
     NoEquilibriumError,
     SingularError,
     UnreachableError,
@@ -15,13 +15,9 @@ from flex_planner.dynamics.rest_at_point import rest_at_point
 from flex_planner.dynamics.statics import equilibrium
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.parameters import Parameters
-from flex_planner.optimal_control.task import MAX_PAYLOAD, Task
+from flex_planner.optimal_control.task import Task
 import numpy as np
 
-# share of its stall torque by which a motor is said to be too weak for a buckled arm
-_OVERLOADED = 1e3
-# just below the payload that is held, motors are loaded by nearly all of their torque: as shares
-_BELOW, _NEARLY = 1e-9, 1e-5
 # of a payload, for differences [kg]
 _NUDGE = 1e-4
 
@@ -42,6 +38,8 @@ class BoundaryConditions:
         Start and goal.
     parameters : Parameters
         Payload, stiffness and limits.
+    holds : bool
+        Whether to refuse a goal that the motors cannot hold.
 
     Attributes
     ----------
@@ -55,18 +53,19 @@ class BoundaryConditions:
 
     Raises
     ------
-    InvalidTaskError
+    HoldingError
         If a motor is too weak to hold the arm at a goal where it comes to rest.
     UnreachableError, SingularError
         If the bent arm cannot rest at a point; the message says which.
 
     """
 
-    def __init__(self, model: ArmModel, task: Task, parameters: Parameters) -> None:
+    def __init__(self, model: ArmModel, task: Task, parameters: Parameters, *,
+                 holds: bool = True) -> None:
         n_t = model.arm.n_coordinates
         self.start = _start_state(model, task, parameters)
-        goal, self.holding_torque = _rest(model, task, 'goal', parameters)
-        if task.ends_at_rest:
+        goal, self.holding_torque = rest_at_end(model, task, 'goal', parameters)
+        if holds and task.ends_at_rest:
             _check_holding(self.holding_torque, parameters)
         self.goal = np.concatenate([goal, task.goal_velocities])
         self.goal_weights = np.concatenate([task.goal_position_weights,
@@ -95,12 +94,13 @@ def _start_state(model: ArmModel, task: Task, parameters: Parameters) -> Array:
     if task.start_modal_displacements.size:
         coordinates = np.concatenate([task.start_positions, task.start_modal_displacements])
     else:
-        coordinates, _ = _rest(model, task, 'start', parameters)
+        coordinates, _ = rest_at_end(model, task, 'start', parameters)
     return np.concatenate([coordinates, task.start_velocities])
 
 
-def _rest(model: ArmModel, task: Task, end: str, parameters: Parameters) -> tuple[Array, Array]:
-    """Return the coordinates (n_t,) of the arm at rest at start or goal, and what holds it."""
+def rest_at_end(model: ArmModel, task: Task, end: str,
+                parameters: Parameters) -> tuple[Array, Array]:
+    """Return the coordinates (n_t,) of the arm at rest at 'start' or 'goal', and what holds it."""
     positions, point = getattr(task, f'{end}_positions'), getattr(task, f'{end}_point')
     if not point.size:
         return equilibrium(model, positions, parameters)
@@ -119,42 +119,9 @@ def _transversality(weights: Array) -> Array:
 
 def _check_holding(torque: Array, parameters: Parameters) -> None:
     """Refuse a goal at which the arm would sink as soon as it has arrived."""
-    for i, (needed, stall) in enumerate(zip(torque, parameters.stall_torque, strict=True), 1):
+    for i, (needed, stall) in enumerate(zip(torque, parameters.stall_torque, strict=True)):
         if abs(needed) > stall:
-            raise InvalidTaskError(
-                f'joint {i} needs {abs(needed):.4g} N m to hold the arm with its payload at the '
-                f'goal, but the stall torque of its motor is {stall:.4g} N m')
-
-
-def holding_limit(model: ArmModel, task: Task, parameters: Parameters) -> tuple[float, int]:
-    """
-    Return the payload [kg] that the motors just hold at the goal, and the joint that is first.
-
-    The payload is infinite where gravity does not load the joints, where motors have no limits,
-    and where the links give way before the motors do.
-
-    """
-    from scipy.optimize import brentq  # a tenth of a second, and few tasks need it
-
-    def load(payload: float) -> Array:
-        """Return the share of the stall torque that each motor needs."""
-        try:
-            torque = _rest(model, task, 'goal', replace(parameters, payload_mass=payload))[1]
-        except (NoEquilibriumError, SingularError, UnreachableError):
-            return np.full(model.arm.n_joints, _OVERLOADED)
-        share: Array = np.abs(torque) / parameters.stall_torque
-        return share
-
-    # that of the task can be held, though none may be too much where it is a counterweight
-    light = parameters.payload_mass
-    heavy = light + 1.0
-    while load(heavy).max() < 1:
-        heavy = light + 2 * (heavy - light)
-        if heavy > MAX_PAYLOAD:
-            return np.inf, 0
-    limit = float(brentq(lambda payload: load(payload).max() - 1, light, heavy, xtol=1e-12))
-    below = load(limit * (1 - _BELOW))
-    return (limit, int(below.argmax())) if abs(below.max() - 1) < _NEARLY else (np.inf, 0)
+            raise HoldingError(i, float(needed), float(stall))
 
 
 class PayloadEnds:
@@ -202,7 +169,7 @@ class PayloadEnds:
         name, velocities = (('start', self._task.start_velocities),
                             ('goal', self._task.goal_velocities))[end]
         try:
-            coordinates, _ = _rest(self._model, self._task, name, parameters)
+            coordinates, _ = rest_at_end(self._model, self._task, name, parameters)
         except (SingularError, UnreachableError) as error:
             raise NoEquilibriumError(str(error)) from None
         return np.concatenate([coordinates, velocities])

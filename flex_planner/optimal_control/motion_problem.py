@@ -47,21 +47,26 @@ class MotionProblem:
     explicit : numpy.ndarray of int
         q and psi_1, whose rates the collocation need not factorise.
 
+    holds : bool
+        Whether to refuse a goal that the motors cannot hold; without, the problem only stands for
+        a task that is refused.
+
     Raises
     ------
-    InvalidTaskError
+    HoldingError
         If a motor is too weak to hold the arm at a goal where it comes to rest.
     UnreachableError, SingularError
         If the bent arm cannot rest at a point; the message says which.
 
     """
 
-    def __init__(self, model: ArmModel, task: Task, parameters: Parameters) -> None:
+    def __init__(self, model: ArmModel, task: Task, parameters: Parameters, *,
+                 holds: bool = True) -> None:
         self.model, self.task, self.parameters = model, task, parameters
         self.p = parameters.stack()
         n_t = model.arm.n_coordinates
         self.size = 4 * n_t
-        self.ends = BoundaryConditions(model, task, parameters)
+        self.ends = BoundaryConditions(model, task, parameters, holds=holds)
         self.start, self.goal = self.ends.start, self.ends.goal
         self.goal_weights = self.ends.goal_weights
         self.holding_torque = self.ends.holding_torque

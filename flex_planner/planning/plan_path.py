@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
-from flex_planner.base.errors import InvalidTaskError
+from flex_planner.base.errors import HoldingError, InvalidTaskError
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import integer
 from flex_planner.collocation import CollocationSolution, Solver
@@ -24,10 +24,11 @@ from flex_planner.planning.kinds.kinds_strategy import as_guess
 from flex_planner.planning.objectives import Objectives
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_problem import plan_problem
-from flex_planner.planning.proofs import find_proof
+from flex_planner.planning.proofs import find_proof, Proof, prove_not_held
 from flex_planner.planning.strategies.catalogue import CATALOGUE
 from flex_planner.planning.strategies.initial_guesses import warm_start
 from flex_planner.planning.strategies.strategy import Strategy
+from flex_planner.planning.warnings import find_arm_warnings
 from flex_planner.planning.weight_search import adapt_weights
 
 
@@ -82,15 +83,23 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
     effort = SearchEffort.of(search)
     model = ArmModel.for_arm(task.arm, model)  # before a clock starts
     solver = (solver or Solver()).watched_by(monitor)
-    problem = MotionProblem(model, task, task_parameters(task))
+    parameters = task_parameters(task)
+    try:
+        problem = MotionProblem(model, task, parameters)
+    except HoldingError as error:
+        refused = MotionProblem(model, task, parameters, holds=False)
+        return _impossible(refused, prove_not_held(error, task.payload_mass))
     if objectives is not None:
         objectives.check(task)
     proof = find_proof(problem)
     if proof is not None:
-        return Plan(task=task, status=PlanStatus.INFEASIBLE, message=str(proof), strategy='',
-                    problem=problem, solution=None)
+        return _impossible(problem, proof)
     plan = plan_problem(problem, solver, (*_given(start_from, problem, solver), *strategies),
                         effort)
+    if plan.status in (PlanStatus.NOT_FOUND, PlanStatus.NOT_CONVERGED):
+        proof = find_proof(problem, thorough=True)
+        return plan if proof is None else replace(
+            plan, status=PlanStatus.INFEASIBLE, message=str(proof))
     # weights that meet an objective may well bring a motion back within its limits
     if objectives is None or not plan.certified:
         return plan
@@ -129,6 +138,12 @@ def plan_kind(task: Task, number: int, **options: Any) -> Plan:
     plan = plan_path(task, **{**options, 'start_from': chosen})
     others = tuple(kind for kind in best.kinds if kind is not chosen)
     return replace(plan, kinds=(*plan.kinds[:1], *others), starts=best.starts)
+
+
+def _impossible(problem: MotionProblem, proof: Proof) -> Plan:
+    """Return the plan of a task that no motion does."""
+    return Plan(task=problem.task, status=PlanStatus.INFEASIBLE, message=str(proof), strategy='',
+                problem=problem, solution=None, warnings=find_arm_warnings(problem.model.arm))
 
 
 def _given(start: Plan | KindOfMotion | CollocationSolution | None, problem: MotionProblem,

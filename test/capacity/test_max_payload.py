@@ -17,7 +17,7 @@ from flex_planner.collocation import Solver, SolverSettings
 from flex_planner.dynamics.integration import PiecewisePolynomial, simulate
 from flex_planner.dynamics.statics import equilibrium
 from flex_planner.optimal_control.arm_model import ArmModel
-from flex_planner.optimal_control.boundary_conditions import holding_limit
+from flex_planner.optimal_control.holding import holding_limit
 from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectResult, DirectSettings
 from flex_planner.optimal_control.motion_problem import task_parameters
 from flex_planner.optimal_control.task import Task

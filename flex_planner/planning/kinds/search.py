@@ -8,8 +8,8 @@ from itertools import chain, islice
 
 from flex_planner.base.errors import InvalidTaskError
 from flex_planner.base.progress import Monitor
-from flex_planner.optimal_control.boundary_conditions import holding_limit
 from flex_planner.optimal_control.direct.unknowns import Free
+from flex_planner.optimal_control.holding import holding_limit
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.planning.kinds.clusters import cluster, kind_of, KindOfMotion, merge
 from flex_planner.planning.kinds.explorer import ExploredMotion, Explorer

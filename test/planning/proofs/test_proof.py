@@ -1,0 +1,349 @@
+"""What is called impossible is: closed forms, motions that exist, and premises one by one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import math
+from typing import Any
+
+from factories import TaskFactory
+from flex_planner.arms.arm import Arm, FAMILIES, Joint, Link, Motor, Node
+from flex_planner.base.errors import HoldingError
+from flex_planner.base.validation import Array
+from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectSettings
+from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
+from flex_planner.optimal_control.task import Task
+from flex_planner.planning.proofs import (
+    bound_duration,
+    bound_payload,
+    find_proof,
+    ProofName,
+    prove_not_held,
+)
+from known_limits import G, HEAVIEST, lifted_to, one_link, SHORTEST
+from light_model import LightModel
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+inf = math.inf
+
+
+def problem_of(task: Task) -> MotionProblem:
+    model: Any = LightModel(task.arm)
+    return MotionProblem(model, task, task_parameters(task))
+
+
+def with_motor(task: Task, friction: float = 0.0, **motor: float) -> Task:
+    joints = tuple(Joint(motor=Motor(**{'stall_torque': 2.0, **motor}), viscous_friction=friction)
+                   for _ in task.arm.joints)
+    return replace(task, arm=replace(task.arm, joints=joints))
+
+
+def two_links(**changes: Any) -> Task:
+    links = (Link(length=0.6, linear_density=4.0), Link(length=0.4, linear_density=3.0))
+    joints = (Joint(motor=Motor(stall_torque=9.0, no_load_speed=5.0)),
+              Joint(motor=Motor(stall_torque=4.0, no_load_speed=6.0)))
+    values: dict[str, Any] = {'start_positions': [0.2, 1.0], 'goal_positions': [1.4, -0.6],
+                              'duration': 0.9, 'payload_mass': 1.5}
+    return Task(arm=Arm(name='two', links=links, joints=joints), **{**values, **changes})
+
+
+# Closed forms: one link, I = 1 kg m^2 + m_p (1 m)^2, K_1 = 2 N m, by 0.5 rad
+
+
+def quickest(inertia: float, drag: float) -> float:
+    """Return the least time from rest to rest of one link by 0.5 rad: drive, then brake."""
+    if not drag:
+        return 2 * math.sqrt(0.5 * inertia / 2.0)
+    scale, end = inertia / drag, 2.0 / drag  # of time, and the speed of a free link
+
+    def way(share: float) -> float:
+        """Return the way to this share of that speed and back to rest."""
+        return scale * end * (-math.log1p(-share) - math.log1p(share))
+
+    share = brentq(lambda share: way(share) - 0.5, 0, 1 - 1e-15)
+    return scale * (math.log1p(share) - math.log1p(-share))
+
+
+@pytest.mark.parametrize(('slope', 'friction', 'close'), [
+    (0.0, 0.0, 0.99), (1.0, 0.0, 0.99), (0.7, 0.3, 0.99), (0.0, 0.8, 0.99),
+    # near its no-load speed a link is taken to be driven as at half of it
+    (8.0, 1.0, 0.6)])
+@pytest.mark.parametrize('payload', [0.0, 1.5])
+def test_bounds_of_one_link_are_nearly_what_it_can_do(slope: float, friction: float,
+                                                      close: float, payload: float) -> None:
+    motor = {'no_load_speed': 2 / slope} if slope else {}
+    task = with_motor(one_link(1.0, payload_mass=payload), friction, **motor)
+    exact = quickest(1 + payload, slope + friction)
+    assert close * exact < bound_duration(problem_of(task)) <= exact
+    # the payload of a duration that it just takes; bounds are found to 0.5 %
+    found = bound_payload(problem_of(replace(task, duration=exact)))
+    assert found.payload >= payload
+    if close > 0.9:
+        assert found.payload <= payload + 0.03 * (1 + payload)
+
+
+@pytest.mark.parametrize('payload', [0.0, 4.0])
+def test_power_bounds_in_closed_form(payload: float) -> None:
+    # m <= 8/9 P T^3 / d^2, of which the link is a third of its 3 kg; a quick motor has power alone
+    task = with_motor(one_link(0.05, payload_mass=payload), no_load_speed=2e-3)
+    power, chord = 2.0 * 2e-3 / 4, 2 * math.sin(0.25)
+    seconds = (9 * (payload + 1.0) * chord**2 / (8 * power))**(1 / 3)
+    proof = find_proof(problem_of(task))
+    assert proof is not None
+    assert proof.name is ProofName.POWER
+    carried = f'{payload:.4g} kg' if payload else 'the tip'
+    assert proof.sentence == (f'the motors give at most 0.001 W: moving {carried} by 0.495 m '
+                              f'takes at least {seconds:.4g} s, and 0.05 s were asked for')
+    longer = problem_of(replace(task, duration=20.0))
+    expected = 8 / 9 * power * 20**3 / chord**2 - 1
+    assert bound_payload(longer).payload <= expected * (1 + 1e-5)
+
+
+def test_power_alone_bounds_flexible_links_without_gravity() -> None:
+    link = Link(length=1.0, linear_density=3.0, flexural_rigidity=20.0, modes=2)
+    task = with_motor(one_link(0.8, payload_mass=1.0), no_load_speed=3.0)
+    task = Task(arm=replace(task.arm, links=(link,), nodes=(Node(), Node(mass=0.5))),
+                start_positions=[0.1], goal_positions=[0.6], duration=0.8, payload_mass=1.0)
+    power, chord = 2.0 * 3.0 / 4, 2 * math.sin(0.25)
+    found = bound_payload(problem_of(task))
+    assert found.payload == pytest.approx(8 / 9 * power * 0.8**3 / chord**2 - 0.5, rel=1e-5)
+    assert found.proof is not None
+    assert found.proof.sentence == (f'the motors give at most 1.5 W: they can bring no more than '
+                                    f'{found.payload:.4g} kg to the goal in 0.8 s')
+    assert bound_duration(problem_of(task)) == pytest.approx(
+        (9 * 1.5 * chord**2 / (8 * power))**(1 / 3), rel=1e-5)
+
+
+def test_speed_at_the_start_counts_as_energy() -> None:
+    # int_0^T sqrt(2 (E + P t) / m) dt = d with E = m v^2 / 2, by quadrature
+    task = replace(with_motor(one_link(1.0, payload_mass=1.0), no_load_speed=0.5),
+                   start_velocities=[0.4])
+    power, mass, chord = 0.25, 2.0, 2 * math.sin(0.25)
+    energy = mass * 0.4**2 / 2
+
+    def way(T: float) -> float:
+        t = (np.arange(4000) + 0.5) * T / 4000
+        return float(np.sqrt(2 * (energy + power * t) / mass).mean()) * T
+
+    bound = bound_duration(problem_of(task))
+    assert bound >= brentq(lambda T: way(T) - chord, 0, 5) * (1 - 1e-5)
+    assert bound < bound_duration(problem_of(replace(task, start_velocities=[0.0])))
+
+
+def test_lifting_takes_the_time_of_its_work() -> None:
+    # 0.3 kg and 1 m of link, 2 kg, from -1.2 to 1.2 rad: m g h in the power of 40 N m at 0.2 rad/s
+    task = with_motor(lifted_to(1.2, 5.0, payload_mass=2.0), stall_torque=40.0, no_load_speed=0.2)
+    task = replace(task, start_positions=[-1.2])
+    work, power = (2 + 0.15) * G * 2 * math.sin(1.2), 40 * 0.2 / 4
+    proof = find_proof(problem_of(task))
+    assert proof is not None
+    assert (f'bringing the arm with 2 kg to the energy of its goal takes at least '
+            f'{work / power:.4g} s') in proof.sentence
+    found = bound_payload(problem_of(task))
+    assert found.payload == pytest.approx(power * 5 / (G * 2 * math.sin(1.2)) - 0.15, rel=1e-5)
+
+
+def test_payload_that_cannot_be_held_is_named_with_its_joint() -> None:
+    task = lifted_to(0.3, 2.0)
+    found = bound_payload(problem_of(task))
+    limit = 6 / (G * math.cos(0.3)) - 0.15
+    assert found.payload == pytest.approx(limit, rel=1e-5)
+    assert found.payload >= limit
+    assert found.proof is not None
+    assert (found.joint, found.proof.name) == (0, ProofName.HOLDING)
+    assert found.proof.sentence == f'joint 1 can hold no more than {limit:.6g} kg at the goal'
+
+
+def test_refused_goal_is_a_proof() -> None:
+    task = lifted_to(0.0, 2.0, payload_mass=6.0)
+    with pytest.raises(HoldingError) as raised:
+        problem_of(task)
+    proof = prove_not_held(raised.value, task.payload_mass)
+    assert (proof.name, proof.sentence) == (ProofName.HOLDING, (
+        'joint 1 needs 60.33 N m to hold 6 kg at the goal, its motor gives 6: no motion can end '
+        'there'))
+
+
+# Motions that exist
+
+
+@pytest.mark.parametrize(('links', 'motors', 'ends', 'duration', 'payload'), [
+    # random counter-examples to limits found by search: these payloads are carried
+    (((0.693, 3.384), (0.402, 5.717)), ((12.089, 7.765), (0.759, 3.882)),
+     ((93, -43), (26, -112)), 1.65, 1.9746),
+    (((0.609, 4.518), (0.326, 10.135)), ((14.022, 3.618), (1.24, 5.304)),
+     ((-3, -13), (-63, 184)), 2.19, 30.80)])
+def test_payloads_that_are_carried_are_not_excluded(
+        links: tuple[tuple[float, float], ...], motors: tuple[tuple[float, float], ...],
+        ends: tuple[tuple[float, float], ...], duration: float, payload: float) -> None:
+    arm = Arm(name='two', links=tuple(Link(length=L, linear_density=rho) for L, rho in links),
+              joints=tuple(Joint(motor=Motor(stall_torque=stall, no_load_speed=speed))
+                           for stall, speed in motors))
+    problem = problem_of(Task(arm=arm, start_positions=np.radians(ends[0]), payload_mass=payload,
+                              goal_positions=np.radians(ends[1]), duration=duration))
+    found = bound_payload(problem)
+    assert found.proof is not None
+    assert found.proof.name is ProofName.ENERGY
+    # within the factor that was found: 5.3 and 22.2
+    assert payload < found.payload < 23 * payload
+    assert 0.25 * duration < bound_duration(problem) < duration
+    assert find_proof(problem, thorough=True) is None
+
+
+@pytest.mark.parametrize('name', HEAVIEST)
+def test_limits_of_the_paper_are_not_excluded(request: pytest.FixtureRequest, name: str,
+                                              paper_task: TaskFactory) -> None:
+    arm = request.getfixturevalue(f'{name}_arm')
+    assert bound_payload(problem_of(paper_task(arm, HEAVIEST[name]))).payload > HEAVIEST[name]
+    problem = problem_of(paper_task(arm, duration=SHORTEST[name]))
+    assert 0.2 * SHORTEST[name] < bound_duration(problem) < SHORTEST[name]
+    assert find_proof(problem, thorough=True) is None
+
+
+@pytest.mark.parametrize(('task', 'close'), [
+    (with_motor(one_link(1.6), 0.1, no_load_speed=2.5), 1.04), (two_links(), 16.0),
+    (two_links(payload_inertia=0.05, duration=0.7), 28.0)], ids=['one', 'two', 'inertia'])
+def test_payloads_that_ipopt_finds_are_not_excluded(task: Task, close: float) -> None:
+    problem = problem_of(task)
+    direct = DirectProblem(problem.model, DirectSettings(intervals=24, degree=4, tolerance=1e-7,
+                                                         free_payload=True))
+    # a high price: nearly the largest payload, near the straight line that it starts from
+    found = direct.solve(problem.parameters, problem.start, problem.goal, task.duration, price=1e5)
+    assert found.converged
+    # the factors are those that were found: bounds of two links are far
+    assert found.payload < bound_payload(problem).payload < close * found.payload
+    heavy = problem_of(replace(task, payload_mass=found.payload))
+    assert 0.2 * task.duration < bound_duration(heavy) < task.duration
+
+
+def drawn_arm(rng: np.random.Generator) -> Arm:
+    """Return an arm with some of everything."""
+    flexible, n = rng.random() < 0.3, int(rng.integers(1, 5))
+    modes = [int(flexible)] * n
+    links = tuple(Link(
+        length=rng.uniform(0.3, 1.2), linear_density=10**rng.uniform(-1, 1), modes=count,
+        flexural_rigidity=10**rng.uniform(0, 1) if count else inf,
+        mode_family=str(rng.choice(list(FAMILIES)))) for count in modes[:2 if flexible else n])
+    joints = tuple(Joint(
+        motor=Motor(stall_torque=10**rng.uniform(0, 1),
+                    no_load_speed=float(rng.choice([inf, 10**rng.uniform(-0.5, 1.3)]))),
+        viscous_friction=float(rng.choice([0.0, 0.5]))) for _ in links)
+    nodes = tuple(Node(mass=rng.uniform(0, 2), inertia=rng.uniform(0, 0.2))
+                  for _ in range(len(links) + 1))
+    return Arm(name='drawn', links=links, joints=joints, nodes=nodes,
+               gravity=rng.choice([0.0, 7.0]) * rng.normal(size=2))
+
+
+def drive(task: Task, rng: np.random.Generator) -> tuple[Array, float]:
+    """Return the state after a motion with motors on their limits, and its duration."""
+    problem, model = problem_of(task), LightModel(task.arm)
+    n, n_t = task.arm.n_joints, task.arm.n_coordinates
+    stall, slope = problem.parameters.stall_torque, problem.parameters.torque_slope
+    rate, x = model.state_rate(problem.p), problem.start.copy()
+    inertia = np.diag(model.mass_and_energy(x[None], problem.p)[0][0])[:n]
+    duration = float(np.sqrt((inertia / stall).mean()) * 10**rng.uniform(-0.8, 0.0))
+    signs, turn = rng.choice([-1.0, 1.0], n), rng.uniform(0.4, 0.9)
+    for sign, part in ((1.0, turn), (-1.0, 1 - turn)):
+        x = solve_ivp(lambda t, state, side=sign * signs * stall: rate(
+            state, side - slope * state[n_t:n_t + n]), (0, part * duration), x, method='LSODA',
+            rtol=1e-9, atol=1e-9).y[:, -1]
+    return x, duration
+
+
+@pytest.mark.parametrize('seed', range(24))
+def test_motion_of_driven_arm_is_not_called_impossible(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    arm = drawn_arm(rng)
+    n, n_t = arm.n_joints, arm.n_coordinates
+    start = rng.uniform(-3, 3, n)
+    task = Task(arm=arm, start_positions=start, goal_positions=start, duration=1.0,
+                payload_mass=float(10**rng.uniform(-2, 1)), goal_velocity_weights=[0.0] * n,
+                start_velocities=rng.choice([0.0, 1.0]) * rng.normal(size=n))
+    end, duration = drive(task, rng)
+    reached = replace(task, goal_positions=end[:n], duration=duration,
+                      goal_velocities=end[n_t:], goal_velocity_weights=[inf] * n_t)
+    problem = problem_of(reached)
+    problem.goal = end  # bent as it is
+    # bounds of one link are reached to 1e-4, the motion is exact to 1e-8
+    assert 0 <= bound_duration(problem) <= duration
+    assert bound_payload(problem).payload >= reached.payload_mass
+    assert find_proof(problem, thorough=True) is None
+    assert find_proof(problem_of(replace(task, time_weight=1.0)), thorough=True) is None
+
+
+# Premises
+
+
+def test_bounds_follow_what_they_depend_on() -> None:
+    task = two_links()
+    payloads = [bound_duration(problem_of(replace(task, payload_mass=m))) for m in (0, 1, 10, 1e3)]
+    durations = [bound_payload(problem_of(replace(task, duration=T))).payload
+                 for T in (0.3, 0.5, 1.0, 4.0)]
+    for values in (payloads, durations):
+        assert (np.diff(values) > 0).all()
+    # the same statement both ways: what is too heavy for a duration takes longer
+    heaviest = durations[2]
+    heavy = replace(task, duration=1.0, payload_mass=1.001 * heaviest)
+    assert bound_duration(problem_of(heavy)) > 0.999
+    assert bound_duration(problem_of(replace(heavy, payload_mass=0.95 * heaviest))) < 1.0
+
+
+@pytest.mark.parametrize(('changes', 'duration', 'payload'), [
+    ({'goal_position_weights': [1.0, 1.0]}, False, False),
+    ({'goal_position_weights': [inf, 1.0]}, True, False),  # a joint still has its way to go
+    ({'goal_velocity_weights': [0.0, 0.0]}, True, True),  # driven, not braked
+    ({'goal_positions': [0.2, 1.0]}, False, False),
+    ({'time_weight': 1.0}, True, False)], ids=str)
+def test_bound_needs_its_premises(changes: dict[str, Any], duration: bool,
+                                  payload: bool) -> None:
+    problem, whole = problem_of(two_links(**changes)), problem_of(two_links())
+    assert (bound_duration(problem) > 0) == duration
+    assert bound_duration(problem) <= bound_duration(whole)
+    found = bound_payload(problem)
+    assert (found.payload < inf) == (found.proof is not None) == payload
+    assert found.payload >= bound_payload(whole).payload
+
+
+@pytest.mark.parametrize('motor', [{'stall_torque': inf}, {}], ids=str)
+def test_motor_without_limit_bounds_nothing(motor: dict[str, float]) -> None:
+    task = two_links()
+    joints = (task.arm.joints[0], Joint(motor=Motor(**motor)))
+    problem = problem_of(replace(task, arm=replace(task.arm, joints=joints)))
+    assert (bound_duration(problem), bound_payload(problem).payload) == (0.0, inf)
+
+
+def test_power_needs_speed_limits_and_torque_does_not() -> None:
+    task = with_motor(two_links(duration=0.4), stall_torque=4.0)
+    found = bound_payload(problem_of(task))
+    assert found.proof is not None
+    assert found.proof.name is ProofName.ENERGY
+    assert 'the torque of the motors can bring no more than' in found.proof.sentence
+
+
+def test_gravity_leaves_flexible_links_without_a_bound_of_energy() -> None:
+    link = Link(length=0.5, linear_density=3.0, flexural_rigidity=20.0, modes=1,
+                mode_family='clamped_free')
+    task = two_links()
+    arm = replace(task.arm, links=(link, link), gravity=[0.0, -1.0])
+    assert bound_payload(problem_of(replace(two_links(), arm=arm))).payload == inf
+
+
+def test_torques_are_looked_at_when_asked_or_when_power_is_scarce() -> None:
+    problem = problem_of(two_links())
+    seconds = bound_duration(problem)
+    shorter = problem.with_changes(duration=0.98 * seconds)
+    proof = find_proof(shorter)
+    assert proof is not None
+    assert proof.name is ProofName.ENERGY
+    assert proof.sentence == ('within the torque of the motors turning joint 1 by 68.8 deg takes '
+                              f'at least {bound_duration(shorter):.4g} s, and '
+                              f'{0.98 * seconds:.4g} s were asked for')
+    # a quick motor is limited by its torque: its power does not tell
+    quick = problem_of(with_motor(two_links(duration=0.2), stall_torque=0.5, no_load_speed=1e4))
+    assert find_proof(quick) is None
+    asked = find_proof(quick, thorough=True)
+    assert asked is not None
+    assert asked.name is ProofName.ENERGY
