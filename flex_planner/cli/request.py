@@ -17,6 +17,7 @@ from flex_planner.base.errors import (
     UnreachableError,
 )
 from flex_planner.base.validation import Array, number
+from flex_planner.cli.controller_options import sampling_settings
 from flex_planner.cli.options import add_arm, angles, numbers
 from flex_planner.optimal_control.task import postures_from_points, Task
 from flex_planner.planning.objectives import Objectives
@@ -47,6 +48,8 @@ class Request:
         [s].
     objectives : Objectives or None
         What the motion must keep besides.
+    sampled : SamplingSettings
+        For which joint controller the trajectory is.
 
     """
 
@@ -55,6 +58,7 @@ class Request:
     elbow: int
     time_limit: float
     objectives: Objectives | None = None
+    sampled: SamplingSettings = SamplingSettings()
 
     @classmethod
     def of(cls, options: argparse.Namespace) -> Request:
@@ -80,13 +84,12 @@ class Request:
                 tolerance=options.tolerance, **_weights(options, arm))
             objectives = _objectives(options, task)
         return cls(task=task, points=points, elbow=options.elbow, time_limit=limit,
-                   objectives=objectives)
+                   objectives=objectives, sampled=sampling_settings(options, arm))
 
     @property
     def sampling(self) -> SamplingSettings:
         """Return the settings of the sampling: close, within the largest number of samples."""
-        closest = SamplingSettings()
-        return replace(closest, longest_step=max(closest.longest_step,
+        return replace(self.sampled, longest_step=max(self.sampled.longest_step,
                                                  self.task.duration / (MAX_SAMPLES - 1)))
 
     def __str__(self) -> str:

@@ -58,6 +58,33 @@ class ExecutionCertificate:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Robustness:
+    """
+    Residual vibration of the same trajectory on other arms, with the PD; ``inf`` if they run away.
+
+    Attributes
+    ----------
+    nominal : float
+        Of the arm that was planned for, `ExecutionCertificate.residual_vibration` [m].
+    more_modes : float
+        With two more modes for every link that has any, at most 8; 0 for rigid links [m].
+    stiffness_differs, payload_differs : float
+        With 10 % less and 10 % more of E I, or of mass and inertia of the payload: the larger of
+        the two [m].
+    more_modes_growth : float
+        How fast deviations grow under the PD with more modes, as
+        `ExecutionCertificate.feedback_growth` [1/s].
+
+    """
+
+    nominal: float
+    more_modes: float
+    stiffness_differs: float
+    payload_differs: float
+    more_modes_growth: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ExecutionLimits:
     """
     What an execution must not exceed, with the PD, for a trajectory to be published.
@@ -77,9 +104,9 @@ class ExecutionLimits:
 
     def violations(self, certificate: ExecutionCertificate, reach: float) -> list[str]:
         """Return a sentence for each limit that is not met."""
-        pairs = ((entry.name, getattr(certificate, entry.name), getattr(self, entry.name) * reach)
-                 for entry in fields(self))
-        found = [f'executed {name.replace("_", " ")} is {value:.3g} m, but must be <= {limit:.3g} m'
+        pairs = ((entry.name.replace('_', ' '), getattr(certificate, entry.name),
+                  getattr(self, entry.name) * reach) for entry in fields(self))
+        found = [f'executed {name} is {value:.3g} m, but must be <= {limit:.3g} m'
                  for name, value, limit in pairs if not value <= limit]
         if found and certificate.feedback_growth > UNSTABLE_GROWTH:
             found.append(unstable_feedback(certificate.controller, certificate.feedback_growth))

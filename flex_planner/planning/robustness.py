@@ -9,7 +9,7 @@ and payloads lighter and heavier, by a tenth.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from flex_planner.arms.arm import Arm, MAX_MODES
 from flex_planner.base.errors import NoEquilibriumError
@@ -23,6 +23,7 @@ from flex_planner.planning.execution import (
     describe_controller,
     Execution,
     ExecutionCertificate,
+    Robustness,
     UNSTABLE_GROWTH,
 )
 from flex_planner.planning.plan import Plan
@@ -37,32 +38,6 @@ _FAR_ABOVE, _NOTABLE = 10.0, 1e-4
 # growth of an error of the joints, above which efforts alone are said to be unstable
 _AMPLIFIED = 10.0
 _POSTURES = 5
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Robustness:
-    """
-    Residual vibration of the same trajectory on other arms, with the PD; ``inf`` if they run away.
-
-    Attributes
-    ----------
-    nominal : float
-        Of the arm that was planned for, `ExecutionCertificate.residual_vibration` [m].
-    more_modes : float
-        With two more modes for every link that has any, at most 8; 0 for rigid links [m].
-    stiffness_differs, payload_differs : float
-        With 10 % less and 10 % more of E I, or of mass and inertia of the payload: the larger of
-        the two [m].
-    more_modes_growth : float
-        How fast deviations grow under the PD with more modes, see `feedback_growth` [1/s].
-
-    """
-
-    nominal: float
-    more_modes: float
-    stiffness_differs: float
-    payload_differs: float
-    more_modes_growth: float
 
 
 def assess_robustness(plan: Plan, sampled: SampledPlan,

@@ -20,8 +20,14 @@ from flex_planner.control.default_gains import default_gains
 from flex_planner.control.joint_controller import JointController
 from flex_planner.control.joint_reference import JointReference
 from flex_planner.planning.certificate import CertificateLimits
-from flex_planner.planning.execution import certify_execution, Execution, ExecutionCertificate
-from flex_planner.planning.plan import Plan, Samples
+from flex_planner.planning.execution import (
+    certify_execution,
+    Execution,
+    ExecutionCertificate,
+    ExecutionLimits,
+    Robustness,
+)
+from flex_planner.planning.plan import Plan, PlanStatus, Samples
 from flex_planner.planning.point_times import MAX_SAMPLES, point_times, SMALLEST_STEP
 from flex_planner.planning.published_motion import PublishedMotion
 import numpy as np
@@ -50,8 +56,12 @@ class SampledPlan:
     torque_error : float
         Largest difference between the efforts and their linear interpolation, found at eight
         times as many points [N m].
+    controller_period : float
+        For which efforts are shifted by a half; 0 if they are not [s].
     execution : ExecutionCertificate
         What the controller makes of times, joints and efforts.
+    robustness : Robustness or None
+        What it makes of them on other arms; None unless `assess_robustness` has found out.
 
     """
 
@@ -59,7 +69,9 @@ class SampledPlan:
     samples: Samples
     efforts: Array
     torque_error: float
+    controller_period: float
     execution: ExecutionCertificate
+    robustness: Robustness | None = None
 
     @property
     def reference(self) -> JointReference:
@@ -165,6 +177,28 @@ def sample_plan(plan: Plan, settings: SamplingSettings,
     return replace(sampled, execution=certificate)
 
 
+def judge_execution(plan: Plan, sampled: SampledPlan,
+                    limits: ExecutionLimits | None = None) -> Plan:
+    """
+    Return the plan, whose certificate fails if its samples miss the limits of an execution.
+
+    Parameters
+    ----------
+    plan : Plan
+        Solved, or else left as it is.
+    sampled : SampledPlan
+        Its samples.
+    limits : ExecutionLimits, optional
+        What must be kept.
+
+    """
+    broken = (limits or ExecutionLimits()).violations(sampled.execution, plan.arm.reach)
+    if not plan.solved or not broken:
+        return plan
+    return replace(plan, status=PlanStatus.CERTIFICATE_FAILED,
+                   message=f'the trajectory cannot be carried out: {"; ".join(broken)}')
+
+
 def execution_of(plan: Plan, controller: JointController) -> Execution:
     """Return the execution of a plan by the arm that it was made for."""
     n_t = plan.arm.n_coordinates
@@ -206,7 +240,7 @@ def _sampled(motion: PublishedMotion, controller: JointController, times: Array,
     efforts = np.vstack([motion.torque(inside), plan.problem.holding_torque])
     return SampledPlan(times_ns=np.append(times_ns, times_ns[-1] + hold_ns), samples=samples,
                        efforts=efforts, torque_error=error,
-                       execution=ExecutionCertificate(controller=controller))
+                       controller_period=2 * abs(motion.delay), execution=ExecutionCertificate(controller=controller))
 
 
 def _at_rest_at_the_ends(plan: Plan, samples: Samples) -> Samples:

@@ -1,9 +1,10 @@
 """
 A recorded plan checked against the model, from the recording alone.
 
-The recorded torques, interpolated linearly as a controller does, are applied to the arm of the
-recording; nothing of the collocation that made the plan is used. What linear interpolation
-changes is in the result: this is what the arm will do, apart from feedback.
+The recorded joint trajectory is carried out by the arm of the recording under the joint controller
+that it was published for, exactly as when it was certified, with feedback and without; nothing of
+the collocation that made the plan is used. The costates of the recording then show whether its
+efforts are those of an optimal motion.
 
 """
 
@@ -11,19 +12,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.errors import RecordingError
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
-from flex_planner.dynamics.integration import integrate, LinearTorque
 from flex_planner.dynamics.statics import equilibrium
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.optimal_control.torque_limits import TorqueLimits
+from flex_planner.planning.execution import Execution, ExecutionLimits
 from flex_planner.reports.recording.contents import RecordedMotion, RecordedRequest
 import numpy as np
 
-_RTOL = 1e-10
+_MICROMETRE = 1e-6
 _TINY = float(np.finfo(float).tiny)
 
 
@@ -34,14 +36,19 @@ class CheckLimits:
 
     Attributes
     ----------
+    execution : ExecutionLimits
+        Of the arrival with feedback, the same as when it was published.
     tip_deviation : float
-        Of the tip, as a share of the arm's reach: linear interpolation costs up to 1e-4 at the
-        planner's default sampling.
+        Of the tip on its way, with feedback, as a share of the arm's reach.
     joint_deviation : float
         Of joint angles and speeds, as a share of the largest.
-    torque_error : float
+    certificate_difference : float
+        Of tip errors and vibrations from those of the recorded certificate, as a share of these
+        and a micrometre.
+    torque_error, shifted_torque_error : float
         By which a torque may leave its bounds of eq. (15) or differ from eq. (14), as a share
-        of the largest torque.
+        of the largest torque; the second where efforts are shifted in time, and states and
+        costates between the points are interpolated.
     hamiltonian_drift : float
         Spread of H relative to its largest term.
     end_error : float
@@ -49,9 +56,12 @@ class CheckLimits:
 
     """
 
-    tip_deviation: float = 1e-3
-    joint_deviation: float = 1e-2
+    execution: ExecutionLimits = ExecutionLimits()
+    tip_deviation: float = 5e-3
+    joint_deviation: float = 2e-2
+    certificate_difference: float = 1e-3
     torque_error: float = 1e-6
+    shifted_torque_error: float = 1e-2
     hamiltonian_drift: float = 0.02
     end_error: float = 1e-6
 
@@ -146,16 +156,26 @@ def check_motion(request: RecordedRequest, model: ArmModel | None = None,
                              f'{request.report.error_msg or "it failed"}')
     model, limits = model or ArmModel(request.arm), limits or CheckLimits()
     ends = [_at_rest(model, row, parameters) for row in motion.coordinates[[0, -1]]]
-    states = integrate(model, parameters.physical, ends[0],
-                       LinearTorque(motion.times, motion.torques), monitor, rtol=_RTOL,
-                       atol=_RTOL / 100)
+    execution = Execution(
+        dynamics=model, parameters=parameters, goal=motion.tip[-1], controller=request.controller,
+        start=np.concatenate([motion.coordinates[0], motion.rates[0]]),
+        duration=float(motion.times[-2]))
+    states = _states(execution, motion, monitor)
     tip = tip_position(request.arm, states[:, :request.arm.n_coordinates])
     return MotionCheck(tip=tip, findings=(
-        *_resimulation(request, motion, states[-1] - ends[1], tip, limits),
-        _joint_path(motion, states, request.arm.n_joints, limits),
+        *_arrival(request, execution, motion, limits, monitor),
+        *_way(motion, states, tip, request.arm, limits),
         *_deviation_from_rest(motion, ends, limits),
         *_deviation_from_request(request, motion, limits),
-        *_optimality(model, motion, parameters, limits)))
+        *_optimality(model, request, parameters, limits)))
+
+
+def _states(execution: Execution, motion: RecordedMotion, monitor: Monitor | None) -> Array:
+    """Return the states at the recorded times, between two updates of the controller on a line."""
+    carried = execution.arm.follow(motion.reference, execution.start, float(motion.times[-1]),
+                                   monitor)
+    return np.stack([np.interp(motion.times, carried.times, column)
+                     for column in carried.states.T], axis=1)
 
 
 def _at_rest(model: ArmModel, coordinates: Array, parameters: Parameters) -> Array:
@@ -164,28 +184,43 @@ def _at_rest(model: ArmModel, coordinates: Array, parameters: Parameters) -> Arr
     return np.concatenate([rest, np.zeros_like(rest)])
 
 
-def _resimulation(request: RecordedRequest, motion: RecordedMotion, miss: Array, tip: Array,
-                  limits: CheckLimits) -> list[Finding]:
-    """Return the errors of the motion that the recorded torques lead to."""
-    most = limits.tip_deviation * request.arm.reach
-    distance = np.linalg.norm(tip - motion.tip, axis=1)
-    return [
-        Finding(name='tip error at the end', unit='m', value=float(distance[-1]), limit=most,
-                recorded=float(request.report.tip_error)),
-        Finding(name='largest tip deviation', unit='m', value=float(distance.max()), limit=most),
-        Finding(name='boundary error (eq. 17)', unit='', value=float(miss @ miss / 2),
-                limit=request.tolerance, recorded=float(request.report.boundary_error))]
+def _arrival(request: RecordedRequest, execution: Execution, motion: RecordedMotion,
+             limits: CheckLimits, monitor: Monitor | None) -> list[Finding]:
+    """Return where the arm arrives, and how that differs from the recorded certificate."""
+    reference, reach, planned = motion.reference, request.arm.reach, request.execution
+    found = []
+    for arm in (execution, execution.open_loop):
+        state = arm.arrive(reference, monitor)
+        found += [arm.tip_error(state), arm.vibration(state)]
+    expected = None if planned is None else [
+        planned.tip_error, planned.residual_vibration, planned.open_loop_tip_error,
+        planned.open_loop_residual_vibration]
+    findings = [
+        Finding(name=f'executed {name}', unit='m', value=value, limit=limit * reach,
+                recorded=None if expected is None else expected[k])
+        for k, (name, value, limit) in enumerate((
+            ('tip error', found[0], limits.execution.tip_error),
+            ('residual vibration', found[1], limits.execution.residual_vibration)))]
+    if expected is not None:
+        findings.append(Finding(
+            name='difference from the certificate', unit='', limit=limits.certificate_difference,
+            value=float(max(abs(value - before) / (before + _MICROMETRE)
+                            for value, before in zip(found, expected, strict=True)))))
+    return findings
 
 
-def _joint_path(motion: RecordedMotion, states: Array, n: int, limits: CheckLimits) -> Finding:
-    """Return the distance of the joints' angles and speeds from the recorded ones."""
-    n_t = motion.coordinates.shape[1]
+def _way(motion: RecordedMotion, states: Array, tip: Array, arm: Arm,
+         limits: CheckLimits) -> list[Finding]:
+    """Return the distances of tip and joints from the recorded ones on the way."""
+    n, n_t = arm.n_joints, arm.n_coordinates
     pairs = ((states[:, :n], motion.coordinates[:, :n]),
              (states[:, n_t:n_t + n], motion.rates[:, :n]))
     shares = [np.abs(found - recorded).max() / max(np.ptp(recorded, axis=0).max(), _TINY)
               for found, recorded in pairs]
-    return Finding(name='largest joint deviation', unit='', limit=limits.joint_deviation,
-                   value=float(np.max(shares)))
+    return [Finding(name='largest tip deviation', unit='m', limit=limits.tip_deviation * arm.reach,
+                    value=float(np.linalg.norm(tip - motion.tip, axis=1).max())),
+            Finding(name='largest joint deviation', unit='', limit=limits.joint_deviation,
+                    value=float(np.max(shares)))]
 
 
 def _deviation_from_rest(motion: RecordedMotion, ends: list[Array],
@@ -214,22 +249,40 @@ def _deviation_from_request(request: RecordedRequest, motion: RecordedMotion,
             for name, miss in zip(('start', 'goal'), found - asked, strict=True)]
 
 
-def _optimality(model: ArmModel, motion: RecordedMotion, parameters: Parameters,
+def _optimality(model: ArmModel, request: RecordedRequest, parameters: Parameters,
                 limits: CheckLimits) -> list[Finding]:
-    """Return the violation of the torque bounds, and the errors of torques and Hamiltonian."""
-    n, size = model.arm.n_joints, max(float(np.abs(motion.torques).max()), _TINY)
-    lower, upper = TorqueLimits.of(model.arm).bounds(motion.rates[:, :n])
-    bounds = np.where(motion.torques >= 0, upper, -lower)
+    """Return the violation of the torque bounds, and the errors of efforts and Hamiltonian."""
+    motion = request.motion
+    assert motion is not None
     # the last sample holds the arm, it is not of the extremal
-    z = np.hstack([motion.coordinates, motion.rates, motion.position_costates,
-                   motion.velocity_costates])[:-1]
+    z, efforts = motion.extended_states[:-1], motion.torques[:-1]
     controls = model.controls(z, parameters.stack())
     powers = np.abs(motion.position_costates * motion.rates).max()
     scale = max(float(controls.cost_rate.max()), float(powers), _TINY)
+    share, applied = limits.torque_error, z
+    if request.effort_delay:
+        share, applied = limits.shifted_torque_error, _shifted(model, request, parameters)
+    n, n_t = model.arm.n_joints, model.arm.n_coordinates
+    lower, upper = TorqueLimits.of(model.arm).bounds(applied[:, n_t:n_t + n])
+    beyond = np.abs(efforts) - np.where(efforts >= 0, upper, -lower)
+    expected = model.controls(applied, parameters.stack()).torque
+    size = share * max(float(np.abs(motion.torques).max()), _TINY)
     return [
-        Finding(name='torque beyond its bounds', unit='N m', limit=limits.torque_error * size,
-                value=max(float((np.abs(motion.torques) - bounds).max()), 0.0)),
-        Finding(name='torques against eq. (14)', unit='N m', limit=limits.torque_error * size,
-                value=float(np.abs(controls.torque - motion.torques[:-1]).max())),
+        Finding(name='torque beyond its bounds', unit='N m', limit=size,
+                value=max(float(beyond.max()), 0.0)),
+        Finding(name='torques against eq. (14)', unit='N m', limit=size,
+                value=float(np.abs(expected - efforts).max())),
         Finding(name='Hamiltonian drift', unit='', limit=limits.hamiltonian_drift,
                 value=float(np.ptp(controls.hamiltonian)) / scale)]
+
+
+def _shifted(model: ArmModel, request: RecordedRequest, parameters: Parameters) -> Array:
+    """Return extended states at the times whose torques the efforts are, shape (k, 4 n_t)."""
+    from scipy.interpolate import CubicHermiteSpline  # see `ArmDynamics.prepare`
+
+    motion = request.motion
+    assert motion is not None
+    z, times = motion.extended_states[:-1], motion.times[:-1]
+    spline = CubicHermiteSpline(times, z, model.optimality(z, parameters.stack()))
+    states: Array = spline(np.clip(times - request.effort_delay, 0, times[-1]))
+    return states

@@ -10,7 +10,12 @@ from typing import Any
 from flex_planner.arms.arm import Arm, Joint, Link, Motor, Node
 from flex_planner.base.errors import FlexPlannerError, RecordingError
 from flex_planner.base.validation import Array
+from flex_planner.control.default_gains import default_gains
+from flex_planner.control.joint_controller import EffortHold, Gains, JointController
+from flex_planner.control.joint_reference import JointReference
+from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.optimal_control.parameters import Parameters
+from flex_planner.planning.execution import ExecutionCertificate, Robustness
 from flex_planner.recording import (
     definition_folder,
     MessageTypes,
@@ -36,8 +41,10 @@ class RecordedMotion:
         [s]; the last sample holds the arm, shortly after the end of the motion.
     coordinates, rates : numpy.ndarray, shape (k, n_t)
         Joints [rad], then modes [m], and their rates.
+    accelerations : numpy.ndarray, shape (k, n)
+        Of the joints [rad/s^2].
     torques : numpy.ndarray, shape (k, n)
-        [N m].
+        Efforts of the joint trajectory [N m].
     position_costates, velocity_costates : numpy.ndarray, shape (k, n_t)
         psi_1 and psi_2.
     tip : numpy.ndarray, shape (k, 2)
@@ -50,6 +57,7 @@ class RecordedMotion:
     times: Array
     coordinates: Array
     rates: Array
+    accelerations: Array
     torques: Array
     position_costates: Array
     velocity_costates: Array
@@ -66,11 +74,25 @@ class RecordedMotion:
             coordinates=np.hstack([_rows(joints, 'positions'),
                                    _rows(bends, 'modal_displacements')]),
             rates=np.hstack([_rows(joints, 'velocities'), _rows(bends, 'modal_rates')]),
-            torques=_rows(joints, 'effort'),
+            accelerations=_rows(joints, 'accelerations'), torques=_rows(joints, 'effort'),
             position_costates=_rows(bends, 'position_costates'),
             velocity_costates=_rows(bends, 'velocity_costates'),
             tip=np.array([(point.x, point.y) for point in message.tip_path]),
             payload_mass=float(message.payload_mass))
+
+    @property
+    def extended_states(self) -> Array:
+        """Return states and costates z, shape (k, 4 n_t)."""
+        return np.hstack([self.coordinates, self.rates, self.position_costates,
+                          self.velocity_costates])
+
+    @property
+    def reference(self) -> JointReference:
+        """Return the trajectory that the joint controller gets."""
+        n = self.torques.shape[1]
+        return JointReference(
+            times=self.times, positions=self.coordinates[:, :n], velocities=self.rates[:, :n],
+            accelerations=self.accelerations, torques=self.torques)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -148,6 +170,51 @@ class RecordedRequest:
         return float(self.task.tolerance or self.settings['tolerance'])
 
     @property
+    def controller(self) -> JointController:
+        """Return the joint controller that the plan was published for."""
+        report = self.report
+        if not getattr(report, 'controller_rate', 0.0):  # older recordings know of none
+            return JointController(gains=default_gains(ArmDynamics.of(self.arm)),
+                                   hold=EffortHold.LINEAR)
+        gains = Gains(stiffness=np.asarray(report.controller_stiffness),
+                      damping=np.asarray(report.controller_damping))
+        return JointController(gains=gains, rate=float(report.controller_rate),
+                               hold=EffortHold.named(report.effort_hold))
+
+    @property
+    def effort_delay(self) -> float:
+        """Return by how much efforts come later than the planned torques [s]."""
+        half = float(getattr(self.report, 'controller_period', 0.0)) / 2
+        return -half if self.controller.hold is EffortHold.START else half
+
+    @property
+    def execution(self) -> ExecutionCertificate | None:
+        """Return the recorded certificate of the trajectory; None in older recordings."""
+        if not getattr(self.report, 'controller_rate', 0.0):
+            return None
+        report = self.report
+        return ExecutionCertificate(
+            controller=self.controller, tip_error=float(report.executed_tip_error),
+            residual_vibration=float(report.executed_residual_vibration),
+            open_loop_tip_error=float(report.open_loop_tip_error),
+            open_loop_residual_vibration=float(report.open_loop_residual_vibration),
+            open_loop_amplification=float(report.open_loop_amplification),
+            feedback_growth=float(report.feedback_growth))
+
+    @property
+    def robustness(self) -> Robustness | None:
+        """Return the recorded figures of other arms; None where there are none."""
+        if self.execution is None or not self.solved:
+            return None
+        report = self.report
+        return Robustness(
+            nominal=float(report.executed_residual_vibration),
+            more_modes=float(report.vibration_if_more_modes),
+            stiffness_differs=float(report.vibration_if_stiffness_differs),
+            payload_differs=float(report.vibration_if_payload_differs),
+            more_modes_growth=float(report.feedback_growth_if_more_modes))
+
+    @property
     def parameters(self) -> Parameters:
         """Return payload, limits and weights of the plan, which a search may have changed."""
         payload = self.task.payload_mass if self.motion is None else self.motion.payload_mass
@@ -212,6 +279,7 @@ def _check_sizes(arm: Arm, motion: RecordedMotion) -> None:
     """Raise ValueError unless a motion is one of an arm."""
     count, n_t = motion.times.size, arm.n_coordinates
     shapes = {'coordinates': n_t, 'rates': n_t, 'torques': arm.n_joints, 'tip': 2,
+              'accelerations': arm.n_joints,
               'position_costates': n_t, 'velocity_costates': n_t}
     for name, columns in shapes.items():
         shape = getattr(motion, name).shape

@@ -154,6 +154,12 @@ class PlannerSettings:
             longest_step=self.sampling_step, torque_tolerance=self.torque_tolerance,
             controller=self.controller(), controller_period=period)
 
+    def with_controller(self, controller: JointController) -> PlannerSettings:
+        """Return the settings for another joint controller."""
+        return replace(self, controller_rate=controller.rate, effort_hold=controller.hold.value,
+                       controller_stiffness=controller.gains.stiffness.tolist(),
+                       controller_damping=controller.gains.damping.tolist())
+
     def controller(self) -> JointController:
         """Return the joint controller that trajectories are for."""
         gains = Gains(stiffness=np.asarray(self.controller_stiffness),
