@@ -21,7 +21,8 @@ from flex_planner.cli.controller_options import sampling_settings
 from flex_planner.cli.options import add_arm, angles, numbers
 from flex_planner.optimal_control.task import postures_from_points, Task
 from flex_planner.planning.objectives import Objectives
-from flex_planner.planning.sampling import MAX_SAMPLES, SamplingSettings
+from flex_planner.planning.point_times import MAX_SAMPLES
+from flex_planner.planning.sampling import SamplingSettings
 import numpy as np
 
 MAX_TIME_LIMIT = 3600.0
@@ -89,8 +90,8 @@ class Request:
     @property
     def sampling(self) -> SamplingSettings:
         """Return the settings of the sampling: close, within the largest number of samples."""
-        return replace(self.sampled, longest_step=max(self.sampled.longest_step,
-                                                 self.task.duration / (MAX_SAMPLES - 1)))
+        shortest = self.task.duration / (MAX_SAMPLES - 1)
+        return replace(self.sampled, longest_step=max(self.sampled.longest_step, shortest))
 
     def __str__(self) -> str:
         """Return the motion in words."""

@@ -90,7 +90,7 @@ class ControlledArm:
         """
         watch, period = monitor or Monitor(), self.controller.period
         count = int(np.ceil(until / period - 1e-6))
-        times = np.arange(count + 1) * period
+        times = np.arange(count + 1, dtype=np.float64) * period
         states = np.full((count + 1, state.size), np.nan)
         states[0], fewest = state, int(np.ceil(period / _LONGEST_STEP - 1e-9))
         first, steps = 0, fewest

@@ -27,11 +27,10 @@ def default_gains(dynamics: ArmDynamics, rate: float = 1000.0) -> Gains:
     hub without inertia - the gains of the joints are lowered.
 
     """
-    arm, scale = dynamics.arm, np.ones(dynamics.arm.n_joints)
+    arm, n = dynamics.arm, dynamics.arm.n_joints
     physical = PhysicalParameters.of_arm(arm).physical
     masses = [_mass(dynamics, bend, physical) for bend in _BENDS]
-    n = arm.n_joints
-    scale = np.maximum(scale, np.diag(masses[0])[:n] / _HEAVY)
+    scale: Array = np.maximum(1.0, np.diag(masses[0])[:n] / _HEAVY)
     response = np.max([np.diag(np.linalg.inv(mass))[:n] for mass in masses], axis=0)
     # the sum bounds the share of any combination of the joints
     share = response * _DAMPING * scale / rate

@@ -13,6 +13,7 @@ from flex_planner.control.joint_controller import Gains, JointController
 from flex_planner.control.joint_reference import Reference
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.physical_parameters import PhysicalParameters
+from flex_planner.planning.plan import Plan
 import numpy as np
 
 # of the joint angles at the start, to see what becomes of it [rad]
@@ -156,6 +157,14 @@ class Execution:
     duration: float
     goal: Array
     controller: JointController
+
+    @classmethod
+    def of(cls, plan: Plan, controller: JointController) -> Execution:
+        """Return the execution of a plan by the arm that it was made for."""
+        goal = tip_position(plan.arm, plan.problem.goal[None, :plan.arm.n_coordinates])[0]
+        return Execution(dynamics=plan.model, parameters=plan.problem.parameters,
+                         start=plan.problem.start, duration=plan.task.duration, goal=goal,
+                         controller=controller)
 
     @property
     def arm(self) -> ControlledArm:

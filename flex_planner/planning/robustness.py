@@ -27,7 +27,7 @@ from flex_planner.planning.execution import (
     UNSTABLE_GROWTH,
 )
 from flex_planner.planning.plan import Plan
-from flex_planner.planning.sampling import execution_of, SampledPlan
+from flex_planner.planning.sampling import SampledPlan
 from flex_planner.planning.warnings import PlanWarning, WarningKind
 import numpy as np
 
@@ -63,7 +63,7 @@ def assess_robustness(plan: Plan, sampled: SampledPlan,
         If the monitor stopped it.
 
     """
-    execution = execution_of(plan, sampled.execution.controller)
+    execution = Execution.of(plan, sampled.execution.controller)
     given = plan.problem.parameters
     payload = given.payload_mass or given.payload_inertia
 

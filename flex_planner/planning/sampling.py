@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.errors import InvalidTaskError
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array, number
@@ -170,7 +169,7 @@ def sample_plan(plan: Plan, settings: SamplingSettings,
             f'a motion of {duration:g} s sampled every {settings.longest_step:g} s has {count} '
             f'samples, but may have {MAX_SAMPLES}; the parameter sampling_step must be >= '
             f'{duration / MAX_SAMPLES:g} s')
-    execution = execution_of(plan, settings.controller_of(plan))
+    execution = Execution.of(plan, settings.controller_of(plan))
     sampled = _close_enough(plan, settings, execution, watch)
     postures = plan.uniform_samples(_POSTURES).coordinates[:, :plan.arm.n_joints]
     certificate = certify_execution(execution, sampled.reference, postures, watch)
@@ -197,15 +196,6 @@ def judge_execution(plan: Plan, sampled: SampledPlan,
         return plan
     return replace(plan, status=PlanStatus.CERTIFICATE_FAILED,
                    message=f'the trajectory cannot be carried out: {"; ".join(broken)}')
-
-
-def execution_of(plan: Plan, controller: JointController) -> Execution:
-    """Return the execution of a plan by the arm that it was made for."""
-    n_t = plan.arm.n_coordinates
-    goal = tip_position(plan.arm, plan.problem.goal[None, :n_t])[0]
-    return Execution(dynamics=plan.model, parameters=plan.problem.parameters,
-                     start=plan.problem.start, duration=plan.task.duration, goal=goal,
-                     controller=controller)
 
 
 def _close_enough(plan: Plan, settings: SamplingSettings, execution: Execution,
@@ -240,7 +230,8 @@ def _sampled(motion: PublishedMotion, controller: JointController, times: Array,
     efforts = np.vstack([motion.torque(inside), plan.problem.holding_torque])
     return SampledPlan(times_ns=np.append(times_ns, times_ns[-1] + hold_ns), samples=samples,
                        efforts=efforts, torque_error=error,
-                       controller_period=2 * abs(motion.delay), execution=ExecutionCertificate(controller=controller))
+                       controller_period=2 * abs(motion.delay),
+                       execution=ExecutionCertificate(controller=controller))
 
 
 def _at_rest_at_the_ends(plan: Plan, samples: Samples) -> Samples:

@@ -15,8 +15,9 @@ import numpy as np
 
 def execution_rows(certificate: ExecutionCertificate) -> list[Row]:
     """Return the certificate of a trajectory."""
+    controller = describe_controller(certificate.controller)
     return [
-        ('published trajectory', f'carried out with {describe_controller(certificate.controller)}'),
+        ('published trajectory', f'carried out with {controller}'),
         ('  tip error', millimetres(certificate.tip_error)),
         ('  residual vibration', millimetres(certificate.residual_vibration)),
         ('  without feedback', f'tip error {millimetres(certificate.open_loop_tip_error)}, '

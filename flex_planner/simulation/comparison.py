@@ -21,12 +21,8 @@ from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_path
-from flex_planner.planning.sampling import (
-    MAX_SAMPLES,
-    sample_plan,
-    SampledPlan,
-    SamplingSettings,
-)
+from flex_planner.planning.point_times import MAX_SAMPLES
+from flex_planner.planning.sampling import sample_plan, SampledPlan, SamplingSettings
 from flex_planner.planning.strategies.initial_guesses import rigid_problem
 from flex_planner.simulation.execution import execute_plan, ExecutionMode, ExecutionResult, Setting
 from flex_planner.simulation.mismatch import Mismatch

@@ -10,8 +10,6 @@ efforts are those of an optimal motion.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.errors import RecordingError
@@ -20,108 +18,19 @@ from flex_planner.base.validation import Array
 from flex_planner.dynamics.statics import equilibrium
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.parameters import Parameters
-from flex_planner.optimal_control.torque_limits import TorqueLimits
-from flex_planner.planning.execution import Execution, ExecutionLimits
+from flex_planner.planning.execution import Execution
 from flex_planner.reports.recording.contents import RecordedMotion, RecordedRequest
+from flex_planner.reports.recording.execution import (
+    effort_delay,
+    recorded_controller,
+    recorded_execution,
+)
+from flex_planner.reports.recording.findings import CheckLimits, Finding, MotionCheck
+from flex_planner.reports.recording.optimality import optimality_findings
 import numpy as np
 
 _MICROMETRE = 1e-6
 _TINY = float(np.finfo(float).tiny)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CheckLimits:
-    """
-    What the findings must not exceed; the boundary error has the limit of the task.
-
-    Attributes
-    ----------
-    execution : ExecutionLimits
-        Of the arrival with feedback, the same as when it was published.
-    tip_deviation : float
-        Of the tip on its way, with feedback, as a share of the arm's reach.
-    joint_deviation : float
-        Of joint angles and speeds, as a share of the largest.
-    certificate_difference : float
-        Of tip errors and vibrations from those of the recorded certificate, as a share of these
-        and a micrometre.
-    torque_error, shifted_torque_error : float
-        By which a torque may leave its bounds of eq. (15) or differ from eq. (14), as a share
-        of the largest torque; the second where efforts are shifted in time, and states and
-        costates between the points are interpolated.
-    hamiltonian_drift : float
-        Spread of H relative to its largest term.
-    end_error : float
-        Of the first and the last sample [rad, m, rad/s, m/s].
-
-    """
-
-    execution: ExecutionLimits = ExecutionLimits()
-    tip_deviation: float = 5e-3
-    joint_deviation: float = 2e-2
-    certificate_difference: float = 1e-3
-    torque_error: float = 1e-6
-    shifted_torque_error: float = 1e-2
-    hamiltonian_drift: float = 0.02
-    end_error: float = 1e-6
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Finding:
-    """
-    One number that the check found.
-
-    Attributes
-    ----------
-    name, unit : str
-        What it is.
-    value, limit : float
-        Passed if value <= limit.
-    recorded : float or None
-        The same in the recorded certificate, where it has it.
-
-    """
-
-    name: str
-    unit: str
-    value: float
-    limit: float
-    recorded: float | None = None
-
-    @property
-    def passed(self) -> bool:
-        """Return whether the value keeps its limit; not a number does not."""
-        return self.value <= self.limit
-
-    def __str__(self) -> str:
-        """Return the finding in words."""
-        unit = f' {self.unit}' if self.unit else ''
-        planned = '' if self.recorded is None else f', {self.recorded:.1e}{unit} when planned'
-        verdict = 'passed' if self.passed else 'FAILED'
-        return f'{verdict}: {self.value:.3g}{unit} (limit {self.limit:.3g}{unit}{planned})'
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class MotionCheck:
-    """
-    What the check of a recorded motion found.
-
-    Attributes
-    ----------
-    findings : tuple of Finding
-        In the order in which they are shown.
-    tip : numpy.ndarray, shape (k, 2)
-        Tip of the re-simulated arm at the recorded times [m].
-
-    """
-
-    findings: tuple[Finding, ...]
-    tip: Array
-
-    @property
-    def passed(self) -> bool:
-        """Return whether every finding keeps its limit."""
-        return all(finding.passed for finding in self.findings)
 
 
 def check_motion(request: RecordedRequest, model: ArmModel | None = None,
@@ -157,9 +66,9 @@ def check_motion(request: RecordedRequest, model: ArmModel | None = None,
     model, limits = model or ArmModel(request.arm), limits or CheckLimits()
     ends = [_at_rest(model, row, parameters) for row in motion.coordinates[[0, -1]]]
     execution = Execution(
-        dynamics=model, parameters=parameters, goal=motion.tip[-1], controller=request.controller,
+        dynamics=model, parameters=parameters, goal=motion.tip[-1],
         start=np.concatenate([motion.coordinates[0], motion.rates[0]]),
-        duration=float(motion.times[-2]))
+        duration=float(motion.times[-2]), controller=recorded_controller(request))
     states = _states(execution, motion, monitor)
     tip = tip_position(request.arm, states[:, :request.arm.n_coordinates])
     return MotionCheck(tip=tip, findings=(
@@ -167,7 +76,8 @@ def check_motion(request: RecordedRequest, model: ArmModel | None = None,
         *_way(motion, states, tip, request.arm, limits),
         *_deviation_from_rest(motion, ends, limits),
         *_deviation_from_request(request, motion, limits),
-        *_optimality(model, request, parameters, limits)))
+        *optimality_findings(model, motion, parameters, limits, effort_delay(request),
+                             float(request.report.torque_interpolation_error))))
 
 
 def _states(execution: Execution, motion: RecordedMotion, monitor: Monitor | None) -> Array:
@@ -187,7 +97,7 @@ def _at_rest(model: ArmModel, coordinates: Array, parameters: Parameters) -> Arr
 def _arrival(request: RecordedRequest, execution: Execution, motion: RecordedMotion,
              limits: CheckLimits, monitor: Monitor | None) -> list[Finding]:
     """Return where the arm arrives, and how that differs from the recorded certificate."""
-    reference, reach, planned = motion.reference, request.arm.reach, request.execution
+    reference, reach, planned = motion.reference, request.arm.reach, recorded_execution(request)
     found = []
     for arm in (execution, execution.open_loop):
         state = arm.arrive(reference, monitor)
@@ -212,15 +122,12 @@ def _arrival(request: RecordedRequest, execution: Execution, motion: RecordedMot
 def _way(motion: RecordedMotion, states: Array, tip: Array, arm: Arm,
          limits: CheckLimits) -> list[Finding]:
     """Return the distances of tip and joints from the recorded ones on the way."""
-    n, n_t = arm.n_joints, arm.n_coordinates
-    pairs = ((states[:, :n], motion.coordinates[:, :n]),
-             (states[:, n_t:n_t + n], motion.rates[:, :n]))
-    shares = [np.abs(found - recorded).max() / max(np.ptp(recorded, axis=0).max(), _TINY)
-              for found, recorded in pairs]
+    recorded = motion.coordinates[:, :arm.n_joints]
+    away = np.abs(states[:, :arm.n_joints] - recorded).max()
     return [Finding(name='largest tip deviation', unit='m', limit=limits.tip_deviation * arm.reach,
                     value=float(np.linalg.norm(tip - motion.tip, axis=1).max())),
             Finding(name='largest joint deviation', unit='', limit=limits.joint_deviation,
-                    value=float(np.max(shares)))]
+                    value=float(away / max(np.ptp(recorded, axis=0).max(), _TINY)))]
 
 
 def _deviation_from_rest(motion: RecordedMotion, ends: list[Array],
@@ -247,42 +154,3 @@ def _deviation_from_request(request: RecordedRequest, motion: RecordedMotion,
     return [Finding(name=f'deviation from task, {name}', unit=unit, limit=limits.end_error,
                     value=float(np.abs(miss).max()))
             for name, miss in zip(('start', 'goal'), found - asked, strict=True)]
-
-
-def _optimality(model: ArmModel, request: RecordedRequest, parameters: Parameters,
-                limits: CheckLimits) -> list[Finding]:
-    """Return the violation of the torque bounds, and the errors of efforts and Hamiltonian."""
-    motion = request.motion
-    assert motion is not None
-    # the last sample holds the arm, it is not of the extremal
-    z, efforts = motion.extended_states[:-1], motion.torques[:-1]
-    controls = model.controls(z, parameters.stack())
-    powers = np.abs(motion.position_costates * motion.rates).max()
-    scale = max(float(controls.cost_rate.max()), float(powers), _TINY)
-    share, applied = limits.torque_error, z
-    if request.effort_delay:
-        share, applied = limits.shifted_torque_error, _shifted(model, request, parameters)
-    n, n_t = model.arm.n_joints, model.arm.n_coordinates
-    lower, upper = TorqueLimits.of(model.arm).bounds(applied[:, n_t:n_t + n])
-    beyond = np.abs(efforts) - np.where(efforts >= 0, upper, -lower)
-    expected = model.controls(applied, parameters.stack()).torque
-    size = share * max(float(np.abs(motion.torques).max()), _TINY)
-    return [
-        Finding(name='torque beyond its bounds', unit='N m', limit=size,
-                value=max(float(beyond.max()), 0.0)),
-        Finding(name='torques against eq. (14)', unit='N m', limit=size,
-                value=float(np.abs(expected - efforts).max())),
-        Finding(name='Hamiltonian drift', unit='', limit=limits.hamiltonian_drift,
-                value=float(np.ptp(controls.hamiltonian)) / scale)]
-
-
-def _shifted(model: ArmModel, request: RecordedRequest, parameters: Parameters) -> Array:
-    """Return extended states at the times whose torques the efforts are, shape (k, 4 n_t)."""
-    from scipy.interpolate import CubicHermiteSpline  # see `ArmDynamics.prepare`
-
-    motion = request.motion
-    assert motion is not None
-    z, times = motion.extended_states[:-1], motion.times[:-1]
-    spline = CubicHermiteSpline(times, z, model.optimality(z, parameters.stack()))
-    states: Array = spline(np.clip(times - request.effort_delay, 0, times[-1]))
-    return states

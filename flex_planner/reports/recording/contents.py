@@ -10,12 +10,8 @@ from typing import Any
 from flex_planner.arms.arm import Arm, Joint, Link, Motor, Node
 from flex_planner.base.errors import FlexPlannerError, RecordingError
 from flex_planner.base.validation import Array
-from flex_planner.control.default_gains import default_gains
-from flex_planner.control.joint_controller import EffortHold, Gains, JointController
 from flex_planner.control.joint_reference import JointReference
-from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.optimal_control.parameters import Parameters
-from flex_planner.planning.execution import ExecutionCertificate, Robustness
 from flex_planner.recording import (
     definition_folder,
     MessageTypes,
@@ -168,51 +164,6 @@ class RecordedRequest:
     def tolerance(self) -> float:
         """Return eps of eq. (17), that of the task or of the parameters."""
         return float(self.task.tolerance or self.settings['tolerance'])
-
-    @property
-    def controller(self) -> JointController:
-        """Return the joint controller that the plan was published for."""
-        report = self.report
-        if not getattr(report, 'controller_rate', 0.0):  # older recordings know of none
-            return JointController(gains=default_gains(ArmDynamics.of(self.arm)),
-                                   hold=EffortHold.LINEAR)
-        gains = Gains(stiffness=np.asarray(report.controller_stiffness),
-                      damping=np.asarray(report.controller_damping))
-        return JointController(gains=gains, rate=float(report.controller_rate),
-                               hold=EffortHold.named(report.effort_hold))
-
-    @property
-    def effort_delay(self) -> float:
-        """Return by how much efforts come later than the planned torques [s]."""
-        half = float(getattr(self.report, 'controller_period', 0.0)) / 2
-        return -half if self.controller.hold is EffortHold.START else half
-
-    @property
-    def execution(self) -> ExecutionCertificate | None:
-        """Return the recorded certificate of the trajectory; None in older recordings."""
-        if not getattr(self.report, 'controller_rate', 0.0):
-            return None
-        report = self.report
-        return ExecutionCertificate(
-            controller=self.controller, tip_error=float(report.executed_tip_error),
-            residual_vibration=float(report.executed_residual_vibration),
-            open_loop_tip_error=float(report.open_loop_tip_error),
-            open_loop_residual_vibration=float(report.open_loop_residual_vibration),
-            open_loop_amplification=float(report.open_loop_amplification),
-            feedback_growth=float(report.feedback_growth))
-
-    @property
-    def robustness(self) -> Robustness | None:
-        """Return the recorded figures of other arms; None where there are none."""
-        if self.execution is None or not self.solved:
-            return None
-        report = self.report
-        return Robustness(
-            nominal=float(report.executed_residual_vibration),
-            more_modes=float(report.vibration_if_more_modes),
-            stiffness_differs=float(report.vibration_if_stiffness_differs),
-            payload_differs=float(report.vibration_if_payload_differs),
-            more_modes_growth=float(report.feedback_growth_if_more_modes))
 
     @property
     def parameters(self) -> Parameters:
