@@ -49,8 +49,8 @@ def main() -> None:
     counts = Counter(entry.topic.name for entry in read_recording(path, types))
     print('\n'.join(f'  {count:5d} {topic}' for topic, count in counts.items()))
 
-    # as arm, parameters and arrays, and once more through the dynamics: here the torques are
-    # interpolated between the samples, as a controller does it
+    # as arm, parameters and arrays, and once more through the dynamics: the recorded arm carries
+    # out the recorded trajectory under its joint controller
     request = RecordedRequest.read(path)
     check = check_motion(request)
     for finding in check.findings:
