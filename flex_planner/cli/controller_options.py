@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 
 from flex_planner.arms.arm import Arm
-from flex_planner.base.validation import number
+from flex_planner.base.validation import number, vector
 from flex_planner.cli.options import numbers
 from flex_planner.control.default_gains import default_gains
 from flex_planner.control.joint_controller import (
@@ -64,7 +65,9 @@ def sampling_settings(options: argparse.Namespace, arm: Arm) -> SamplingSettings
 def _gains(options: argparse.Namespace, arm: Arm, rate: float) -> Gains:
     """Return the gains that are given, and suitable ones where they are not."""
     gains = default_gains(ArmDynamics.of(arm), rate)
-    values = {name: numbers(f'--controller-{name}', text, arm.n_joints)
-              if (text := getattr(options, f'controller_{name}')) is not None
-              else getattr(gains, name) for name in ('stiffness', 'damping')}
-    return Gains(**values)
+    for name in ('stiffness', 'damping'):
+        if (text := getattr(options, f'controller_{name}')) is not None:
+            option = f'--controller-{name}'
+            given = vector(option, numbers(option, text, arm.n_joints), arm.n_joints, at_least=0)
+            gains = replace(gains, **{name: given})
+    return gains

@@ -18,8 +18,8 @@ def execution_rows(certificate: ExecutionCertificate) -> list[Row]:
     controller = describe_controller(certificate.controller)
     return [
         ('published trajectory', f'carried out with {controller}'),
-        ('  tip error', millimetres(certificate.tip_error)),
-        ('  residual vibration', millimetres(certificate.residual_vibration)),
+        ('  executed tip error', millimetres(certificate.tip_error)),
+        ('  executed residual vibration', millimetres(certificate.residual_vibration)),
         ('  without feedback', f'tip error {millimetres(certificate.open_loop_tip_error)}, '
          f'residual vibration {millimetres(certificate.open_loop_residual_vibration)}; a small '
          f'error at the start grows to {certificate.open_loop_amplification:.2g} times its size')]

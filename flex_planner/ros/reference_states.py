@@ -84,7 +84,7 @@ class ReferenceStates:
     """
 
     def __init__(self, plan: StreamedPlan) -> None:
-        self.plan, times = plan, plan.times_ns * 1e-9
+        self.plan, times = plan, np.multiply(plan.times_ns, 1e-9, dtype=np.float64)
         self._reference = JointReference(
             times=times, positions=plan.coordinates, velocities=plan.rates,
             accelerations=plan.accelerations, torques=plan.torques)

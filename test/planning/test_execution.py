@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from factories import PlanFactory
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.validation import Array
@@ -20,7 +21,6 @@ from flex_planner.planning.sampling import (
     SampledPlan,
     SamplingSettings,
 )
-from factories import PlanFactory
 import numpy as np
 import pytest
 

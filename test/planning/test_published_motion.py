@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from factories import PlanFactory
 from flex_planner.control.joint_controller import EffortHold, Gains, JointController
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.published_motion import PublishedMotion
-from factories import PlanFactory
 import numpy as np
 import pytest
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from factories import PlanFactory
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import load_arm
 from flex_planner.control.controlled_motion import locked_bending
@@ -23,7 +24,6 @@ from flex_planner.planning.sampling import sample_plan, SampledPlan, SamplingSet
 from flex_planner.planning.warnings import WarningKind
 from flex_planner.simulation.joint_control import Encoder
 from flex_planner.simulation.plant import Control, Plant
-from factories import PlanFactory
 import numpy as np
 import pytest
 

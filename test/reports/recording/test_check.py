@@ -127,5 +127,6 @@ def test_falsified_recording_fails_on_the_command_line(plan: Path, tmp_path: Pat
             recording.write(entry.topic, entry.message, entry.log_time_ns)
     page = tmp_path / 'forged.html'
     assert main(['report', str(recording.path), '--check', '--output', str(page)]) == 1
-    assert 'the check of the recording FAILED (difference from the certificate' in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert 'the check of the recording FAILED (difference from the certificate' in told
     assert 'class="verdict failed"' in page.read_text()
