@@ -45,10 +45,10 @@ def recorded_execution(request: RecordedRequest) -> ExecutionCertificate | None:
 
 
 def recorded_robustness(request: RecordedRequest) -> Robustness | None:
-    """Return the figures of other arms; None where there are none."""
-    if not _is_told(request) or not request.solved:
-        return None
+    """Return the figures of other arms; None where nobody has found them."""
     report = request.report
+    if not _is_told(request) or not np.isfinite(report.feedback_growth_if_more_modes):
+        return None
     return Robustness(
         nominal=float(report.executed_residual_vibration),
         more_modes=float(report.vibration_if_more_modes),

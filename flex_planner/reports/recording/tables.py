@@ -144,10 +144,12 @@ def _certificate(request: RecordedRequest) -> ReportTable:
 def _execution(request: RecordedRequest) -> list[ReportTable]:
     """Return what the controller makes of the trajectory, also on arms that differ."""
     certificate, robustness = recorded_execution(request), recorded_robustness(request)
-    if certificate is None or robustness is None:
+    if certificate is None:
         return []
     found = [ReportTable(title='Published trajectory, carried out', rows=tuple(
         execution_rows(certificate)))]
+    if robustness is None:
+        return found
     if request.arm.n_modes:
         found.append(ReportTable(title='Residual vibration with feedback if ...', rows=tuple(
             vibrations(robustness))))

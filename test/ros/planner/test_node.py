@@ -453,7 +453,7 @@ def test_parameter_that_is_set_counts(rigid: Planner) -> None:
     ('controller_stiffness', [1.0], 'controller_stiffness has 1 number'),
     ('controller_damping', [1.0, -1.0], 'controller_damping[1] is -1.0'),
     ('controller_period', -0.5, 'controller_period is -0.5, but must be -1, or from 0 to 0.1 s'),
-    ('effort_hold', 'front', 'effort_hold is front, but must be one of end, start, middle'),
+    ('effort_hold', 'front', "effort_hold is 'front', but must be one of end, start, middle"),
     ('joint_names', ['a', 'b'], 'read-only'),
     ('arm', 'korayem_ei5', 'read-only'),
     ('recording_folder', '/', 'read-only'),
