@@ -71,7 +71,7 @@ class Robustness:
         With two more modes for every link that has any, at most 8; 0 for rigid links [m].
     stiffness_differs, payload_differs : float
         With 10 % less and 10 % more of E I, or of mass and inertia of the payload: the larger of
-        the two [m].
+        the two; the nominal one where there are neither modes nor a payload [m].
     more_modes_growth : float
         How fast deviations grow under the PD with more modes, as
         `ExecutionCertificate.feedback_growth` [1/s].
