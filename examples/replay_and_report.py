@@ -12,12 +12,14 @@ recording needs ROS 2, reading it does not.
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 import sys
 
 from flex_planner import load_arm, plan_path, Task
 from flex_planner.cli.recorder import RequestRecorder
 from flex_planner.cli.request import Request
+from flex_planner.planning.robustness import assess_robustness
 from flex_planner.planning.sampling import sample_plan
 from flex_planner.recording import definition_folder, MessageTypes, read_recording
 from flex_planner.reports.recording import check_motion, RecordedRequest, verdict, write_report
@@ -34,8 +36,9 @@ def record_plan() -> Path:
     plan = plan_path(task)
     if not plan.solved:
         sys.exit(plan.message)
-    recorder = RequestRecorder(request, FOLDER / 'recordings')
-    return recorder.record_plan(plan, sample_plan(plan, request.sampling))
+    sampled = sample_plan(plan, request.sampling)
+    sampled = replace(sampled, robustness=assess_robustness(plan, sampled))
+    return RequestRecorder(request, FOLDER / 'recordings').record_plan(plan, sampled)
 
 
 def main() -> None:
@@ -48,8 +51,8 @@ def main() -> None:
     counts = Counter(entry.topic.name for entry in read_recording(path, types))
     print('\n'.join(f'  {count:5d} {topic}' for topic, count in counts.items()))
 
-    # as arm, parameters and arrays, and once more through the dynamics: here the torques are
-    # interpolated between the samples, as a controller does it
+    # as arm, parameters and arrays, and once more through the dynamics: the recorded arm carries
+    # out the recorded trajectory under its joint controller
     request = RecordedRequest.read(path)
     check = check_motion(request)
     for finding in check.findings:

@@ -2,7 +2,8 @@
 Launch the planner so that a joint_trajectory_controller carries out what it publishes.
 
 The controller needs an effort command interface, and the joint names of the planner's parameters;
-its own launch file starts it.
+its own launch file starts it. Its rate and gains belong into those parameters, too
+(controller_rate, controller_stiffness, controller_damping): trajectories are certified for them.
 
 """
 

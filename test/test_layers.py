@@ -18,15 +18,16 @@ FLOORS = {
     'arms': 1, 'collocation': 1, 'recording': 1,
     'dynamics': 2,
     'optimal_control': 3,
-    'planning': 4,
-    'capacity': 5, 'simulation': 5,
-    'plotting': 6, 'reports': 6,
-    'maps': 7, 'paper': 7,
-    'ros': 8,
-    'cli': 9,
+    'control': 4,
+    'planning': 5,
+    'capacity': 6, 'simulation': 6,
+    'plotting': 7, 'reports': 7,
+    'maps': 8, 'paper': 8,
+    'ros': 9,
+    'cli': 10,
 }
-CORE = ('base', 'arms', 'collocation', 'dynamics', 'optimal_control', 'planning', 'capacity',
-        'simulation')
+CORE = ('base', 'arms', 'collocation', 'dynamics', 'optimal_control', 'control', 'planning',
+        'capacity', 'simulation')
 # what the core must do without
 BLOCKED = ['rclpy', 'flex_planner_interfaces', 'matplotlib', 'mcap', 'mcap_ros2', 'rosbags',
            'geometry_msgs', 'sensor_msgs', 'trajectory_msgs', 'builtin_interfaces']

@@ -59,12 +59,17 @@ class RequestRecorder:
     def __init__(self, request: Request, folder: Path) -> None:
         task = request.task
         self._message = task_message(request)
+        sampling = request.sampling
+        settings = PlannerSettings.for_arm(task.arm)
+        if sampling.controller is not None:
+            settings = settings.with_controller(sampling.controller)
+        if sampling.controller_period is not None:
+            settings = replace(settings, controller_period=sampling.controller_period)
         self._settings = replace(
-            PlannerSettings.for_arm(task.arm), elbow=request.elbow, tolerance=task.tolerance,
+            settings, elbow=request.elbow, tolerance=task.tolerance,
             allowed_planning_time=request.time_limit, recording_folder=str(folder),
             effort_weights=task.effort_weights.tolist(),
-            sampling_step=request.sampling.longest_step,
-            torque_tolerance=request.sampling.torque_tolerance)
+            sampling_step=sampling.longest_step, torque_tolerance=sampling.torque_tolerance)
         self._recorder = OutcomeRecorder(task.arm, _NODE)
 
     def record_plan(self, plan: Plan, reference: SampledPlan | None) -> Path:

@@ -17,11 +17,13 @@ from flex_planner.base.errors import (
     UnreachableError,
 )
 from flex_planner.base.validation import Array, number
+from flex_planner.cli.controller_options import sampling_settings
 from flex_planner.cli.options import add_arm, angles, numbers
 from flex_planner.optimal_control.ends_at_points import ends_at_points
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.objectives import Objectives
-from flex_planner.planning.sampling import MAX_SAMPLES, SamplingSettings
+from flex_planner.planning.point_times import MAX_SAMPLES
+from flex_planner.planning.sampling import SamplingSettings
 import numpy as np
 
 MAX_TIME_LIMIT = 3600.0
@@ -46,6 +48,8 @@ class Request:
         [s].
     objectives : Objectives or None
         What the motion must keep besides.
+    sampled : SamplingSettings
+        For which joint controller the trajectory is.
 
     """
 
@@ -53,6 +57,7 @@ class Request:
     elbow: int
     time_limit: float
     objectives: Objectives | None = None
+    sampled: SamplingSettings = SamplingSettings()
 
     @classmethod
     def of(cls, options: argparse.Namespace) -> Request:
@@ -76,14 +81,13 @@ class Request:
                 **_weights(options, arm))
             objectives = _objectives(options, task)
         return cls(task=task, elbow=options.elbow, time_limit=limit,
-                   objectives=objectives)
+                   objectives=objectives, sampled=sampling_settings(options, arm))
 
     @property
     def sampling(self) -> SamplingSettings:
         """Return the settings of the sampling: close, within the largest number of samples."""
-        closest = SamplingSettings()
-        return replace(closest, longest_step=max(closest.longest_step,
-                                                 self.task.duration / (MAX_SAMPLES - 1)))
+        shortest = self.task.duration / (MAX_SAMPLES - 1)
+        return replace(self.sampled, longest_step=max(self.sampled.longest_step, shortest))
 
     def __str__(self) -> str:
         """Return the motion in words."""

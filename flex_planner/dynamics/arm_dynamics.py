@@ -123,6 +123,38 @@ class ArmDynamics:
 
         return advance
 
+    def controlled_steps(self, state: Array, reference: Array, timing: Array, controller: Array,
+                         physical: Array) -> tuple[Array, Array, Array]:
+        """
+        Return the states after each of k steps under a joint controller, and their errors.
+
+        Parameters
+        ----------
+        state : numpy.ndarray, shape (2 n_t,)
+            Before the first step, in which the controller must be sampled.
+        reference : numpy.ndarray, shape (k, 4 n)
+            Angles [rad] and speeds [rad/s] that the PD compares the joints with, and efforts at
+            the beginning and the end of each step [N m].
+        timing : numpy.ndarray, shape (k, 2)
+            Length of each step [s], and 1 where the PD is sampled at its beginning, 0 where it is
+            held.
+        controller : numpy.ndarray, shape (4 n,)
+            Stiffness, damping, stall torque and torque lost per speed of the joints.
+        physical : numpy.ndarray
+            `PhysicalParameters.physical`.
+
+        Returns
+        -------
+        states, fifth, third : numpy.ndarray, shape (k, 2 n_t)
+            As `runge_kutta_steps` has them.
+
+        """
+        first = np.zeros((len(reference), state.size + self.arm.n_joints))
+        first[0, :state.size] = state
+        after, fifth, third = self._load('controlled_step').evaluate_chain(
+            first, reference, timing, controller, physical)
+        return after[:, :state.size], fifth, third
+
     def held_step(self, physical: Array) -> HeldStep:
         """
         Return one such step under torques that are held, as a quick function.

@@ -33,6 +33,8 @@ def build_dynamics_functions(arm: Arm) -> dict[str, BatchedFunction]:
         - ``forward_dynamics`` (x, u) -> x', eq. (5)
         - ``runge_kutta_step`` (x, torques at the stages, step) -> next x and the two error
           estimates of the Dormand-Prince method of order 8
+        - ``controlled_step`` ((x, feedback), reference, (step, sampled), controller) -> the same
+          of a step under a joint controller, see `_controlled_step`
         - ``inverse_dynamics`` (x, a) -> generalized forces, eq. (3)
         - ``mass_and_energy`` x -> M, kinetic energy, potential energy
         - ``static_forces`` q -> dV/dq, d2V/dq2 with V the potential energy
@@ -49,6 +51,7 @@ def build_dynamics_functions(arm: Arm) -> dict[str, BatchedFunction]:
     return {
         'forward_dynamics': rate,
         'runge_kutta_step': _runge_kutta_step(rate[0]),
+        'controlled_step': _controlled_step(rate[0], arm.n_joints),
         'inverse_dynamics': batch('inverse_dynamics', [x, a], p, [chain.inverse_dynamics(a)]),
         'mass_and_energy': batch('mass_and_energy', [x], p,
                                  [M, chain.kinetic, chain.potential]),
@@ -80,14 +83,52 @@ def _runge_kutta_step(rate: Any) -> BatchedFunction:
 
     x, u = ca.MX.sym('x', rate.size1_in(0)), ca.MX.sym('u', rate.size1_in(1), DOP853.n_stages)
     step, p = ca.MX.sym('h'), ca.MX.sym('p', rate.size1_in(2))
+    stages = ca.horzsplit(u)
+    results = _advance(rate, x, [*stages, stages[-1]], step, p)
+    return ca.Function('runge_kutta_step', [x, ca.vec(u), step, p], results), 3
+
+
+def _controlled_step(rate: Any, n: int) -> BatchedFunction:
+    """
+    Return a step of DOP853 under feedforward efforts and a PD that is sampled and held.
+
+    Inputs: x with the n torques of the PD; angles, speeds, and efforts at both ends of the step;
+    its length, and 1 where the PD is sampled at its beginning, else 0; gains, stall torques, and
+    what a motor loses of them by its speed. Outputs: x with the PD's torques, two error
+    estimates.
+
+    """
+    from scipy.integrate import DOP853
+
+    size = rate.size1_in(0)
+    state, p = ca.MX.sym('s', size + n), ca.MX.sym('p', rate.size1_in(2))
+    reference, timing, controller = (ca.MX.sym(name, count) for name, count in (
+        ('r', 4 * n), ('t', 2), ('c', 4 * n)))
+    x, held = state[:size], state[size:]
+    angles, speeds, first, last = ca.vertsplit(reference, n)
+    stiffness, damping, stall, loss = ca.vertsplit(controller, n)
+    speed = x[size // 2:size // 2 + n]
+    sampled = stiffness * (angles - x[:n]) + damping * (speeds - speed)
+    held += timing[1] * (sampled - held)
+    begin, end = (ca.fmin(ca.fmax(effort + held, -stall - loss * speed), stall - loss * speed)
+                  for effort in (first, last))
+    stages = [begin + float(share) * (end - begin) for share in DOP853.C[:DOP853.n_stages]]
+    after, fifth, third = _advance(rate, x, [*stages, end], timing[0], p)
+    return ca.Function('controlled_step', [state, reference, timing, controller, p], [
+        ca.vertcat(after, held), fifth, third]), 3
+
+
+def _advance(rate: Any, x: Any, torques: Sequence[Any], step: Any, p: Any) -> list[Any]:
+    """Return x after a step with torques at its stages and its end, and two error estimates."""
+    from scipy.integrate import DOP853
+
     slopes: list[Any] = []
     for i in range(DOP853.n_stages):
-        slopes.append(rate(x + step * _combine(DOP853.A[i, :i], slopes), u[:, i], p))
+        slopes.append(rate(x + step * _combine(DOP853.A[i, :i], slopes), torques[i], p))
     following = x + step * _combine(DOP853.B, slopes)
     # the last stage of the error estimate is at the end of the step, as stage 12 is
-    slopes.append(rate(following, u[:, DOP853.n_stages - 1], p))
-    errors = [step * _combine(row, slopes) for row in (DOP853.E5, DOP853.E3)]
-    return ca.Function('runge_kutta_step', [x, ca.vec(u), step, p], [following, *errors]), 3
+    slopes.append(rate(following, torques[-1], p))
+    return [following, *(step * _combine(row, slopes) for row in (DOP853.E5, DOP853.E3))]
 
 
 def _combine(weights: Any, vectors: list[Any]) -> Any:

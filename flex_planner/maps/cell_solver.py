@@ -13,6 +13,7 @@ from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.capacity.min_duration import find_min_duration
 from flex_planner.capacity.results import LimitResult, MaxPayload, MinDuration
 from flex_planner.collocation import Solver, SolverSettings
+from flex_planner.control.joint_controller import Gains
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.maps.cell_results import CellCode, CellResult
 from flex_planner.maps.kept_motions import KeptMotion
@@ -26,7 +27,6 @@ from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.strategies.first_extremals import solve_first
 from flex_planner.simulation.comparison import sample_finely
 from flex_planner.simulation.execution import execute_plan, ExecutionMode, Setting
-from flex_planner.simulation.joint_control import Gains
 import numpy as np
 
 _RATE = 1000.0  # [Hz]
@@ -132,7 +132,7 @@ class CellSolver:
         setting = Setting(model=ArmDynamics(arm), gains=gains, rate=_RATE, payload_mass=carried,
                           goal=goal, settling=study.simulated.settling, monitor=monitor)
         mode = ExecutionMode.FLEXIBLE if study.simulated.gains else ExecutionMode.FLEXIBLE_OPEN
-        executed = execute_plan(mode, plan, sample_finely(plan, monitor), setting)
+        executed = execute_plan(mode, plan, sample_finely(plan, _RATE, monitor), setting)
         return Vibration(plan=plan, peak_to_peak=executed.residual.tip)
 
     def result(self, index: tuple[int, ...], found: CellSolution) -> CellResult:

@@ -7,8 +7,8 @@ import math
 
 from flex_planner.arms.arm import Arm
 from flex_planner.base.validation import number, vector
+from flex_planner.control.joint_controller import Gains
 from flex_planner.optimal_control.task import MAX_PAYLOAD
-from flex_planner.simulation.joint_control import Gains
 from flex_planner.simulation.mismatch import Mismatch
 
 

@@ -12,12 +12,12 @@ from flex_planner.arms.arm_files import arm_from_mapping, ArmFileError, load_arm
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.validation import Array, integer, number, vector
 from flex_planner.base.yaml_files import YamlSection
+from flex_planner.control.joint_controller import Gains
 from flex_planner.maps.axes import Axis, read_axes
 from flex_planner.maps.end_points import End
 from flex_planner.maps.quantities import Quantity
 from flex_planner.maps.simulated_arm import SimulatedArm
 from flex_planner.maps.study_motion import StudyMotion
-from flex_planner.simulation.joint_control import Gains
 from flex_planner.simulation.mismatch import AS_GIVEN, Mismatch
 import numpy as np
 

@@ -1,34 +1,42 @@
 """
-A plan as samples that a joint controller follows.
+A plan as samples that a joint controller follows, and what the controller makes of them.
 
-A controller interpolates the torque linearly between samples and holds the last sample for
+A controller interpolates the effort linearly between samples and holds the last sample for
 ever, so the samples are as close as the torque demands, one lies where a motor reaches or leaves
-its limit, and the last torque is the one that holds the arm still.
+its limit, and the last effort is the one that holds the arm still. They are closer still where
+the arm would otherwise arrive elsewhere than under the planned torque itself.
 
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 from flex_planner.base.errors import InvalidTaskError
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array, number
-from flex_planner.planning.plan import Plan, Samples
+from flex_planner.control.default_gains import default_gains
+from flex_planner.control.joint_controller import JointController
+from flex_planner.control.joint_reference import JointReference
+from flex_planner.planning.certificate import CertificateLimits
+from flex_planner.planning.execution import (
+    certify_execution,
+    Execution,
+    ExecutionCertificate,
+    ExecutionLimits,
+    Robustness,
+)
+from flex_planner.planning.plan import Plan, PlanStatus, Samples
+from flex_planner.planning.point_times import MAX_SAMPLES, point_times, SMALLEST_STEP
+from flex_planner.planning.published_motion import PublishedMotion
 import numpy as np
 from numpy.typing import NDArray
 
-# between the last moving sample and the holding one: any longer, and the ramp between their
-# torques would leave an impulse behind
-HOLD_DELAY_NS = 1000
-
-_SMALLEST_STEP = 2.5e-4
-# a controller's message and a recording should stay below some megabytes
-MAX_SAMPLES = 20_000
-_PROBES = 8
-# of the steps: if more than these are too long, all are; else an excursion between two switches
-_FEW = 0.1
+MAX_PERIOD = 0.1
+# smaller tolerances of the efforts, each by the factor, where the arm arrives elsewhere
+_REFINEMENTS, _FACTOR = 6, 0.25
+# along the motion, at which the stability of the PD is looked at
+_POSTURES = 5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -42,21 +50,42 @@ class SampledPlan:
         From 0, strictly increasing [ns].
     samples : Samples
         At these times; at rest, with the holding torque, in the last.
+    efforts : numpy.ndarray, shape (k, n)
+        For the controller: the torques of half a `controller_period` before or after [N m].
     torque_error : float
-        Largest difference between the planned torque and its linear interpolation, found at
-        eight times as many points [N m].
+        Largest difference between the efforts and their linear interpolation, found at eight
+        times as many points [N m].
+    controller_period : float
+        For which efforts are shifted by a half; 0 if they are not [s].
+    execution : ExecutionCertificate
+        What the controller makes of times, joints and efforts.
+    robustness : Robustness or None
+        What it makes of them on other arms; None unless `assess_robustness` has found out.
 
     """
 
     times_ns: NDArray[np.int64]
     samples: Samples
+    efforts: Array
     torque_error: float
+    controller_period: float
+    execution: ExecutionCertificate
+    robustness: Robustness | None = None
+
+    @property
+    def reference(self) -> JointReference:
+        """Return the trajectory that a controller gets."""
+        samples, n = self.samples, self.efforts.shape[1]
+        return JointReference(
+            times=np.multiply(self.times_ns, 1e-9, dtype=np.float64),
+            positions=samples.coordinates[:, :n], velocities=samples.rates[:, :n],
+            accelerations=samples.accelerations[:, :n], torques=self.efforts)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SamplingSettings:
     """
-    How densely a plan is sampled.
+    How densely a plan is sampled, and for which controller.
 
     Parameters
     ----------
@@ -65,7 +94,16 @@ class SamplingSettings:
     torque_tolerance : float
         Steps are halved until linear interpolation is this exact, they would fall below 0.25 ms,
         or the samples would be more than 20000: all steps while more than a tenth of them are
-        too long, then those alone; > 0 [N m].
+        too long, then those alone; > 0 [N m]. It is lowered where the arm would arrive more than
+        0.01 mm away from where the planned torque leads it, under the same controller, or with
+        0.1 mm more vibration.
+    controller : JointController or None
+        That carries the trajectory out; None for 1 kHz and `default_gains`.
+    controller_period : float or None
+        Efforts are those of half this time before (`EffortHold.END`) or after (`START`) the
+        sample, so that their mean is right while a controller of this period holds them, 0 to
+        0.1; 0 for the torques at the time of the sample, None for the period of the controller
+        [s].
 
     Raises
     ------
@@ -76,16 +114,39 @@ class SamplingSettings:
 
     longest_step: float = 0.01
     torque_tolerance: float = 0.02
+    controller: JointController | None = None
+    controller_period: float | None = None
 
     def __post_init__(self) -> None:
-        number('longest_step', self.longest_step, at_least=_SMALLEST_STEP, at_most=1, unit='s')
+        number('longest_step', self.longest_step, at_least=SMALLEST_STEP, at_most=1, unit='s')
         number('torque_tolerance', self.torque_tolerance, above=0, unit='N m')
+        if self.controller_period is not None:
+            number('controller_period', self.controller_period, at_least=0, at_most=MAX_PERIOD,
+                   unit='s')
+
+    def controller_of(self, plan: Plan) -> JointController:
+        """Return the controller that a plan is for."""
+        return self.controller or JointController(gains=default_gains(plan.model))
 
 
 def sample_plan(plan: Plan, settings: SamplingSettings,
                 monitor: Monitor | None = None) -> SampledPlan:
     """
     Return samples of a solved plan, and one more that holds the arm.
+
+    Parameters
+    ----------
+    plan : Plan
+        With a solution.
+    settings : SamplingSettings
+        Of the samples and the controller.
+    monitor : Monitor, optional
+        May stop it.
+
+    Returns
+    -------
+    SampledPlan
+        Check its `execution` against `ExecutionLimits` before an arm gets it.
 
     Raises
     ------
@@ -108,61 +169,69 @@ def sample_plan(plan: Plan, settings: SamplingSettings,
             f'a motion of {duration:g} s sampled every {settings.longest_step:g} s has {count} '
             f'samples, but may have {MAX_SAMPLES}; the parameter sampling_step must be >= '
             f'{duration / MAX_SAMPLES:g} s')
-    times, error = _fitting(plan, settings, watch)
-    times_ns = np.round(times * 1e9).astype(np.int64)
-    moving = _at_rest_at_the_ends(plan, plan.sample(np.minimum(times_ns * 1e-9, duration)))
-    return SampledPlan(times_ns=np.append(times_ns, times_ns[-1] + HOLD_DELAY_NS),
-                       samples=_with_hold(plan, moving), torque_error=error)
+    execution = Execution.of(plan, settings.controller_of(plan))
+    sampled = _close_enough(plan, settings, execution, watch)
+    postures = plan.uniform_samples(_POSTURES).coordinates[:, :plan.arm.n_joints]
+    certificate = certify_execution(execution, sampled.reference, postures, watch)
+    return replace(sampled, execution=certificate)
 
 
-def _fitting(plan: Plan, settings: SamplingSettings, watch: Monitor) -> tuple[Array, float]:
-    """Return times between which the torques are nearly straight, and the error that is left."""
-    times = _first_times(plan, settings.longest_step)
-    errors = _interpolation_errors(plan, times[:-1], times[1:])
-    while True:
-        watch.check()
-        halved = _too_long(np.diff(times), errors, settings.torque_tolerance)
-        if not halved.any():
-            return times, float(errors.max())
-        middles = (times[:-1] + times[1:])[halved] / 2
-        times = np.insert(times, np.flatnonzero(halved) + 1, middles)
-        new, errors = np.repeat(halved, 1 + halved), np.repeat(errors, 1 + halved)
-        errors[new] = _interpolation_errors(plan, times[:-1][new], times[1:][new])
+def judge_execution(plan: Plan, sampled: SampledPlan,
+                    limits: ExecutionLimits | None = None) -> Plan:
+    """
+    Return the plan, whose certificate fails if its samples miss the limits of an execution.
+
+    Parameters
+    ----------
+    plan : Plan
+        Solved, or else left as it is.
+    sampled : SampledPlan
+        Its samples.
+    limits : ExecutionLimits, optional
+        What must be kept.
+
+    """
+    broken = (limits or ExecutionLimits()).violations(sampled.execution, plan.arm.reach)
+    if not plan.solved or not broken:
+        return plan
+    return replace(plan, status=PlanStatus.CERTIFICATE_FAILED,
+                   message=f'the trajectory cannot be carried out: {"; ".join(broken)}')
 
 
-def _too_long(steps: Array, errors: Array, tolerance: float) -> NDArray[np.bool_]:
-    """Return the steps to halve."""
-    long: NDArray[np.bool_] = steps >= 2 * _SMALLEST_STEP
-    halved = long & (errors > tolerance)
-    if halved.mean() > _FEW:
-        halved |= long & (steps > steps.max() / 2)
-    room = MAX_SAMPLES - steps.size
-    if np.count_nonzero(halved) > room:
-        worst = np.argsort(-np.where(halved, errors, 0.0))[:room]
-        halved &= np.isin(np.arange(steps.size), worst)
-    return halved
+def _close_enough(plan: Plan, settings: SamplingSettings, execution: Execution,
+                  watch: Monitor) -> SampledPlan:
+    """Return samples with which the arm arrives as with infinitely many of them."""
+    limits = CertificateLimits()
+    period = settings.controller_period
+    motion = PublishedMotion.of(plan, execution.controller,
+                                execution.controller.period if period is None else period)
+    exact = execution.arrive(motion, watch)
+    vibration = execution.vibration(exact)
+    for refinement in range(_REFINEMENTS + 1):
+        tolerance = settings.torque_tolerance * _FACTOR**refinement
+        sampled = _sampled(motion, execution.controller,
+                           *point_times(motion, settings.longest_step, tolerance, watch))
+        arrived = replace(execution, goal=execution.tip(exact))
+        state = arrived.arrive(sampled.reference, watch)
+        more = abs(arrived.vibration(state) - vibration)
+        if not np.isfinite(vibration) or (arrived.tip_error(state) <= limits.tip_error
+                                          and more <= limits.residual_vibration):
+            break
+    return sampled
 
 
-def _first_times(plan: Plan, longest: float) -> Array:
-    """Return times that are evenly spaced between the switches of the motors."""
-    duration, breaks = plan.task.duration, [0.0]
-    if np.ceil(duration / longest) + plan.switching_times.size <= MAX_SAMPLES:
-        for time in plan.switching_times.tolist():
-            if breaks[-1] + _SMALLEST_STEP <= time <= duration - _SMALLEST_STEP:
-                breaks.append(time)
-    pieces = [np.linspace(first, last, int(np.ceil((last - first) / longest)), endpoint=False)
-              for first, last in pairwise([*breaks, duration])]
-    return np.concatenate([*pieces, [duration]])
-
-
-def _interpolation_errors(plan: Plan, first: Array, last: Array) -> Array:
-    """Return the changes that linear interpolation makes in the torques [N m]."""
-    share = np.linspace(0, 1, _PROBES + 1)
-    times = first[:, None] + (last - first)[:, None] * share
-    torques = plan.sample(times.ravel()).torques.reshape(*times.shape, -1)
-    lines = np.stack([1 - share, share], axis=1) @ torques[:, [0, -1]]
-    errors: Array = np.abs(lines - torques).max(axis=(1, 2))
-    return errors
+def _sampled(motion: PublishedMotion, controller: JointController, times: Array,
+             error: float) -> SampledPlan:
+    """Return the samples at given times, from 0 to the end of the motion."""
+    plan, times_ns = motion.plan, np.round(times * 1e9).astype(np.int64)
+    inside = np.minimum(times_ns * 1e-9, motion.duration)
+    hold_ns = round(motion.hold_delay * 1e9)
+    samples = _with_hold(plan, _at_rest_at_the_ends(plan, plan.sample(inside)), hold_ns)
+    efforts = np.vstack([motion.torque(inside), plan.problem.holding_torque])
+    return SampledPlan(times_ns=np.append(times_ns, times_ns[-1] + hold_ns), samples=samples,
+                       efforts=efforts, torque_error=error,
+                       controller_period=2 * abs(motion.delay),
+                       execution=ExecutionCertificate(controller=controller))
 
 
 def _at_rest_at_the_ends(plan: Plan, samples: Samples) -> Samples:
@@ -174,13 +243,13 @@ def _at_rest_at_the_ends(plan: Plan, samples: Samples) -> Samples:
     return replace(samples, coordinates=coordinates, rates=rates)
 
 
-def _with_hold(plan: Plan, samples: Samples) -> Samples:
+def _with_hold(plan: Plan, samples: Samples, delay_ns: int) -> Samples:
     """Append a sample at rest with the holding torque."""
     def again(values: Array) -> Array:
         return np.concatenate([values, values[-1:]])
 
     fields = {name: again(getattr(samples, name)) for name in Samples.__slots__}
-    fields['times'][-1] += HOLD_DELAY_NS * 1e-9
+    fields['times'][-1] += delay_ns * 1e-9
     fields['accelerations'][-1] = 0
     fields['torques'][-1] = plan.problem.holding_torque
     return Samples(**fields)

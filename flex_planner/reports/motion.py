@@ -58,16 +58,14 @@ def certificate_rows(certificate: Certificate) -> list[Row]:
         ('  residual vibration', f'{certificate.residual_vibration * 1e3:.1e} mm')]
 
 
-def plan_rows(plan: Plan, peaks: Peaks | None) -> list[Row]:
-    """Return the result of a task; `peaks` only with a solution."""
+def plan_rows(plan: Plan) -> list[Row]:
+    """Return how planning a task ended; see `motion_rows` for the motion."""
     intervals = f'{plan.mesh_intervals} intervals' if plan.mesh_intervals else ''
     rows = [('status', plan.status.value),
             planning_row(plan.planning_time, plan.strategy, f'{plan.iterations} iterations',
                          intervals)]
     rows += kind_rows(plan.kinds, plan.starts, 'J = ', '')
-    rows += objective_rows(plan)
-    rows += warning_rows(plan.warnings)
-    return rows if peaks is None else [*rows, *motion_rows(plan, peaks)]
+    return [*rows, *objective_rows(plan), *warning_rows(plan.warnings)]
 
 
 def motion_rows(plan: Plan, peaks: Peaks) -> list[Row]:
@@ -128,8 +126,8 @@ def weights_table(plan: Plan) -> str:
          'yes' if trial.met else 'no'] for i, trial in enumerate(plan.objectives.trials, 1)])
 
 
-def payload_rows(found: MaxPayload, peaks: Peaks | None) -> list[Row]:
-    """Return the result of a search for the maximum payload; `peaks` only with a motion."""
+def payload_rows(found: MaxPayload) -> list[Row]:
+    """Return the result of a search for the maximum payload; see `motion_rows` for the motion."""
     rows = [('status', found.status.value), ('method', found.method.value),
             planning_row(found.planning_time, f'{found.iterations} iterations'),
             ('largest payload', _bracket(found))]
@@ -140,10 +138,9 @@ def payload_rows(found: MaxPayload, peaks: Peaks | None) -> list[Row]:
                                f'({found.proof})'))
     rows += kind_rows(found.kinds, found.starts, '', ' kg')
     rows += warning_rows(found.warnings)
-    if found.plan is None or peaks is None:
-        return rows
-    return [*rows, ('strategy of the motion', found.plan.strategy),
-            *motion_rows(found.plan, peaks)]
+    if found.plan is not None and found.plan.solution is not None:
+        rows.append(('strategy of the motion', found.plan.strategy))
+    return rows
 
 
 def _bracket(found: MaxPayload) -> str:

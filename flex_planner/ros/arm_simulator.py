@@ -8,13 +8,13 @@ import time
 from builtin_interfaces.msg import Time
 from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.validation import Array
+from flex_planner.control.joint_reference import JointReference
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.ros.messages.plans import duration_seconds
 from flex_planner.ros.messages.trajectory_rules import trajectory_violations
 from flex_planner.ros.runtime.parameters import declare, declare_arm
 from flex_planner.ros.runtime.running import run_node
 from flex_planner.ros.settings.simulator import SimulatorSettings
-from flex_planner.simulation.joint_control import JointReference
 from flex_planner.simulation.plant import Plant
 from flex_planner.simulation.settling import ArrivalWatch, ResidualVibration
 from geometry_msgs.msg import PointStamped
@@ -165,7 +165,8 @@ def _reference(trajectory: JointTrajectory, names: list[str]) -> JointReference:
 
     times = [duration_seconds(point.time_from_start) for point in points]
     return JointReference(times=np.array(times), positions=column('positions'),
-                          velocities=column('velocities'), torques=column('effort'))
+                          velocities=column('velocities'), accelerations=column('accelerations'),
+                          torques=column('effort'))
 
 
 def _state_message(stamp: Time, names: Sequence[str], positions: Array, velocities: Array,

@@ -23,11 +23,11 @@ import threading
 import time
 
 from flex_planner.base.validation import Array
+from flex_planner.control.joint_reference import JointReference
 import numpy as np
 from numpy.typing import NDArray
 import rclpy
 from rclpy.signals import SignalHandlerOptions
-from scipy.interpolate import CubicHermiteSpline
 from sensor_msgs.msg import JointState
 
 _BLOCK = 100  # states are interpolated that many at a time
@@ -73,8 +73,8 @@ class ReferenceStates:
     """
     A plan at a constant rate, and at its end.
 
-    Between the samples, coordinates and rates follow cubic polynomials and torques are linear, as
-    they are for a joint_trajectory_controller.
+    Between the samples, coordinates follow quintic polynomials and torques are linear, as they do
+    for a joint_trajectory_controller.
 
     Parameters
     ----------
@@ -84,9 +84,10 @@ class ReferenceStates:
     """
 
     def __init__(self, plan: StreamedPlan) -> None:
-        self.plan, times = plan, plan.times_ns * 1e-9
-        self._positions = CubicHermiteSpline(times, plan.coordinates, plan.rates)
-        self._velocities = CubicHermiteSpline(times, plan.rates, plan.accelerations)
+        self.plan, times = plan, np.multiply(plan.times_ns, 1e-9, dtype=np.float64)
+        self._reference = JointReference(
+            times=times, positions=plan.coordinates, velocities=plan.rates,
+            accelerations=plan.accelerations, torques=plan.torques)
         # the last period may be up to half a period longer or shorter than the others
         count = max(int(np.floor(times[-1] * plan.rate + 0.5)), 1)
         grid = np.round(np.arange(count) / plan.rate * 1e9).astype(np.int64)
@@ -101,11 +102,9 @@ class ReferenceStates:
 
     def _values(self, times: Array) -> tuple[Array, Array, Array]:
         """Return coordinates, rates, and torques with zeros for the modes."""
-        plan = self.plan
-        modes = np.zeros((len(times), len(plan.names) - plan.torques.shape[1]))
-        torques = [np.interp(times, plan.times_ns * 1e-9, column) for column in plan.torques.T]
-        return (self._positions(times), self._velocities(times),
-                np.column_stack([*torques, modes]))
+        modes = np.zeros((len(times), len(self.plan.names) - self.plan.torques.shape[1]))
+        positions, velocities = self._reference.motion(times)
+        return positions, velocities, np.hstack([self._reference.torque(times), modes])
 
     def _message(self, stamp_ns: int, position: Array, velocity: Array,
                  effort: Array) -> JointState:

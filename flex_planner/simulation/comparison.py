@@ -14,20 +14,17 @@ from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array, number
+from flex_planner.control.default_gains import default_gains
+from flex_planner.control.joint_controller import Gains, JointController
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_path
-from flex_planner.planning.sampling import (
-    MAX_SAMPLES,
-    sample_plan,
-    SampledPlan,
-    SamplingSettings,
-)
+from flex_planner.planning.point_times import MAX_SAMPLES
+from flex_planner.planning.sampling import sample_plan, SampledPlan, SamplingSettings
 from flex_planner.planning.strategies.initial_guesses import rigid_problem
 from flex_planner.simulation.execution import execute_plan, ExecutionMode, ExecutionResult, Setting
-from flex_planner.simulation.joint_control import Gains
 from flex_planner.simulation.mismatch import Mismatch
 from flex_planner.simulation.plant import Control
 
@@ -137,7 +134,7 @@ def compare(task: Task, *, model: ArmModel | None = None, mismatch: Mismatch | N
 
 def _execute_all(flexible: Plan, rigid: Plan, setting: Setting) -> tuple[ExecutionResult, ...]:
     """Carry out every mode whose plan is solved."""
-    references = {plan is rigid: sample_finely(plan, setting.monitor)
+    references = {plan is rigid: sample_finely(plan, setting.rate, setting.monitor)
                   for plan in (flexible, rigid) if plan.solved}
     plans = {False: flexible, True: rigid}
     found = []
@@ -148,8 +145,10 @@ def _execute_all(flexible: Plan, rigid: Plan, setting: Setting) -> tuple[Executi
     return tuple(found)
 
 
-def sample_finely(plan: Plan, monitor: Monitor) -> SampledPlan:
-    """Return samples as close as the sampling allows."""
+def sample_finely(plan: Plan, rate: float, monitor: Monitor) -> SampledPlan:
+    """Return samples as close as the sampling allows, for a controller of a rate [Hz]."""
     step = max(_STEP, plan.task.duration / (MAX_SAMPLES - 1))
-    settings = SamplingSettings(longest_step=step, torque_tolerance=_TORQUE_TOLERANCE)
+    controller = JointController(gains=default_gains(plan.model, rate), rate=rate)
+    settings = SamplingSettings(longest_step=step, torque_tolerance=_TORQUE_TOLERANCE,
+                                controller=controller)
     return sample_plan(plan, settings, monitor)

@@ -8,11 +8,11 @@ from enum import Enum
 from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
+from flex_planner.control.controlled_motion import locked_bending
+from flex_planner.control.joint_controller import Gains
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
-from flex_planner.dynamics.statics import equilibrium, residual_vibration
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.sampling import SampledPlan
-from flex_planner.simulation.joint_control import Gains, JointReference
 from flex_planner.simulation.plant import Control, Plant
 from flex_planner.simulation.settling import ResidualVibration
 import numpy as np
@@ -72,7 +72,8 @@ class ExecutionResult:
     Attributes
     ----------
     mode : ExecutionMode
-        Of execution.    arrival : float
+        Of execution.
+    arrival : float
         Planned duration [s].
     arrival_error : float
         Distance of the tip from the goal at that time [m].
@@ -146,7 +147,7 @@ def execute_plan(mode: ExecutionMode, plan: Plan, sampled: SampledPlan,
         If the monitor stopped it.
 
     """
-    reference, n = JointReference.of(sampled), plan.arm.n_joints
+    reference, n = sampled.reference, plan.arm.n_joints
     gains = setting.gains if mode.feedback else Gains.of(n, 0.0, 0.0)
     plant = Plant(
         setting.model, Control(gains=gains, rate=setting.rate,
@@ -191,19 +192,10 @@ def _watch(plant: Plant, arrival: float, setting: Setting) -> tuple[SimulatedMot
         torques.append(moved.torque)
 
     plant.advance(np.ceil(arrival * setting.rate - 1e-6) / setting.rate, note)
-    bending = _bending(plant)
+    bending = locked_bending(plant.model, plant.state, plant.parameters)
     plant.advance(arrival + setting.settling, note)
     coordinates = np.array(states)[:, :n_t]
     torques[0] = torques[1]
     return SimulatedMotion(times=np.array(times), coordinates=coordinates,
                            torques=np.array(torques),
                            tip=tip_position(plant.model.arm, coordinates)), bending
-
-
-def _bending(plant: Plant) -> float:
-    """Return the largest deflection of the links if the joints were locked now."""
-    rest, _ = equilibrium(plant.model, plant.joint_state[0], plant.parameters)
-    locked = plant.state.copy()
-    n, n_t = plant.model.arm.n_joints, plant.model.arm.n_coordinates
-    locked[n_t:n_t + n] = 0
-    return residual_vibration(plant.model, locked, rest, plant.parameters)

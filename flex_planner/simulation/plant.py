@@ -13,19 +13,14 @@ from dataclasses import dataclass
 
 from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.validation import Array, integer, number, vector
+from flex_planner.control.joint_controller import EffortHold, Gains, MAX_RATE, MIN_RATE
+from flex_planner.control.joint_reference import JointReference
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.integration import HeldTorqueIntegrator
 from flex_planner.dynamics.physical_parameters import PhysicalParameters
 from flex_planner.dynamics.statics import equilibrium
 from flex_planner.optimal_control.torque_limits import TorqueLimits
-from flex_planner.simulation.joint_control import (
-    Disturbance,
-    Encoder,
-    Gains,
-    JointReference,
-    JointSensor,
-    MAX_RATE,
-)
+from flex_planner.simulation.joint_control import Disturbance, Encoder, JointSensor
 import numpy as np
 
 RTOL, ATOL = 1e-8, 1e-10
@@ -47,6 +42,8 @@ class Control:
         Of the PD.
     rate : float
         Of the controller, 10 to 100000 [Hz].
+    hold : EffortHold
+        Of the torque of a reference; `LINEAR` is held as its mean.
     feedforward : bool
         Whether the torque of a reference is applied.
     limit_torques : bool
@@ -65,13 +62,14 @@ class Control:
 
     gains: Gains
     rate: float = 1000.0
+    hold: EffortHold = EffortHold.END
     feedforward: bool = True
     limit_torques: bool = True
     encoder: Encoder = Encoder()
     disturbance: Disturbance = Disturbance()
 
     def __post_init__(self) -> None:
-        number('rate', self.rate, at_least=10, at_most=MAX_RATE, unit='Hz')
+        number('rate', self.rate, at_least=MIN_RATE, at_most=MAX_RATE, unit='Hz')
 
     def check(self, joints: int) -> None:
         """Raise InvalidValueError unless it fits an arm of so many joints."""
@@ -188,8 +186,8 @@ class Plant:
         torque: Array = (gains.stiffness * (position - sensor.positions)
                          + gains.damping * (velocity - sensor.speeds))
         if self.control.feedforward or not self._moves:
-            # a torque that is held for a period is best taken from its middle
-            torque = torque + self._reference.torque(elapsed + self.period / 2)
+            due = elapsed + self.control.hold.delay * self.period
+            torque = torque + self._reference.torque(due)
         if self.control.limit_torques:
             lower, upper = self._limits.bounds(self.joint_state[1])
             torque = np.minimum(np.maximum(torque, lower), upper)

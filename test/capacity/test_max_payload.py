@@ -17,8 +17,8 @@ from flex_planner.collocation import Solver, SolverSettings
 from flex_planner.dynamics.integration import PiecewisePolynomial, simulate
 from flex_planner.dynamics.statics import equilibrium
 from flex_planner.optimal_control.arm_model import ArmModel
-from flex_planner.optimal_control.holding import holding_limit
 from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectResult, DirectSettings
+from flex_planner.optimal_control.holding import holding_limit
 from flex_planner.optimal_control.motion_problem import task_parameters
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import PlanStatus
@@ -50,7 +50,8 @@ def test_stronger_motors_carry_more(rigid_arm: Arm, paper_task: TaskFactory) -> 
     found = [find_max_payload(paper_task(arm_with(rigid_arm, (torque, torque))))
              for torque in (4.0, 8.0, 8.01, 16.0)]
     assert all(each.solved for each in found)
-    assert all(less.local_upper < more.payload for less, more in zip(found[:-1], found[1:], strict=True))
+    assert all(less.local_upper < more.payload
+               for less, more in zip(found[:-1], found[1:], strict=True))
 
 
 def test_stronger_second_motor_alone_carries_more(rigid_arm: Arm,
@@ -65,7 +66,8 @@ def test_more_time_carries_more_in_the_horizontal_plane(rigid_model: ArmModel,
     found = [find_max_payload(paper_task(rigid_model.arm, 0.0, duration=T), model=rigid_model)
              for T in (0.6, 1.0, 1.001, 4.0)]
     assert all(each.solved for each in found)
-    assert all(less.local_upper < more.payload for less, more in zip(found[:-1], found[1:], strict=True))
+    assert all(less.local_upper < more.payload
+               for less, more in zip(found[:-1], found[1:], strict=True))
 
 
 def test_slower_motion_of_motors_as_much_weaker_carries_the_same(rigid_arm: Arm,

@@ -198,7 +198,8 @@ def test_payload_grows_with_the_duration_and_is_that_of_single_searches(
              for duration in durations]
     assert [each.task.duration for each in found] == durations
     assert all(each.solved for each in found)
-    assert all(less.local_upper < more.payload for less, more in zip(found[:-1], found[1:], strict=True))
+    assert all(less.local_upper < more.payload
+               for less, more in zip(found[:-1], found[1:], strict=True))
     # each pair of brackets has the limit in it
     assert all(max(one.payload, other.payload) <= min(one.local_upper, other.local_upper)
                for one, other in zip(found, alone, strict=True))

@@ -136,6 +136,49 @@ def test_large_bending_is_refused_unless_it_is_allowed(tmp_path: Path) -> None:
     allowed = run('plan', str(soft), *motion, *DRY, '--allow-large-bending')
     assert (allowed.code, allowed.rows['status']) == (0, 'solved and certified')
     assert f'{"warning":<26} link 1 bends by 50% of its length at ' in allowed.out
+def test_plan_is_told_with_what_a_controller_makes_of_it(planned: Outcome) -> None:
+    assert planned.rows['published trajectory'] == (
+        'carried out with 100, 100 N m/rad and 10, 10 N m s/rad at 1000 Hz, effort_hold end')
+    assert planned.number('executed tip error') < 0.01
+    assert 'a small error at the start grows to 1 times its size' in planned.rows[
+        'without feedback']
+    assert 'residual vibration if' not in planned.rows  # the arm is rigid
+
+
+def test_flexible_plan_is_told_with_what_its_model_leaves_out() -> None:
+    outcome = run('plan', 'korayem_ei5', *MOTION, *DRY, '--payload', '1')
+    assert outcome.code == 0
+    assert outcome.number('2 more modes per link') < 0.1
+    assert outcome.number('stiffness +-10%') > 1
+    assert 0.1 < outcome.number('payload +-10%') < 1
+    assert outcome.number('nothing differs') < 0.02
+    assert 'residual vibration if stiffness differs by 10%: 1.4 mm, but 0.012 mm' in outcome.out
+
+
+def test_controller_of_the_command_line_is_the_one_that_is_recorded(tmp_path: Path) -> None:
+    outcome = run('plan', 'korayem_rigid', *MOTION, '--no-plot', '--output', str(tmp_path),
+                  '--controller-rate', '250', '--effort-hold', 'start', '--controller-period',
+                  '0', '--controller-stiffness', '80,40', '--controller-damping', '8,4')
+    assert outcome.code == 0
+    report = recorded(outcome.rows['recording'])['plan_report']
+    assert (report.controller_rate, report.effort_hold) == (250.0, 'start')
+    assert report.controller_stiffness.tolist() == [80.0, 40.0]
+    assert report.controller_damping.tolist() == [8.0, 4.0]
+    assert report.controller_period == 0.0
+    # half a period of 4 ms
+    assert report.executed_tip_error > 5e-5
+    assert main(['report', outcome.rows['recording'], '--check', '--output',
+                 str(tmp_path / 'page.html')]) == 0
+
+
+def test_trajectory_that_cannot_be_carried_out_is_a_failure(tmp_path: Path) -> None:
+    outcome = run('plan', 'korayem_rigid', *MOTION, '--no-plot', '--output', str(tmp_path),
+                  '--controller-rate', '100', '--controller-damping', '1000,1000')
+    assert outcome.code == 1
+    assert 'the trajectory cannot be carried out: executed tip error is' in outcome.err
+    found = recorded(outcome.rows['recording'])
+    assert found['plan_report'].error_code == PlanReport.CERTIFICATE_FAILED
+    assert 'joint_trajectory' not in found
 
 
 def test_progress_is_a_line_per_phase(planned: Outcome, searched: Outcome) -> None:
@@ -292,6 +335,10 @@ def test_time_limit_is_named_where_it_ends_a_search() -> None:
      'but the command has --from, --to-angles'),
     ([*MOTION, '--start-velocities', '1'], '--start-velocities has 1 numbers, but must be a list'),
     ([*MOTION, '--start-modal-displacements', '1'], '--start-modal-displacements has 1 numbers'),
+    ([*MOTION, '--controller-rate', '1'], '--controller-rate is 1.0, but must be a number >= 10'),
+    ([*MOTION, '--controller-period', '1'], '--controller-period is 1.0, but must be a number'),
+    ([*MOTION, '--controller-stiffness', '1'], '--controller-stiffness has 1 numbers, but must'),
+    ([*MOTION, '--controller-damping', '1,-1'], '--controller-damping[1] is -1.0, but must be'),
     (['--from-angles', '0,90', '--to-angles', '0,1e5', '--duration', '1'],
      '--to-angles[1] is 100000.0, but must be a number >= -5729.58 and <= 5729.58 deg')])
 def test_bad_option_is_answered_by_one_line_that_names_it(arguments: list[str],

@@ -8,19 +8,18 @@ from typing import Any
 from flex_planner.arms.arm import Arm
 from flex_planner.base.errors import InvalidTaskError, InvalidValueError, NotFiniteError
 from flex_planner.base.progress import Monitor, StoppedError
+from flex_planner.base.validation import Array
 from flex_planner.capacity.max_payload import find_max_payload
+from flex_planner.control.joint_controller import EffortHold, Gains, JointController
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.optimal_control.task import Task
 from flex_planner.optimal_control.torque_limits import TorqueLimits
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_path
-from flex_planner.planning.sampling import (
-    HOLD_DELAY_NS,
-    sample_plan,
-    SampledPlan,
-    SamplingSettings,
-)
+from flex_planner.planning.point_times import point_times
+from flex_planner.planning.published_motion import PublishedMotion
+from flex_planner.planning.sampling import sample_plan, SampledPlan, SamplingSettings
 import numpy as np
 import pytest
 
@@ -53,6 +52,13 @@ def plan(request: pytest.FixtureRequest) -> Plan:
     return plan
 
 
+def placed(plan: Plan, tolerance: float, longest: float = 0.01) -> tuple[Array, float]:
+    """Return times of points whose efforts are the planned torques, and their error."""
+    controller = JointController(gains=Gains.of(2, 100.0, 10.0))
+    motion = PublishedMotion.of(plan, controller, 0.0)
+    return point_times(motion, longest, tolerance, Monitor())
+
+
 def interpolation_error(plan: Plan, reference: SampledPlan) -> float:
     """Return the error of linear interpolation on a grid 32 times as fine as the samples."""
     moving = reference.samples
@@ -70,7 +76,7 @@ def test_times_are_integers_that_grow_from_0(plan: Plan) -> None:
     assert times[0] == 0
     assert (np.diff(times) > 0).all()
     assert times[-2] == round(plan.task.duration * 1e9)
-    assert times[-1] - times[-2] == HOLD_DELAY_NS
+    assert times[-1] - times[-2] == 1_000_000  # a period of the controller
 
 
 def test_samples_belong_to_their_times(plan: Plan) -> None:
@@ -93,7 +99,9 @@ def test_motion_starts_and_ends_exactly_at_rest(plan: Plan) -> None:
 
 
 def test_last_effort_holds_the_arm(plan: Plan) -> None:
-    samples = sample_plan(plan, SamplingSettings()).samples
+    sampled = sample_plan(plan, SamplingSettings())
+    samples = sampled.samples
+    assert sampled.efforts[-1].tolist() == samples.torques[-1].tolist()
     n, n_t = plan.arm.n_joints, plan.arm.n_coordinates
     p = Parameters.of(plan.arm, payload_mass=plan.task.payload_mass).physical
     still = np.concatenate([samples.coordinates[-1], np.zeros(n_t)])[None]
@@ -111,30 +119,31 @@ def test_last_effort_under_gravity_is_not_that_of_the_arrival(hanging: Plan) -> 
 
 @pytest.mark.parametrize('tolerance', [0.2, 0.02, 0.002])
 def test_torque_error_bounds_linear_interpolation(plan: Plan, tolerance: float) -> None:
-    reference = sample_plan(plan, SamplingSettings(torque_tolerance=tolerance))
+    reference = sample_plan(plan, SamplingSettings(torque_tolerance=tolerance,
+                                                   controller_period=0.0))
     assert 0 < reference.torque_error <= tolerance
+    assert reference.efforts.tolist() == reference.samples.torques.tolist()
     # four probes a step, one of them in the middle, where a parabola is worst
     assert interpolation_error(plan, reference) <= 1.02 * reference.torque_error
 
 
 def fewest_samples(plan: Plan, longest: float) -> int:
-    """Return the steps between switches, and two samples: where they end, and to hold the arm."""
+    """Return the steps between switches, and one more."""
     ends = [0.0, *plan.switching_times, 1.0]
-    count = int(np.ceil(np.diff(ends) / longest).sum()) + 2
-    # without switches 102 of 10 ms, 36 of 30 ms
-    assert plan.switching_times.size or count == {0.01: 102, 0.03: 36}[longest]
+    count = int(np.ceil(np.diff(ends) / longest).sum()) + 1
+    # without switches 101 of 10 ms, 35 of 30 ms
+    assert plan.switching_times.size or count == {0.01: 101, 0.03: 35}[longest]
     return count
 
 
 def test_tighter_tolerance_gives_more_samples(plan: Plan) -> None:
-    counts = [sample_plan(plan, SamplingSettings(torque_tolerance=tolerance)).times_ns.size
-              for tolerance in (0.5, 0.02, 0.001)]
+    counts = [placed(plan, tolerance)[0].size for tolerance in (0.5, 0.02, 0.001)]
     assert counts[0] < counts[1] < counts[2]
     assert counts[0] == fewest_samples(plan, 0.01)
 
 
 def test_samples_lie_on_switches_and_are_dense_only_where_torques_bend(saturated: Plan) -> None:
-    reference = sample_plan(saturated, SamplingSettings())
+    reference = sample_plan(saturated, SamplingSettings(controller_period=0.0))
     switches = np.round(saturated.switching_times * 1e9).astype(np.int64)
     assert switches.size == 6
     assert np.isin(switches, reference.times_ns).all()
@@ -152,24 +161,48 @@ def test_samples_lie_on_switches_and_are_dense_only_where_torques_bend(saturated
 def test_switches_nearer_than_the_shortest_step_are_one(flexible: Plan) -> None:
     switches = np.array([1e-4, 0.5, 0.5001, 0.70017, 0.9999])
     plan = replace(flexible, switching_times=switches)
-    reference = sample_plan(plan, SamplingSettings(torque_tolerance=1e3))
-    assert np.isin([500_000_000, 700_170_000], reference.times_ns).all()
-    assert np.diff(reference.times_ns)[:-1].min() >= 250_000
+    times, _ = placed(plan, 1e3)
+    assert np.isin([0.5, 0.70017], times).all()
+    assert np.diff(times).min() >= 2.5e-4
 
 
 def test_samples_that_are_too_many_are_spent_where_they_matter_most(
         flexible: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('flex_planner.planning.sampling.MAX_SAMPLES', 130)
-    errors = [sample_plan(flexible, SamplingSettings(torque_tolerance=tolerance))
-              for tolerance in (1e3, 1e-6)]
-    assert [len(reference.times_ns) for reference in errors] == [102, 132]
-    assert errors[1].torque_error < 0.8 * errors[0].torque_error
+    monkeypatch.setattr('flex_planner.planning.point_times.MAX_SAMPLES', 130)
+    (few, coarse), (many, fine) = (placed(flexible, tolerance) for tolerance in (1e3, 1e-6))
+    assert [few.size, many.size] == [101, 131]
+    assert fine < 0.8 * coarse
 
 
 def test_longest_step_is_kept(plan: Plan) -> None:
-    reference = sample_plan(plan, SamplingSettings(longest_step=0.03, torque_tolerance=1e3))
-    assert np.diff(reference.times_ns).max() <= 30_000_000
-    assert reference.times_ns.size == fewest_samples(plan, 0.03)
+    times, _ = placed(plan, 1e3, longest=0.03)
+    assert np.diff(times).max() <= 0.03 * (1 + 1e-12)
+    assert times.size == fewest_samples(plan, 0.03)
+
+
+def test_points_are_closer_where_the_arm_would_arrive_elsewhere(flexible: Plan) -> None:
+    settings = SamplingSettings(longest_step=0.05, torque_tolerance=10.0)
+    coarse, _ = placed(flexible, 10.0, longest=0.05)
+    sampled = sample_plan(flexible, settings)
+    assert sampled.times_ns.size > 3 * coarse.size
+    assert sampled.torque_error < 0.1
+    # with infinitely many points 0.2 um, of which 10 um are allowed to the points
+    assert sampled.execution.tip_error < 1.1e-5
+
+
+@pytest.mark.parametrize(('hold', 'shift'), [
+    (EffortHold.END, 2e-3), (EffortHold.START, -2e-3), (EffortHold.MIDDLE, 0.0),
+    (EffortHold.LINEAR, 0.0)])
+def test_efforts_are_shifted_by_half_the_period_in_which_they_are_held(
+        flexible: Plan, hold: EffortHold, shift: float) -> None:
+    controller = JointController(gains=Gains.of(2, 100.0, 10.0), rate=250.0, hold=hold)
+    sampled = sample_plan(flexible, SamplingSettings(controller=controller))
+    times = sampled.times_ns[:-1] * 1e-9
+    planned = flexible.sample(np.clip(times - shift, 0, 1)).torques
+    np.testing.assert_allclose(sampled.efforts[:-1], planned, atol=1e-9)
+    np.testing.assert_allclose(sampled.samples.torques[1:-2], flexible.sample(times[1:-1]).torques,
+                               atol=1e-6)
+    assert sampled.execution.controller is controller
 
 
 def test_steps_stay_above_a_quarter_of_a_millisecond(flexible: Plan) -> None:
@@ -190,7 +223,9 @@ def test_plan_without_solution_has_no_samples(rigid_arm: Arm, rigid_model: ArmMo
     ({'longest_step': 1e-5}, InvalidValueError, 'longest_step is 1e-05'),
     ({'longest_step': 2.0}, InvalidValueError, 'longest_step is 2.0'),
     ({'torque_tolerance': 0.0}, InvalidValueError, 'torque_tolerance is 0.0'),
-    ({'torque_tolerance': np.nan}, NotFiniteError, 'torque_tolerance is nan')])
+    ({'torque_tolerance': np.nan}, NotFiniteError, 'torque_tolerance is nan'),
+    ({'controller_period': -1.0}, InvalidValueError, 'controller_period is -1.0'),
+    ({'controller_period': 0.2}, InvalidValueError, 'controller_period is 0.2')])
 def test_bad_sampling_settings_are_refused(values: dict[str, float], error: type[Exception],
                                            text: str) -> None:
     with pytest.raises(error, match=text):

@@ -37,17 +37,17 @@ def test_planning_that_got_nowhere_names_no_strategy() -> None:
 
 def test_failed_search_has_no_bracket(rigid_arm: Arm) -> None:
     found = search(rigid_arm, status=PlanStatus.TIMEOUT)
-    assert dict(payload_rows(found, None))['largest payload'] == 'none found'
+    assert dict(payload_rows(found))['largest payload'] == 'none found'
     assert search_table(found) == ''
 
 
 def test_search_that_did_not_end_says_what_was_tried(rigid_arm: Arm) -> None:
     found = search(rigid_arm, status=PlanStatus.NOT_CONVERGED, payload=2.0, local_upper=3.0)
-    assert dict(payload_rows(found, None))['largest payload'] == '2 kg; no solution at 3 kg'
+    assert dict(payload_rows(found))['largest payload'] == '2 kg; no solution at 3 kg'
 
 
 def test_motor_that_can_hold_no_more_is_told(rigid_arm: Arm) -> None:
     found = search(rigid_arm, status=PlanStatus.SOLVED, payload=2.0, local_upper=2.0001, held=True,
                    limiting_joint=1)
-    rows = dict(payload_rows(found, None))
+    rows = dict(payload_rows(found))
     assert rows['limited by'] == 'the motor of joint 2, which can hold no more at the goal'

@@ -12,6 +12,7 @@ from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import load_arm
 from flex_planner.base.errors import InvalidSizeError, InvalidTaskError, InvalidValueError
 from flex_planner.base.progress import Monitor, StoppedError
+from flex_planner.control.joint_controller import Gains
 from flex_planner.dynamics.integration import integrate
 from flex_planner.dynamics.statics import residual_vibration
 from flex_planner.optimal_control.arm_model import ArmModel
@@ -22,7 +23,6 @@ from flex_planner.plotting.comparison import draw_comparison
 from flex_planner.reports.comparison import comparison_rows, comparison_table
 from flex_planner.simulation.comparison import compare, Comparison
 from flex_planner.simulation.execution import ExecutionMode
-from flex_planner.simulation.joint_control import Gains
 from flex_planner.simulation.mismatch import Mismatch
 import matplotlib.image
 import numpy as np

@@ -7,10 +7,12 @@ from typing import Any
 
 from flex_planner.arms.arm import Arm, Joint, Link
 from flex_planner.base.errors import InvalidSizeError, InvalidValueError, NotFiniteError
+from flex_planner.control.joint_controller import Gains
+from flex_planner.control.joint_reference import JointReference
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.statics import equilibrium, natural_modes
 from flex_planner.optimal_control.parameters import Parameters
-from flex_planner.simulation.joint_control import Disturbance, Gains, JointReference
+from flex_planner.simulation.joint_control import Disturbance
 from flex_planner.simulation.mismatch import Mismatch
 from flex_planner.simulation.plant import Control, Plant
 import numpy as np

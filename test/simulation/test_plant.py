@@ -9,6 +9,8 @@ from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.errors import InvalidSizeError, InvalidValueError, NotFiniteError
 from flex_planner.base.validation import Array
+from flex_planner.control.joint_controller import EffortHold, Gains
+from flex_planner.control.joint_reference import JointReference
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.integration import simulate
 from flex_planner.optimal_control.arm_model import ArmModel
@@ -16,11 +18,10 @@ from flex_planner.optimal_control.torque_limits import TorqueLimits
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.sampling import sample_plan, SamplingSettings
-from flex_planner.simulation.joint_control import Disturbance, Encoder, Gains, JointReference
+from flex_planner.simulation.joint_control import Disturbance, Encoder
 from flex_planner.simulation.plant import Control, Plant, RunawayError
 import numpy as np
 import pytest
-from scipy.interpolate import CubicHermiteSpline
 
 GAINS = Gains.of(2, 100.0, 10.0)
 FREE = Gains.of(2, 0.0, 0.0)
@@ -47,7 +48,7 @@ def workshop_plant(workshop_arm: Arm) -> ArmDynamics:
 
 @pytest.fixture(scope='module')
 def reference(plan: Plan) -> JointReference:
-    return JointReference.of(sample_plan(plan, SamplingSettings(torque_tolerance=2e-3)))
+    return sample_plan(plan, SamplingSettings(torque_tolerance=2e-3)).reference
 
 
 def plant_at_start(plan: Plan, gains: Gains = GAINS, payload_mass: float = 1.0,
@@ -206,11 +207,13 @@ def test_bad_plant_is_refused(ei50_plant: ArmDynamics, changes: dict[str, Any],
 def test_plant_integrates_as_scipy_does(workshop_plant: ArmDynamics) -> None:
     # held for 50 ms each, so that the integrator meets torques that are constant
     rate, torques = 20.0, np.random.default_rng(1).uniform(-3, 3, (12, 2))
-    plant = Plant(workshop_plant, Control(gains=FREE, rate=rate, limit_torques=False),
+    plant = Plant(workshop_plant, Control(gains=FREE, rate=rate, limit_torques=False,
+                                          hold=EffortHold.MIDDLE),
                   payload_mass=0.3, positions=POSTURE)
     state, times = plant.state, (np.arange(12) + 0.5) / rate
-    plant.follow(JointReference(times=np.append(0, times[1:]), positions=np.zeros((12, 2)),
-                                velocities=np.zeros((12, 2)), torques=torques))
+    still = np.zeros((12, 2))
+    plant.follow(JointReference(times=np.append(0, times[1:]), positions=still, velocities=still,
+                                accelerations=still, torques=torques))
     for k in range(12):
         plant.advance((k + 1) / rate)
         held = plant.torque.copy()
@@ -232,16 +235,17 @@ def test_error_of_a_step_is_watched_at_every_rate(ei50_plant: ArmDynamics, rate:
     np.testing.assert_allclose(plants[0].state, plants[1].state, rtol=1e-6, atol=1e-7)
 
 
-def test_reference_is_interpolated_as_scipy_does(reference: JointReference) -> None:
-    spline = CubicHermiteSpline(reference.times, reference.positions, reference.velocities)
-    for time in np.linspace(0, 0.999, 57):
-        position, velocity = reference.motion(time)
-        np.testing.assert_allclose(position, spline(time), atol=1e-13)
-        np.testing.assert_allclose(velocity, spline(time, 1), atol=1e-9)
-        expected = [np.interp(time, reference.times, u) for u in reference.torques.T]
-        np.testing.assert_allclose(reference.torque(time), expected, atol=1e-12)
-    assert reference.motion(2.0)[0].tolist() == reference.positions[-1].tolist()
-    assert reference.torque(2.0).tolist() == reference.torques[-1].tolist()
+@pytest.mark.parametrize(('hold', 'share'), [
+    (EffortHold.START, 0.0), (EffortHold.MIDDLE, 0.5), (EffortHold.END, 1.0)])
+def test_torque_of_a_trajectory_is_held_as_the_controller_does(
+        plan: Plan, reference: JointReference, hold: EffortHold, share: float) -> None:
+    plant = plant_at_start(plan, FREE, hold=hold, limit_torques=False)
+    plant.follow(reference)
+    for period in range(50):
+        plant.advance((period + 1) * PERIOD)
+        expected = reference.torque((period + share) * PERIOD)
+        np.testing.assert_allclose(plant.torque, expected, atol=1e-9)
+    assert Control(gains=FREE).hold is EffortHold.END
 
 
 def test_every_period_of_a_plan_takes_a_single_step(

@@ -11,11 +11,11 @@ from flex_planner.cli.options import Commands, numbers
 from flex_planner.cli.outputs import check_folder
 from flex_planner.cli.progress_line import run_with_progress
 from flex_planner.cli.request import add_task, Request, translate_errors
+from flex_planner.control.joint_controller import Gains
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.reports.comparison import comparison_rows, comparison_table
 from flex_planner.reports.motion import table
 from flex_planner.simulation.comparison import compare, Comparison
-from flex_planner.simulation.joint_control import Gains
 from flex_planner.simulation.mismatch import Mismatch
 import numpy as np
 

@@ -4,21 +4,26 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
+from dataclasses import replace
 import sys
 
 from flex_planner.base.progress import Monitor
 from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.capacity.results import MaxPayload, PayloadMethod
+from flex_planner.cli.controller_options import add_controller
 from flex_planner.cli.options import Commands
 from flex_planner.cli.outputs import add_outputs, Outputs
 from flex_planner.cli.progress_line import run_with_progress
 from flex_planner.cli.request import add_objectives, add_task, Request, translate_errors
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.planning.kinds.effort import SearchEffort
-from flex_planner.planning.plan import Peaks, peaks, Plan, PlanStatus
+from flex_planner.planning.plan import peaks, Plan, PlanStatus
 from flex_planner.planning.plan_path import plan_kind
-from flex_planner.planning.sampling import sample_plan, SampledPlan
+from flex_planner.planning.robustness import assess_robustness, robustness_warnings
+from flex_planner.planning.sampling import judge_execution, sample_plan, SampledPlan
+from flex_planner.reports.execution import execution_rows, robustness_rows
 from flex_planner.reports.motion import (
+    motion_rows,
     payload_rows,
     plan_rows,
     Row,
@@ -40,6 +45,7 @@ def add_commands(commands: Commands) -> None:
     plan.add_argument('--kind', type=int, default=1, metavar='N',
                       help='plan the N-th of the kinds of motion that are listed, 1 to 4 '
                       '(default: 1, the best)')
+    add_controller(plan)
     add_outputs(plan)
     plan.set_defaults(run=_plan)
     payload = commands.add_parser(
@@ -48,6 +54,7 @@ def add_commands(commands: Commands) -> None:
     add_task(payload, payload='smallest payload of interest (default: 0)')
     _add_search(payload)
     _add_kinds(payload)
+    add_controller(payload)
     add_outputs(payload)
     payload.set_defaults(run=_payload)
 
@@ -83,8 +90,8 @@ def _plan(options: argparse.Namespace) -> int:
                              objectives=request.objectives, search=options.search)
 
     plan = run_with_progress(request.task.arm, request.time_limit, work)
-    reference, most = _sample(request, plan)
-    _print_result(request, f'with {request.task.payload_mass:g} kg', plan_rows(plan, most))
+    plan, reference, rows = _sample(request, plan)
+    _print_result(request, f'with {request.task.payload_mass:g} kg', [*plan_rows(plan), *rows])
     if text := weights_table(plan):
         print(f'\n{text}\n')
     _print_files(outputs.write_plan(plan, reference if plan.solved else None))
@@ -105,20 +112,34 @@ def _payload(options: argparse.Namespace) -> int:
                 method=PayloadMethod[options.method.upper()], search=options.search)
 
     found = run_with_progress(request.task.arm, request.time_limit, work)
-    reference, most = _sample(request, found.plan)
-    _print_result(request, '', payload_rows(found, most))
+    rows: list[Row] = []
+    reference = None
+    if found.plan is not None:
+        plan, reference, rows = _sample(request, found.plan)
+        if plan is not found.plan:
+            found = replace(found, plan=plan, status=plan.status, message=plan.message)
+    _print_result(request, '', [*payload_rows(found), *rows])
     if text := search_table(found):
         print(f'\n{text}\n')
     _print_files(outputs.write_search(found, accuracy, step, reference if found.solved else None))
     return _exit_code(request, found)
 
 
-def _sample(request: Request, plan: Plan | None) -> tuple[SampledPlan | None, Peaks | None]:
-    """Return samples of a plan and its peaks, if it has a solution."""
-    if plan is None or plan.solution is None:
-        return None, None
+def _sample(request: Request, plan: Plan) -> tuple[Plan, SampledPlan | None, list[Row]]:
+    """Return a plan judged by its samples, the samples, and what they show; none if unsolved."""
+    if plan.solution is None:
+        return plan, None, []
     reference = sample_plan(plan, request.sampling)
-    return reference, peaks(plan, reference.samples)
+    plan = judge_execution(plan, reference)
+    rows = [*motion_rows(plan, peaks(plan, reference.samples)),
+            *execution_rows(reference.execution)]
+    if plan.solved:
+        robustness = assess_robustness(plan, reference)
+        reference = replace(reference, robustness=robustness)
+        rows += robustness_rows(robustness, plan.arm)
+        rows += [('warning', warning.sentence) for warning in robustness_warnings(
+            reference.execution, robustness, plan.arm.reach)]
+    return plan, reference, rows
 
 
 def _print_result(request: Request, payload: str, rows: list[Row]) -> None:

@@ -7,8 +7,9 @@ Needs neither ROS nor the planner that made the recording, only the recording.
 
 from __future__ import annotations
 
-from flex_planner.reports.recording.check import check_motion, CheckLimits, Finding, MotionCheck
+from flex_planner.reports.recording.check import check_motion
 from flex_planner.reports.recording.contents import RecordedMotion, RecordedRequest
+from flex_planner.reports.recording.findings import CheckLimits, Finding, MotionCheck
 from flex_planner.reports.recording.page import report_page, write_report
 from flex_planner.reports.recording.tables import check_table, verdict
 

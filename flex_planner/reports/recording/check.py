@@ -1,117 +1,36 @@
 """
 A recorded plan checked against the model, from the recording alone.
 
-The recorded torques, interpolated linearly as a controller does, are applied to the arm of the
-recording; nothing of the collocation that made the plan is used. What linear interpolation
-changes is in the result: this is what the arm will do, apart from feedback.
+The recorded joint trajectory is carried out by the arm of the recording under the joint controller
+that it was published for, exactly as when it was certified, with feedback and without; nothing of
+the collocation that made the plan is used. The costates of the recording then show whether its
+efforts are those of an optimal motion.
 
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.errors import RecordingError
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
-from flex_planner.dynamics.integration import integrate, LinearTorque
 from flex_planner.dynamics.statics import equilibrium
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.parameters import Parameters
-from flex_planner.optimal_control.torque_limits import TorqueLimits
+from flex_planner.planning.execution import Execution
 from flex_planner.reports.recording.contents import RecordedMotion, RecordedRequest
+from flex_planner.reports.recording.execution import (
+    effort_delay,
+    recorded_controller,
+    recorded_execution,
+)
+from flex_planner.reports.recording.findings import CheckLimits, Finding, MotionCheck
+from flex_planner.reports.recording.optimality import optimality_findings
 import numpy as np
 
-_RTOL = 1e-10
+_MICROMETRE = 1e-6
 _TINY = float(np.finfo(float).tiny)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CheckLimits:
-    """
-    What the findings must not exceed; the boundary error has the limit of the task.
-
-    Attributes
-    ----------
-    tip_deviation : float
-        Of the tip, as a share of the arm's reach: linear interpolation costs up to 1e-4 at the
-        planner's default sampling.
-    joint_deviation : float
-        Of joint angles and speeds, as a share of the largest.
-    torque_error : float
-        By which a torque may leave its bounds of eq. (15) or differ from eq. (14), as a share
-        of the largest torque.
-    hamiltonian_drift : float
-        Spread of H relative to its largest term.
-    end_error : float
-        Of the first and the last sample [rad, m, rad/s, m/s].
-
-    """
-
-    tip_deviation: float = 1e-3
-    joint_deviation: float = 1e-2
-    torque_error: float = 1e-6
-    hamiltonian_drift: float = 0.02
-    end_error: float = 1e-6
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Finding:
-    """
-    One number that the check found.
-
-    Attributes
-    ----------
-    name, unit : str
-        What it is.
-    value, limit : float
-        Passed if value <= limit.
-    recorded : float or None
-        The same in the recorded certificate, where it has it.
-
-    """
-
-    name: str
-    unit: str
-    value: float
-    limit: float
-    recorded: float | None = None
-
-    @property
-    def passed(self) -> bool:
-        """Return whether the value keeps its limit; not a number does not."""
-        return self.value <= self.limit
-
-    def __str__(self) -> str:
-        """Return the finding in words."""
-        unit = f' {self.unit}' if self.unit else ''
-        planned = '' if self.recorded is None else f', {self.recorded:.1e}{unit} when planned'
-        verdict = 'passed' if self.passed else 'FAILED'
-        return f'{verdict}: {self.value:.3g}{unit} (limit {self.limit:.3g}{unit}{planned})'
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class MotionCheck:
-    """
-    What the check of a recorded motion found.
-
-    Attributes
-    ----------
-    findings : tuple of Finding
-        In the order in which they are shown.
-    tip : numpy.ndarray, shape (k, 2)
-        Tip of the re-simulated arm at the recorded times [m].
-
-    """
-
-    findings: tuple[Finding, ...]
-    tip: Array
-
-    @property
-    def passed(self) -> bool:
-        """Return whether every finding keeps its limit."""
-        return all(finding.passed for finding in self.findings)
 
 
 def check_motion(request: RecordedRequest, model: ArmModel | None = None,
@@ -147,16 +66,27 @@ def check_motion(request: RecordedRequest, model: ArmModel | None = None,
     model, limits = model or ArmModel(request.arm), limits or CheckLimits()
     ends = [_start_state(model, request, motion),
             _at_rest(model, motion.coordinates[-1], parameters)]
-    states = integrate(model, parameters.physical, ends[0],
-                       LinearTorque(motion.times, motion.torques), monitor, rtol=_RTOL,
-                       atol=_RTOL / 100)
+    execution = Execution(
+        dynamics=model, parameters=parameters, goal=motion.tip[-1],
+        start=np.concatenate([motion.coordinates[0], motion.rates[0]]),
+        duration=float(motion.times[-2]), controller=recorded_controller(request))
+    states = _states(execution, motion, monitor)
     tip = tip_position(request.arm, states[:, :request.arm.n_coordinates])
     return MotionCheck(tip=tip, findings=(
-        *_resimulation(request, motion, states[-1] - ends[1], tip, limits),
-        _joint_path(motion, states, request.arm.n_joints, limits),
+        *_arrival(request, execution, motion, limits, monitor),
+        *_way(motion, states, tip, request.arm, limits),
         *_deviation_at_ends(request, motion, ends, limits),
         *_deviation_from_request(request, motion, limits),
-        *_optimality(model, motion, parameters, limits)))
+        *optimality_findings(model, motion, parameters, limits, effort_delay(request),
+                             float(request.report.torque_interpolation_error))))
+
+
+def _states(execution: Execution, motion: RecordedMotion, monitor: Monitor | None) -> Array:
+    """Return the states at the recorded times, between two updates of the controller on a line."""
+    carried = execution.arm.follow(motion.reference, execution.start, float(motion.times[-1]),
+                                   monitor)
+    return np.stack([np.interp(motion.times, carried.times, column)
+                     for column in carried.states.T], axis=1)
 
 
 def _start_state(model: ArmModel, request: RecordedRequest, motion: RecordedMotion) -> Array:
@@ -176,28 +106,40 @@ def _at_rest(model: ArmModel, coordinates: Array, parameters: Parameters) -> Arr
     return np.concatenate([rest, np.zeros_like(rest)])
 
 
-def _resimulation(request: RecordedRequest, motion: RecordedMotion, miss: Array, tip: Array,
-                  limits: CheckLimits) -> list[Finding]:
-    """Return the errors of the motion that the recorded torques lead to."""
-    most = limits.tip_deviation * request.arm.reach
-    distance = np.linalg.norm(tip - motion.tip, axis=1)
-    return [
-        Finding(name='tip error at the end', unit='m', value=float(distance[-1]), limit=most,
-                recorded=float(request.report.tip_error)),
-        Finding(name='largest tip deviation', unit='m', value=float(distance.max()), limit=most),
-        Finding(name='boundary error (eq. 17)', unit='', value=float(miss @ miss / 2),
-                limit=request.tolerance, recorded=float(request.report.boundary_error))]
+def _arrival(request: RecordedRequest, execution: Execution, motion: RecordedMotion,
+             limits: CheckLimits, monitor: Monitor | None) -> list[Finding]:
+    """Return where the arm arrives, and how that differs from the recorded certificate."""
+    reference, reach, planned = motion.reference, request.arm.reach, recorded_execution(request)
+    found = []
+    for arm in (execution, execution.open_loop):
+        state = arm.arrive(reference, monitor)
+        found += [arm.tip_error(state), arm.vibration(state)]
+    expected = None if planned is None else [
+        planned.tip_error, planned.residual_vibration, planned.open_loop_tip_error,
+        planned.open_loop_residual_vibration]
+    findings = [
+        Finding(name=f'executed {name}', unit='m', value=value, limit=limit * reach,
+                recorded=None if expected is None else expected[k])
+        for k, (name, value, limit) in enumerate((
+            ('tip error', found[0], limits.execution.tip_error),
+            ('residual vibration', found[1], limits.execution.residual_vibration)))]
+    if expected is not None:
+        findings.append(Finding(
+            name='difference from the certificate', unit='', limit=limits.certificate_difference,
+            value=float(max(abs(value - before) / (before + _MICROMETRE)
+                            for value, before in zip(found, expected, strict=True)))))
+    return findings
 
 
-def _joint_path(motion: RecordedMotion, states: Array, n: int, limits: CheckLimits) -> Finding:
-    """Return the distance of the joints' angles and speeds from the recorded ones."""
-    n_t = motion.coordinates.shape[1]
-    pairs = ((states[:, :n], motion.coordinates[:, :n]),
-             (states[:, n_t:n_t + n], motion.rates[:, :n]))
-    shares = [np.abs(found - recorded).max() / max(np.ptp(recorded, axis=0).max(), _TINY)
-              for found, recorded in pairs]
-    return Finding(name='largest joint deviation', unit='', limit=limits.joint_deviation,
-                   value=float(np.max(shares)))
+def _way(motion: RecordedMotion, states: Array, tip: Array, arm: Arm,
+         limits: CheckLimits) -> list[Finding]:
+    """Return the distances of tip and joints from the recorded ones on the way."""
+    recorded = motion.coordinates[:, :arm.n_joints]
+    away = np.abs(states[:, :arm.n_joints] - recorded).max()
+    return [Finding(name='largest tip deviation', unit='m', limit=limits.tip_deviation * arm.reach,
+                    value=float(np.linalg.norm(tip - motion.tip, axis=1).max())),
+            Finding(name='largest joint deviation', unit='', limit=limits.joint_deviation,
+                    value=float(away / max(np.ptp(recorded, axis=0).max(), _TINY)))]
 
 
 def _deviation_at_ends(request: RecordedRequest, motion: RecordedMotion, ends: list[Array],
@@ -227,24 +169,3 @@ def _deviation_from_request(request: RecordedRequest, motion: RecordedMotion,
             name=f'deviation from task, {name}', unit='rad' if by_angles else 'm',
             limit=limits.end_error, value=float(np.abs(miss).max())))
     return findings
-
-
-def _optimality(model: ArmModel, motion: RecordedMotion, parameters: Parameters,
-                limits: CheckLimits) -> list[Finding]:
-    """Return the violation of the torque bounds, and the errors of torques and Hamiltonian."""
-    n, size = model.arm.n_joints, max(float(np.abs(motion.torques).max()), _TINY)
-    lower, upper = TorqueLimits.of(model.arm).bounds(motion.rates[:, :n])
-    bounds = np.where(motion.torques >= 0, upper, -lower)
-    # the last sample holds the arm, it is not of the extremal
-    z = np.hstack([motion.coordinates, motion.rates, motion.position_costates,
-                   motion.velocity_costates])[:-1]
-    controls = model.controls(z, parameters.stack())
-    powers = np.abs(motion.position_costates * motion.rates).max()
-    scale = max(float(controls.cost_rate.max()), float(powers), _TINY)
-    return [
-        Finding(name='torque beyond its bounds', unit='N m', limit=limits.torque_error * size,
-                value=max(float((np.abs(motion.torques) - bounds).max()), 0.0)),
-        Finding(name='torques against eq. (14)', unit='N m', limit=limits.torque_error * size,
-                value=float(np.abs(controls.torque - motion.torques[:-1]).max())),
-        Finding(name='Hamiltonian drift', unit='', limit=limits.hamiltonian_drift,
-                value=float(np.ptp(controls.hamiltonian)) / scale)]

@@ -10,6 +10,7 @@ from typing import Any
 from flex_planner.arms.arm import Arm, Joint, Link, Motor, Node
 from flex_planner.base.errors import FlexPlannerError, RecordingError
 from flex_planner.base.validation import Array
+from flex_planner.control.joint_reference import JointReference
 from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.recording import (
     definition_folder,
@@ -36,8 +37,10 @@ class RecordedMotion:
         [s]; the last sample holds the arm, shortly after the end of the motion.
     coordinates, rates : numpy.ndarray, shape (k, n_t)
         Joints [rad], then modes [m], and their rates.
+    accelerations : numpy.ndarray, shape (k, n)
+        Of the joints [rad/s^2].
     torques : numpy.ndarray, shape (k, n)
-        [N m].
+        Efforts of the joint trajectory [N m].
     position_costates, velocity_costates : numpy.ndarray, shape (k, n_t)
         psi_1 and psi_2.
     tip : numpy.ndarray, shape (k, 2)
@@ -50,6 +53,7 @@ class RecordedMotion:
     times: Array
     coordinates: Array
     rates: Array
+    accelerations: Array
     torques: Array
     position_costates: Array
     velocity_costates: Array
@@ -66,11 +70,25 @@ class RecordedMotion:
             coordinates=np.hstack([_rows(joints, 'positions'),
                                    _rows(bends, 'modal_displacements')]),
             rates=np.hstack([_rows(joints, 'velocities'), _rows(bends, 'modal_rates')]),
-            torques=_rows(joints, 'effort'),
+            accelerations=_rows(joints, 'accelerations'), torques=_rows(joints, 'effort'),
             position_costates=_rows(bends, 'position_costates'),
             velocity_costates=_rows(bends, 'velocity_costates'),
             tip=np.array([(point.x, point.y) for point in message.tip_path]),
             payload_mass=float(message.payload_mass))
+
+    @property
+    def extended_states(self) -> Array:
+        """Return states and costates z, shape (k, 4 n_t)."""
+        return np.hstack([self.coordinates, self.rates, self.position_costates,
+                          self.velocity_costates])
+
+    @property
+    def reference(self) -> JointReference:
+        """Return the trajectory that the joint controller gets."""
+        n = self.torques.shape[1]
+        return JointReference(
+            times=self.times, positions=self.coordinates[:, :n], velocities=self.rates[:, :n],
+            accelerations=self.accelerations, torques=self.torques)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -212,6 +230,7 @@ def _check_sizes(arm: Arm, motion: RecordedMotion) -> None:
     """Raise ValueError unless a motion is one of an arm."""
     count, n_t = motion.times.size, arm.n_coordinates
     shapes = {'coordinates': n_t, 'rates': n_t, 'torques': arm.n_joints, 'tip': 2,
+              'accelerations': arm.n_joints,
               'position_costates': n_t, 'velocity_costates': n_t}
     for name, columns in shapes.items():
         shape = getattr(motion, name).shape

@@ -20,8 +20,8 @@ from typing import Any
 from flex_planner.base.errors import RecordingError
 from flex_planner.base.validation import Array
 from flex_planner.base.version import VERSION
-from flex_planner.reports.recording.check import MotionCheck
 from flex_planner.reports.recording.contents import RecordedRequest
+from flex_planner.reports.recording.findings import MotionCheck
 from flex_planner.reports.recording.frequencies import NaturalFrequencies
 from flex_planner.reports.recording.plots import Plot, plots, Series
 from flex_planner.reports.recording.tables import ReportTable, tables, verdict

@@ -8,8 +8,8 @@ from typing import Any
 
 from flex_planner.base.validation import Array
 from flex_planner.optimal_control.torque_limits import TorqueLimits
-from flex_planner.reports.recording.check import MotionCheck
 from flex_planner.reports.recording.contents import RecordedMotion, RecordedRequest
+from flex_planner.reports.recording.findings import MotionCheck
 from flex_planner.reports.recording.frequencies import NaturalFrequencies
 from flex_planner.reports.recording.spectra import spectrum
 import numpy as np

@@ -9,8 +9,10 @@ from typing import Any
 from flex_planner.arms.arm import Arm, Joint
 from flex_planner.planning.certificate import CertificateLimits
 from flex_planner.planning.warnings import WarningKind
-from flex_planner.reports.recording.check import MotionCheck
+from flex_planner.reports.execution import execution_rows, vibrations
 from flex_planner.reports.recording.contents import RecordedRequest
+from flex_planner.reports.recording.execution import recorded_execution, recorded_robustness
+from flex_planner.reports.recording.findings import MotionCheck
 from flex_planner.reports.recording.frequencies import NaturalFrequencies
 import numpy as np
 
@@ -59,7 +61,7 @@ def tables(request: RecordedRequest, check: MotionCheck | None = None,
     """Return the tables of a report."""
     found = [_task(request), _outcome(request), *_kinds(request), *_warnings(request.report)]
     if request.solved:
-        found.append(_certificate(request))
+        found += [_certificate(request), *_execution(request)]
     if check is not None:
         found.append(check_table(check))
     if request.motion is not None:
@@ -169,6 +171,19 @@ def _certificate(request: RecordedRequest) -> ReportTable:
                      '–' if limit is None else f'{limit:.0e}', judged))
     return ReportTable(title='Certificate when planned', columns=('', 'found', 'limit', ''),
                        rows=tuple(rows))
+
+
+def _execution(request: RecordedRequest) -> list[ReportTable]:
+    """Return what the controller makes of the trajectory, also on arms that differ."""
+    certificate, robustness = recorded_execution(request), recorded_robustness(request)
+    if certificate is None:
+        return []
+    found = [ReportTable(title='Published trajectory, carried out', rows=tuple(
+        execution_rows(certificate)))]
+    if robustness is not None and request.arm.n_modes:
+        found.append(ReportTable(title='Residual vibration with feedback if ...', rows=tuple(
+            vibrations(robustness))))
+    return found
 
 
 def _joints(request: RecordedRequest) -> ReportTable:

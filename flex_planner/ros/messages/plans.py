@@ -23,6 +23,7 @@ from flex_planner.optimal_control.task import Task
 from flex_planner.planning.kinds.clusters import KindOfMotion
 from flex_planner.planning.objectives import Objectives
 from flex_planner.planning.plan import peaks, Plan, PlanStatus, Samples
+from flex_planner.planning.robustness import robustness_warnings
 from flex_planner.planning.sampling import SampledPlan
 from flex_planner.planning.warnings import PlanWarning
 from flex_planner.ros.settings.planner import PlannerSettings
@@ -60,6 +61,17 @@ STATUS_CODES = {
 STOP_CODES = {StopReason.TIMEOUT: PlanReport.TIMEOUT,
               StopReason.CANCELED: PlanReport.CANCELED}
 OBJECTIVE_FIELDS = ('max_joint_speeds', 'max_torque_shares', 'max_modal_rates')
+# fields of the report, and of the core's certificate and robustness
+EXECUTION_FIELDS = {
+    'executed_tip_error': 'tip_error', 'executed_residual_vibration': 'residual_vibration',
+    'open_loop_tip_error': 'open_loop_tip_error',
+    'open_loop_residual_vibration': 'open_loop_residual_vibration',
+    'open_loop_amplification': 'open_loop_amplification', 'feedback_growth': 'feedback_growth'}
+ROBUSTNESS_FIELDS = {
+    'vibration_if_more_modes': 'more_modes',
+    'vibration_if_stiffness_differs': 'stiffness_differs',
+    'vibration_if_payload_differs': 'payload_differs',
+    'feedback_growth_if_more_modes': 'more_modes_growth'}
 _MAX_PLANNING_TIME = 3600.0
 
 
@@ -137,7 +149,8 @@ def failure_report(code: int, sentence: str) -> PlanReport:
     report = PlanReport(error_code=code, error_msg=sentence)
     for name in ('cost', 'effort', 'energy', 'collocation_residual', 'boundary_error',
                  'hamiltonian_drift', 'tip_error', 'residual_vibration', 'state_error',
-                 'costate_error', 'torque_interpolation_error'):
+                 'costate_error', 'torque_interpolation_error', *EXECUTION_FIELDS,
+                 *ROBUSTNESS_FIELDS):
         setattr(report, name, float('inf'))
     return report
 
@@ -180,7 +193,7 @@ def add_warnings(report: PlanReport, warnings: Sequence[PlanWarning]) -> None:
 
 
 def add_reference(report: PlanReport, plan: Plan, reference: SampledPlan) -> None:
-    """Add the peaks of the sampled plan to a report."""
+    """Add to a report what the samples of a plan show."""
     most = peaks(plan, reference.samples)
     limited = np.isfinite([joint.motor.no_load_speed for joint in plan.arm.joints]).any()
     report.peak_torques = most.torques.tolist()
@@ -188,6 +201,23 @@ def add_reference(report: PlanReport, plan: Plan, reference: SampledPlan) -> Non
     report.peak_speeds = most.speeds.tolist()
     report.peak_speed_shares = most.speed_shares.tolist() if limited else []
     report.torque_interpolation_error = reference.torque_error
+    add_execution(report, reference)
+    if reference.robustness is not None:
+        add_warnings(report, [*plan.warnings, *robustness_warnings(
+            reference.execution, reference.robustness, plan.arm.reach)])
+
+
+def add_execution(report: PlanReport, reference: SampledPlan) -> None:
+    """Add to a report what a controller makes of the samples of a plan, also on other arms."""
+    certificate, controller = reference.execution, reference.execution.controller
+    for name, own in EXECUTION_FIELDS.items():
+        setattr(report, name, float(getattr(certificate, own)))
+    for name, own in ROBUSTNESS_FIELDS.items() if reference.robustness else ():
+        setattr(report, name, float(getattr(reference.robustness, own)))
+    report.controller_rate, report.effort_hold = controller.rate, controller.hold.value
+    report.controller_stiffness = controller.gains.stiffness.tolist()
+    report.controller_damping = controller.gains.damping.tolist()
+    report.controller_period = reference.controller_period
 
 
 def duration_message(nanoseconds: int) -> Duration:
@@ -209,7 +239,7 @@ def joint_trajectory(reference: SampledPlan, joint_names: Sequence[str]) -> Join
             time_from_start=duration_message(time), positions=samples.coordinates[k, :n].tolist(),
             velocities=samples.rates[k, :n].tolist(),
             accelerations=samples.accelerations[k, :n].tolist(),
-            effort=samples.torques[k].tolist())
+            effort=reference.efforts[k].tolist())
         for k, time in enumerate(reference.times_ns)]
     return JointTrajectory(joint_names=list(joint_names), points=points)
 

@@ -6,6 +6,7 @@ import sys
 from typing import Any
 
 from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.planning.robustness import prepare_robustness
 from flex_planner.ros.messages.markers import motion_markers
 from flex_planner.ros.messages.plans import duration_seconds
 from flex_planner.ros.planner.diagnostics import Diagnostics, Record
@@ -79,6 +80,7 @@ class PlannerNode(Node):  # type: ignore[misc]
                                    f'{self._settings.map_store}')
         self._planner = RequestPlanner(
             ArmModel(arm), OutcomeRecorder(arm, self.get_fully_qualified_name()), starts)
+        prepare_robustness(arm)
         self._queue = RequestQueue(self._settings.queue_length)
         self._joints = self.create_publisher(JointTrajectory, '~/joint_trajectory', LATCHED)
         self._flexible = self.create_publisher(

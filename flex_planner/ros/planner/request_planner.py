@@ -15,7 +15,8 @@ from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_kind
-from flex_planner.planning.sampling import sample_plan
+from flex_planner.planning.robustness import assess_robustness
+from flex_planner.planning.sampling import judge_execution, sample_plan
 from flex_planner.planning.strategies.initial_guesses import WARM_START
 from flex_planner.ros.messages.payload_searches import (
     report_from_search,
@@ -24,12 +25,14 @@ from flex_planner.ros.messages.payload_searches import (
     search_without_result,
 )
 from flex_planner.ros.messages.plans import (
+    add_execution,
     duration_message,
     error_code,
     objectives_from_message,
     planning_time_limit,
     report_from_plan,
     report_trajectory,
+    STATUS_CODES,
     STOP_CODES,
     task_from_message,
 )
@@ -188,6 +191,13 @@ def _outcome(report: PlanReport, plan: Plan | None, settings: PlannerSettings,
     if plan is None or report.error_code != PlanReport.NONE:
         return Outcome(report=report, trajectory=FlexibleTrajectory(), plan=plan)
     reference = sample_plan(plan, settings.sampling(), monitor)
+    judged = judge_execution(plan, reference)
+    if not judged.solved:
+        add_execution(report, reference)
+        report.error_code = STATUS_CODES[judged.status]
+        report.error_msg = f'{judged.status.value}: {judged.message}'
+        return Outcome(report=report, trajectory=FlexibleTrajectory(), plan=judged)
+    reference = replace(reference, robustness=assess_robustness(plan, reference, monitor))
     trajectory = report_trajectory(report, plan, reference, settings)
     broken = trajectory_violations(trajectory.joint_trajectory, settings.joint_names)
     if broken:

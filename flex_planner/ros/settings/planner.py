@@ -10,10 +10,20 @@ from flex_planner.arms.arm import Arm
 from flex_planner.base.errors import InvalidSizeError, InvalidValueError
 from flex_planner.base.validation import vector
 from flex_planner.collocation import Solver, SolverSettings
+from flex_planner.control.default_gains import default_gains
+from flex_planner.control.joint_controller import (
+    EffortHold,
+    Gains,
+    JointController,
+    MAX_RATE,
+    MIN_RATE,
+)
+from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.optimal_control.task import MAX_PAYLOAD
 from flex_planner.planning.kinds.effort import SearchEffort
-from flex_planner.planning.sampling import SamplingSettings
+from flex_planner.planning.sampling import MAX_PERIOD, SamplingSettings
 from flex_planner.ros.runtime.parameters import parameter_field
+import numpy as np
 
 # of the largest payload [kg]
 MIN_ACCURACY, MAX_ACCURACY = 1e-6, 1e3
@@ -72,6 +82,20 @@ class PlannerSettings:
     torque_tolerance: float = parameter_field(
         0.02, 'Largest error of linear interpolation of the torque between the samples [N m].',
         lowest=1e-6, highest=1e6)
+    controller_rate: float = parameter_field(
+        1000.0, 'Rate of the joint controller that published trajectories are for [Hz].',
+        lowest=MIN_RATE, highest=MAX_RATE)
+    effort_hold: str = parameter_field(
+        EffortHold.END.value, 'Effort that it applies from one update to the next: that of the '
+        'end of the time between (joint_trajectory_controller), start, middle, or linear.')
+    controller_stiffness: list[float] = parameter_field(
+        [100.0], 'Proportional gain of its PD, one entry per joint [N m/rad].')
+    controller_damping: list[float] = parameter_field(
+        [10.0], 'Derivative gain of its PD, one entry per joint [N m s/rad].')
+    controller_period: float = parameter_field(
+        -1.0, 'Efforts are shifted by half this time, so that their mean is right where they are '
+        'held for it; -1: 1 / controller_rate, 0: not at all [s].', lowest=-1.0,
+        highest=MAX_PERIOD)
     reference_rate: float = parameter_field(
         100.0, 'Rate of the states that are streamed along a published plan [Hz].', lowest=1.0,
         highest=1000.0)
@@ -91,9 +115,15 @@ class PlannerSettings:
     def __post_init__(self) -> None:
         if self.elbow not in (-1, 1):
             raise InvalidValueError('elbow', self.elbow, '+1 or -1')
-        vector('effort_weights', self.effort_weights, len(self.joint_names), above=0)
+        count = len(self.joint_names)
+        vector('effort_weights', self.effort_weights, count, above=0)
+        for name in ('controller_stiffness', 'controller_damping'):
+            vector(name, getattr(self, name), count, at_least=0)
         if len(set(self.joint_names)) != len(self.joint_names) or '' in self.joint_names:
             raise InvalidValueError('joint_names', self.joint_names, 'different names')
+        if -1 < self.controller_period < 0:
+            raise InvalidValueError('controller_period', self.controller_period,
+                                    f'-1, or from 0 to {MAX_PERIOD:g} s')
         if 0 < self.max_recording_size < MIN_RECORDING_SIZE:
             raise InvalidValueError('max_recording_size', self.max_recording_size,
                                     f'0 or at least {MIN_RECORDING_SIZE} bytes')
@@ -105,7 +135,10 @@ class PlannerSettings:
     def for_arm(cls, arm: Arm) -> PlannerSettings:
         """Return the defaults for an arm."""
         names = [f'joint{i}' for i in range(1, arm.n_joints + 1)]
-        return replace(cls(), joint_names=names, effort_weights=[1.0] * arm.n_joints)
+        gains = default_gains(ArmDynamics.of(arm))
+        return replace(cls(), joint_names=names, effort_weights=[1.0] * arm.n_joints,
+                       controller_stiffness=gains.stiffness.tolist(),
+                       controller_damping=gains.damping.tolist())
 
     def check_joints(self, count: int) -> None:
         """Raise InvalidSizeError unless there is a name for each of the arm's joints."""
@@ -121,8 +154,23 @@ class PlannerSettings:
 
     def sampling(self) -> SamplingSettings:
         """Return the settings of the sampling of trajectories."""
-        return SamplingSettings(longest_step=self.sampling_step,
-                                torque_tolerance=self.torque_tolerance)
+        period = None if self.controller_period < 0 else self.controller_period
+        return SamplingSettings(
+            longest_step=self.sampling_step, torque_tolerance=self.torque_tolerance,
+            controller=self.controller(), controller_period=period)
+
+    def with_controller(self, controller: JointController) -> PlannerSettings:
+        """Return the settings for another joint controller."""
+        return replace(self, controller_rate=controller.rate, effort_hold=controller.hold.value,
+                       controller_stiffness=controller.gains.stiffness.tolist(),
+                       controller_damping=controller.gains.damping.tolist())
+
+    def controller(self) -> JointController:
+        """Return the joint controller that trajectories are for."""
+        gains = Gains(stiffness=np.asarray(self.controller_stiffness),
+                      damping=np.asarray(self.controller_damping))
+        return JointController(gains=gains, rate=self.controller_rate,
+                               hold=EffortHold.named(self.effort_hold))
 
     def output_folder(self) -> Path:
         """Return the folder of the recordings."""

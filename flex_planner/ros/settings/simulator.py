@@ -6,8 +6,11 @@ from dataclasses import dataclass, replace
 
 from flex_planner.arms.arm import Arm
 from flex_planner.base.validation import vector
+from flex_planner.control.default_gains import default_gains
+from flex_planner.control.joint_controller import EffortHold, Gains, MAX_RATE, MIN_RATE
+from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.ros.runtime.parameters import parameter_field
-from flex_planner.simulation.joint_control import Disturbance, Encoder, Gains, MAX_RATE
+from flex_planner.simulation.joint_control import Disturbance, Encoder
 from flex_planner.simulation.mismatch import AS_GIVEN, Mismatch
 from flex_planner.simulation.plant import Control
 import numpy as np
@@ -53,10 +56,14 @@ class SimulatorSettings:
     feedforward: bool = parameter_field(
         True, 'Whether the torques of a trajectory are applied; if not, PD alone moves the arm.',
         read_only=True)
+    effort_hold: str = parameter_field(
+        EffortHold.END.value, 'Whose torque of the trajectory is applied from one update to the '
+        'next: that of its end, as joint_trajectory_controller does; start; middle.',
+        read_only=True)
     limit_torques: bool = parameter_field(
         True, 'Whether the motors have the limits of the arm file, eq. (15).', read_only=True)
     control_rate: float = parameter_field(
-        1000.0, 'Rate of the simulated controller [Hz].', lowest=10.0, highest=MAX_RATE,
+        1000.0, 'Rate of the simulated controller [Hz].', lowest=MIN_RATE, highest=MAX_RATE,
         read_only=True)
     encoder_rate: float = parameter_field(
         0.0, 'Rate at which the joints are measured [Hz]; 0: that of the controller.',
@@ -97,10 +104,10 @@ class SimulatorSettings:
     @classmethod
     def for_arm(cls, arm: Arm) -> SimulatorSettings:
         """Return the defaults for an arm."""
-        n = arm.n_joints
+        n, gains = arm.n_joints, default_gains(ArmDynamics.of(arm))
         return replace(cls(), joint_names=[f'joint{i}' for i in range(1, n + 1)],
-                       initial_positions=[0.0] * n, stiffness=[100.0] * n, damping=[10.0] * n,
-                       added_friction=[0.0] * n)
+                       initial_positions=[0.0] * n, stiffness=gains.stiffness.tolist(),
+                       damping=gains.damping.tolist(), added_friction=[0.0] * n)
 
     @property
     def mismatch(self) -> Mismatch:
@@ -113,7 +120,8 @@ class SimulatorSettings:
         """Return the control of the joints."""
         return Control(
             gains=Gains(stiffness=np.asarray(self.stiffness), damping=np.asarray(self.damping)),
-            rate=self.control_rate, feedforward=self.feedforward,
+            rate=self.control_rate, hold=EffortHold.named(self.effort_hold),
+            feedforward=self.feedforward,
             limit_torques=self.limit_torques,
             encoder=Encoder(rate=self.encoder_rate, resolution=self.encoder_resolution,
                             differentiates=self.encoder_differences),

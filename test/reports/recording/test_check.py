@@ -11,7 +11,6 @@ from typing import Any
 from flex_planner.base.errors import RecordingError
 from flex_planner.base.progress import Monitor, StoppedError
 from flex_planner.cli import main
-from flex_planner.dynamics.integration import integrate, LinearTorque, simulate
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.recording import (
     definition_folder,
@@ -59,10 +58,12 @@ def test_recorded_plans_pass_their_check(name: str, model: str,
     check = check_motion(recording, request.getfixturevalue(model))
     assert check.passed
     found = {finding.name: finding for finding in check.findings}
-    # of linear interpolation between samples, whose torques differ by up to 0.02 N m
-    assert found['tip error at the end'].value < 1e-4
-    assert found['torques against eq. (14)'].value < 1e-9
-    assert found['boundary error (eq. 17)'].recorded == recording.report.boundary_error
+    # the recorded motion is replayed exactly as it was certified
+    assert found['executed tip error'].value == recording.report.executed_tip_error < 1e-5
+    assert found['executed tip error'].recorded == recording.report.executed_tip_error
+    assert found['difference from the certificate'].value == 0
+    # of states and costates between the points, where efforts are those of half a period before
+    assert found['torques against eq. (14)'].value < 1e-3
 
 
 @pytest.fixture(scope='module')
@@ -109,19 +110,22 @@ def test_motion_from_another_state_is_found_out(bent: RecordedRequest, field: st
 
 @pytest.mark.parametrize(('change', 'expected'), [
     (lambda motion: {'torques': 1.02 * motion.torques},
-     {'tip error at the end', 'largest tip deviation', 'torques against eq. (14)'}),
+     {'difference from the certificate', 'torques against eq. (14)'}),
     (lambda motion: {'torques': 3 * motion.torques},
-     {'tip error at the end', 'largest tip deviation', 'torques against eq. (14)',
-      'boundary error (eq. 17)', 'torque beyond its bounds'}),
+     {'difference from the certificate', 'largest tip deviation', 'torques against eq. (14)',
+      'largest joint deviation', 'torque beyond its bounds'}),
     (lambda motion: {'payload_mass': 1.0},
-     {'tip error at the end', 'largest tip deviation', 'torques against eq. (14)'}),
-    (lambda motion: {'tip': motion.tip + 0.01}, {'tip error at the end', 'largest tip deviation'}),
-    (lambda motion: {'rates': 1.02 * motion.rates}, {'largest joint deviation'}),
+     {'difference from the certificate', 'torques against eq. (14)'}),
+    (lambda motion: {'tip': motion.tip + 0.01}, {'executed tip error', 'largest tip deviation'}),
+    (lambda motion: {'rates': 1.02 * motion.rates}, {'difference from the certificate'}),
+    (lambda motion: {'accelerations': 1.02 * motion.accelerations},
+     {'difference from the certificate'}),
+    (lambda motion: {'times': 1.001 * motion.times}, {'difference from the certificate'}),
     (lambda motion: {'velocity_costates': 0.9 * motion.velocity_costates},
      {'torques against eq. (14)', 'Hamiltonian drift'}),
     (lambda motion: {'torques': np.full_like(motion.torques, 1e200)}, {
-        'tip error at the end', 'largest tip deviation', 'torques against eq. (14)',
-        'boundary error (eq. 17)', 'torque beyond its bounds'}),
+        'executed tip error', 'largest tip deviation', 'torques against eq. (14)',
+        'torque beyond its bounds'}),
     (lambda motion: {'rates': motion.rates + 1e-3}, {
         'deviation from rest, start', 'deviation from rest, goal'})])
 def test_every_falsified_plan_is_found_out(request_of_plan: RecordedRequest, ei50_model: ArmModel,
@@ -141,20 +145,27 @@ def test_plan_of_another_task_is_found_out(request_of_plan: RecordedRequest,
         request_of_plan.task.goal_point = original
 
 
-def test_resimulation_agrees_with_an_integrator_of_another_kind(
-        ei50_model: ArmModel, request_of_plan: RecordedRequest) -> None:
-    motion, p = request_of_plan.motion, request_of_plan.parameters.physical
-    assert motion is not None
-    times = np.linspace(0, 0.1, 5)
-    torques = np.array([np.interp(times, motion.times, column) for column in motion.torques.T]).T
-    start = np.concatenate([motion.coordinates[0], motion.rates[0]])
-    ours = integrate(ei50_model, p, start, LinearTorque(times, torques), rtol=1e-10, atol=1e-12)
-    state = start
-    for k, length in enumerate(np.diff(times)):
-        slope = (torques[k + 1] - torques[k]) / length
-        state = simulate(ei50_model, p, state, lambda t, u=torques[k], slope=slope: u + t * slope,
-                         length, rtol=1e-10, atol=1e-12)
-    assert np.abs(ours[-1] - state).max() < 1e-9
+def test_effort_shifted_as_the_recording_says_is_that_of_eq_14(
+        request_of_plan: RecordedRequest, ei50_model: ArmModel) -> None:
+    period = request_of_plan.report.controller_period
+    assert period == 1e-3
+    request_of_plan.report.controller_period = 0.0
+    try:
+        assert failed_findings(request_of_plan, ei50_model) == {'torques against eq. (14)'}
+    finally:
+        request_of_plan.report.controller_period = period
+
+
+def test_older_recording_is_checked_with_linear_efforts(request_of_plan: RecordedRequest,
+                                                        ei50_model: ArmModel) -> None:
+    rate, request_of_plan.report.controller_rate = request_of_plan.report.controller_rate, 0.0
+    try:
+        check = check_motion(request_of_plan, ei50_model)
+    finally:
+        request_of_plan.report.controller_rate = rate
+    names = [finding.name for finding in check.findings]
+    assert 'executed tip error' in names
+    assert 'difference from the certificate' not in names
 
 
 def test_check_obeys_its_monitor_and_needs_a_motion(request_of_plan: RecordedRequest,
@@ -176,5 +187,6 @@ def test_falsified_recording_fails_on_the_command_line(plan: Path, tmp_path: Pat
             recording.write(entry.topic, entry.message, entry.log_time_ns)
     page = tmp_path / 'forged.html'
     assert main(['report', str(recording.path), '--check', '--output', str(page)]) == 1
-    assert 'the check of the recording FAILED (tip error at the end' in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert 'the check of the recording FAILED (difference from the certificate' in told
     assert 'class="verdict failed"' in page.read_text()

@@ -88,6 +88,22 @@ def test_plots_show_the_recorded_numbers(request_of_plan: RecordedRequest) -> No
         f'{joint} {end}' for end in ('lowest', 'highest') for joint in ('joint1', 'joint2')]
 
 
+def test_page_tells_what_a_controller_makes_of_the_trajectory(
+        request_of_plan: RecordedRequest) -> None:
+    tables = {table['title']: dict(table['rows']) for table in Page(
+        report_page(request_of_plan)).data['tables'] if not table['columns']}
+    carried = tables['Published trajectory, carried out']
+    assert carried['published trajectory'].endswith('at 1000 Hz, effort_hold end')
+    assert carried['  executed tip error'].endswith(' mm')
+    others = tables['Residual vibration with feedback if ...']
+    assert list(others) == ['2 more modes per link', 'stiffness +-10%', 'payload +-10%',
+                            'nothing differs']
+    found = request_of_plan.report.vibration_if_stiffness_differs
+    assert others['stiffness +-10%'] == f'{found * 1e3:.2g} mm'
+    assert 'residual vibration if stiffness differs' in tables['Warnings'][
+        'sensitive to stiffness']
+
+
 def test_plots_of_searches_show_front_and_trials(search: Path, trials: Path) -> None:
     message = RecordedRequest.read(search).search
     front = drawn(Page(report_page(RecordedRequest.read(search))))['front']

@@ -25,6 +25,7 @@ from flex_planner.collocation import Solver, SolverSettings
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_path import plan_path
+from flex_planner.planning.robustness import assess_robustness
 from flex_planner.planning.sampling import sample_plan, SampledPlan, SamplingSettings
 from flex_planner.planning.warnings import WarningKind
 from flex_planner.recording import definition_folder
@@ -308,6 +309,27 @@ def test_report_of_a_plan_repeats_its_numbers(plan: Plan, reference: SampledPlan
     assert all(0 < share < 1 for share in report.peak_torque_shares)
 
 
+def test_report_tells_what_a_controller_makes_of_the_trajectory(plan: Plan,
+                                                                reference: SampledPlan) -> None:
+    report, execution = report_from_plan(plan), reference.execution
+    robustness = assess_robustness(plan, reference)
+    add_reference(report, plan, replace(reference, robustness=robustness))
+    assert report.executed_tip_error == execution.tip_error < 1e-5
+    assert report.executed_residual_vibration == execution.residual_vibration
+    assert report.open_loop_tip_error == execution.open_loop_tip_error
+    assert report.open_loop_residual_vibration == execution.open_loop_residual_vibration
+    assert report.open_loop_amplification == execution.open_loop_amplification
+    assert report.vibration_if_more_modes == robustness.more_modes
+    assert report.vibration_if_stiffness_differs == robustness.stiffness_differs
+    assert report.vibration_if_payload_differs == robustness.payload_differs
+    assert report.feedback_growth == execution.feedback_growth < 0
+    assert report.feedback_growth_if_more_modes == robustness.more_modes_growth
+    assert (report.controller_rate, report.effort_hold) == (1000.0, 'end')
+    assert list(report.controller_stiffness) == [100.0, 100.0]
+    assert list(report.controller_damping) == [10.0, 10.0]
+    assert report.controller_period == 1e-3
+
+
 def test_speed_shares_are_left_out_without_a_speed_limit(ei50_arm: Arm, paper_task: Any) -> None:
     free = replace(ei50_arm, joints=(Joint(), Joint())).rigid()
     free_plan = plan_path(paper_task(free))
@@ -327,7 +349,7 @@ def test_messages_hold_the_samples(plan: Plan, reference: SampledPlan) -> None:
     assert [*point.positions, *bend.modal_displacements] == samples.coordinates[k].tolist()
     assert [*point.velocities, *bend.modal_rates] == samples.rates[k].tolist()
     assert point.accelerations.tolist() == samples.accelerations[k, :2].tolist()
-    assert point.effort.tolist() == samples.torques[k].tolist()
+    assert point.effort.tolist() == reference.efforts[k].tolist()
     assert bend.position_costates.tolist() == samples.position_costates[k].tolist()
     assert bend.velocity_costates.tolist() == samples.velocity_costates[k].tolist()
     assert (message.tip_path[k].x, message.tip_path[k].y) == tuple(samples.tip[k])

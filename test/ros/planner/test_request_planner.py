@@ -37,18 +37,34 @@ def test_stop_after_the_solve_is_reported_without_a_trajectory(
     assert not outcome.publishable
 
 
+def test_trajectory_that_cannot_be_carried_out_is_not_published(
+        worker: RequestPlanner, settings: PlannerSettings) -> None:
+    # the damping is held for 10 ms, in which it turns the speed of the joints round
+    slow = replace(settings, controller_rate=100.0, controller_damping=[1000.0, 1000.0])
+    outcome = worker.plan(task(), RequestState(settings=slow))
+    report = outcome.report
+    assert report.error_code == PlanReport.CERTIFICATE_FAILED
+    assert 'the trajectory cannot be carried out: executed tip error is' in report.error_msg
+    assert 'the PD of the joints (100, 100 N m/rad and 1000, 1000 N m s/rad at 100 Hz' in (
+        report.error_msg)
+    assert report.executed_tip_error > 5e-3
+    assert report.feedback_growth > 0
+    assert not outcome.trajectory.points
+    assert not outcome.publishable
+
+
 def test_recording_that_is_told_to_stop_leaves_nothing_and_is_not_published(
         worker: RequestPlanner, settings: PlannerSettings, tmp_path: Path,
         monkeypatch: pytest.MonkeyPatch) -> None:
-    told = []  # once the samples are made, everyone is told to stop
-    sample = request_planner.sample_plan
+    told = []  # once the samples are judged, everyone is told to stop
+    assess = request_planner.assess_robustness
 
-    def sampled(*arguments: Any) -> Any:
-        reference = sample(*arguments)
+    def assessed(*arguments: Any) -> Any:
+        robustness = assess(*arguments)
         told.append(True)
-        return reference
+        return robustness
 
-    monkeypatch.setattr(request_planner, 'sample_plan', sampled)
+    monkeypatch.setattr(request_planner, 'assess_robustness', assessed)
     outcome = worker.plan(task(), RequestState(settings=settings, stopping=lambda: bool(told)))
     assert outcome.report.error_code == PlanReport.RECORDING_FAILED
     assert 'writing stopped after 0 of' in outcome.report.error_msg

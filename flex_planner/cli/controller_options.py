@@ -1,0 +1,73 @@
+"""Options that say which joint controller a trajectory is for."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+
+from flex_planner.arms.arm import Arm
+from flex_planner.base.validation import number, vector
+from flex_planner.cli.options import numbers
+from flex_planner.control.default_gains import default_gains
+from flex_planner.control.joint_controller import (
+    EffortHold,
+    Gains,
+    JointController,
+    MAX_RATE,
+    MIN_RATE,
+)
+from flex_planner.dynamics.arm_dynamics import ArmDynamics
+from flex_planner.planning.sampling import MAX_PERIOD, SamplingSettings
+
+
+def add_controller(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the joint controller."""
+    group = parser.add_argument_group(
+        'joint controller', 'that the trajectory is for, and that carries it out on the model '
+        'before it is published')
+    add = group.add_argument
+    add('--controller-rate', type=float, default=1000.0, metavar='HZ',
+        help='rate of its updates (default: %(default)g)')
+    add('--effort-hold', choices=[hold.value for hold in EffortHold], default='end',
+        help='effort that it applies between two updates: end, as joint_trajectory_controller '
+        'does (default), start, middle, or linear')
+    add('--controller-stiffness', metavar='P,P,...', help='proportional gains [N m/rad] '
+        '(default: 100 for each joint, or what suits the arm)')
+    add('--controller-damping', metavar='D,D,...', help='derivative gains [N m s/rad] '
+        '(default: 10 for each joint, or what suits the arm)')
+    add('--controller-period', type=float, metavar='S', help='shift the efforts by half this '
+        'time, in which they are held, so that their mean is right (default: 1 / rate; 0: not '
+        'at all)')
+
+
+def sampling_settings(options: argparse.Namespace, arm: Arm) -> SamplingSettings:
+    """
+    Return the sampling that a command line wants, with defaults where it has no such options.
+
+    Raises
+    ------
+    InvalidValueError
+        Naming the option.
+
+    """
+    if not hasattr(options, 'controller_rate'):
+        return SamplingSettings()
+    rate = number('--controller-rate', options.controller_rate, at_least=MIN_RATE,
+                  at_most=MAX_RATE, unit='Hz')
+    period = options.controller_period
+    if period is not None:
+        period = number('--controller-period', period, at_least=0, at_most=MAX_PERIOD, unit='s')
+    controller = JointController(gains=_gains(options, arm, rate), rate=rate,
+                                 hold=EffortHold.named(options.effort_hold))
+    return SamplingSettings(controller=controller, controller_period=period)
+
+
+def _gains(options: argparse.Namespace, arm: Arm, rate: float) -> Gains:
+    """Return the gains that are given, and suitable ones where they are not."""
+    gains = default_gains(ArmDynamics.of(arm), rate)
+    for name in ('stiffness', 'damping'):
+        if (text := getattr(options, f'controller_{name}')) is not None:
+            option = f'--controller-{name}'
+            given = vector(option, numbers(option, text, arm.n_joints), arm.n_joints, at_least=0)
+            gains = replace(gains, **{name: given})
+    return gains

@@ -1,0 +1,188 @@
+"""
+What is left of a published motion on arms that are not quite the one that was planned for.
+
+Each of them carries the same trajectory out under the same joint controller: with two more modes
+per link, which torque jumps excite as much as those of the model; with links softer and stiffer,
+and payloads lighter and heavier, by a tenth.
+
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from flex_planner.arms.arm import Arm, MAX_MODES
+from flex_planner.base.errors import NoEquilibriumError
+from flex_planner.base.progress import Monitor
+from flex_planner.base.validation import Array
+from flex_planner.control.feedback_stability import feedback_growth
+from flex_planner.dynamics.arm_dynamics import ArmDynamics
+from flex_planner.dynamics.physical_parameters import PhysicalParameters
+from flex_planner.dynamics.statics import equilibrium
+from flex_planner.planning.execution import (
+    describe_controller,
+    Execution,
+    ExecutionCertificate,
+    Robustness,
+    UNSTABLE_GROWTH,
+)
+from flex_planner.planning.plan import Plan
+from flex_planner.planning.sampling import SampledPlan
+from flex_planner.planning.warnings import PlanWarning, WarningKind
+import numpy as np
+
+MORE_MODES = 2
+DIFFERENCE = 0.1
+# of the nominal vibration, and as a share of the reach: a vibration above both is told of
+_FAR_ABOVE, _NOTABLE = 10.0, 1e-4
+# growth of an error of the joints, above which efforts alone are said to be unstable
+_AMPLIFIED = 10.0
+_POSTURES = 5
+
+
+def assess_robustness(plan: Plan, sampled: SampledPlan,
+                      monitor: Monitor | None = None) -> Robustness:
+    """
+    Return what is left of a sampled plan on arms that are not quite that of the plan.
+
+    The dynamics of the arm with more modes are compiled the first time, which takes some tenths
+    of a second, see `prepare_robustness`.
+
+    Parameters
+    ----------
+    plan : Plan
+        With a solution.
+    sampled : SampledPlan
+        Its samples.
+    monitor : Monitor, optional
+        May stop it.
+
+    Raises
+    ------
+    StoppedError
+        If the monitor stopped it.
+
+    """
+    execution = Execution.of(plan, sampled.execution.controller)
+    given = plan.problem.parameters
+    payload = given.payload_mass or given.payload_inertia
+
+    def worst(*changed: PhysicalParameters) -> float:
+        return max(_vibration(execution, execution.dynamics, parameters, sampled, monitor)
+                   for parameters in changed)
+
+    nominal = sampled.execution.residual_vibration
+    more, growth = nominal, sampled.execution.feedback_growth
+    if plan.arm.n_modes:
+        other = replace(execution, dynamics=ArmDynamics.of(with_more_modes(plan.arm)))
+        more = _vibration(execution, other.dynamics, _physical(given), sampled, monitor)
+        positions = plan.uniform_samples(_POSTURES).coordinates[:, :plan.arm.n_joints]
+        growth = feedback_growth(other.arm, positions)
+    return Robustness(
+        nominal=nominal, more_modes=more, more_modes_growth=growth,
+        stiffness_differs=worst(*_scaled(given, rigidity=True)) if plan.arm.n_modes else nominal,
+        payload_differs=worst(*_scaled(given, rigidity=False)) if payload else nominal)
+
+
+def prepare_robustness(arm: Arm) -> None:
+    """Compile what `assess_robustness` takes for an arm, or load it."""
+    if arm.n_modes:
+        ArmDynamics.of(with_more_modes(arm))
+
+
+def with_more_modes(arm: Arm) -> Arm:
+    """Return an arm whose flexible links have two more modes, as far as links may have them."""
+    return replace(arm, links=tuple(
+        replace(link, modes=min(link.modes + MORE_MODES, MAX_MODES)) if link.modes else link
+        for link in arm.links))
+
+
+def robustness_warnings(certificate: ExecutionCertificate, robustness: Robustness,
+                        reach: float) -> list[PlanWarning]:
+    """
+    Return what a user should know before an arm carries a motion out.
+
+    Parameters
+    ----------
+    certificate : ExecutionCertificate
+        Of the trajectory.
+    robustness : Robustness
+        Of it.
+    reach : float
+        Of the arm [m].
+
+    """
+    found = []
+    if certificate.open_loop_amplification > _AMPLIFIED:
+        found.append(PlanWarning(kind=WarningKind.OPEN_LOOP_UNSTABLE, sentence=(
+            'without feedback the motion is unstable: an error '
+            'of a joint at the start grows to '
+            f'{certificate.open_loop_amplification:.2g} times its size until the arrival')))
+    if robustness.more_modes_growth > UNSTABLE_GROWTH >= certificate.feedback_growth:
+        found.append(PlanWarning(kind=WarningKind.FEEDBACK_UNSTABLE, sentence=(
+            f'with {MORE_MODES} more modes per link the PD of the '
+            f'joints is unstable ({describe_controller(certificate.controller)}): choose lower '
+            'gains or a faster controller')))
+    changes = {
+        WarningKind.SENSITIVE_TO_MODES: (robustness.more_modes,
+                                         f'links have {MORE_MODES} more modes'),
+        WarningKind.SENSITIVE_TO_STIFFNESS: (robustness.stiffness_differs,
+                                             f'stiffness differs by {DIFFERENCE:.0%}'),
+        WarningKind.SENSITIVE_TO_PAYLOAD: (robustness.payload_differs,
+                                           f'the payload differs by {DIFFERENCE:.0%}')}
+    most = max(_FAR_ABOVE * robustness.nominal, _NOTABLE * reach)
+    return found + [
+        PlanWarning(kind=kind, value=vibration, sentence=(
+            f'residual vibration if {change}: {_millimetres(vibration)}, but '
+            f'{_millimetres(robustness.nominal)} as modelled'))
+        for kind, (vibration, change) in changes.items() if vibration > most]
+
+
+def _millimetres(length: float) -> str:
+    """Return a length in words."""
+    return f'{length * 1e3:.2g} mm' if np.isfinite(length) else 'without bound'
+
+
+def _scaled(given: PhysicalParameters, *, rigidity: bool) -> list[PhysicalParameters]:
+    """Return the parameters with less and with more of the stiffness, or of the payload."""
+    factors = 1 - DIFFERENCE, 1 + DIFFERENCE
+    plain = _physical(given)
+    if rigidity:
+        return [replace(plain, rigidity=given.rigidity * factor) for factor in factors]
+    return [replace(plain, payload_mass=given.payload_mass * factor,
+                    payload_inertia=given.payload_inertia * factor) for factor in factors]
+
+
+def _physical(given: PhysicalParameters) -> PhysicalParameters:
+    """Return the part of a plan's parameters that is about the arm."""
+    return PhysicalParameters(payload_mass=given.payload_mass, rigidity=given.rigidity,
+                              payload_inertia=given.payload_inertia)
+
+
+def _vibration(nominal: Execution, dynamics: ArmDynamics, parameters: PhysicalParameters,
+               sampled: SampledPlan, monitor: Monitor | None) -> float:
+    """Return the residual vibration of another arm that follows the trajectory [m]."""
+    try:
+        start = _start(nominal, dynamics, parameters)
+    except NoEquilibriumError:
+        return float(np.inf)
+    other = replace(nominal, dynamics=dynamics, parameters=parameters, start=start)
+    return other.vibration(other.arrive(sampled.reference, monitor))
+
+
+def _start(nominal: Execution, dynamics: ArmDynamics, parameters: PhysicalParameters) -> Array:
+    """Return where another arm starts: as far from its rest as the one that was planned for."""
+    planned, arm = nominal.dynamics.arm, dynamics.arm
+    angles = nominal.start[:planned.n_joints]
+    rest, _ = equilibrium(nominal.dynamics, angles, nominal.parameters)
+    other, _ = equilibrium(dynamics, angles, parameters)
+    start = np.concatenate([other, np.zeros_like(other)])
+    away = nominal.start - np.concatenate([rest, np.zeros_like(rest)])
+    for half in (0, 1):
+        own, theirs = half * planned.n_coordinates, half * arm.n_coordinates
+        start[theirs:theirs + arm.n_joints] += away[own:own + arm.n_joints]
+        for mine, its in zip(planned.modal_slices, arm.modal_slices, strict=True):
+            count = mine.stop - mine.start
+            start[theirs + its.start:theirs + its.start + count] += (
+                away[own + mine.start:own + mine.stop])
+    return start

@@ -1,0 +1,46 @@
+"""What a joint controller makes of a trajectory, as lines of text."""
+
+from __future__ import annotations
+
+from flex_planner.arms.arm import Arm
+from flex_planner.planning.execution import (
+    describe_controller,
+    ExecutionCertificate,
+    Robustness,
+)
+from flex_planner.planning.robustness import DIFFERENCE, MORE_MODES
+from flex_planner.reports.motion import Row
+import numpy as np
+
+
+def execution_rows(certificate: ExecutionCertificate) -> list[Row]:
+    """Return the certificate of a trajectory."""
+    controller = describe_controller(certificate.controller)
+    return [
+        ('published trajectory', f'carried out with {controller}'),
+        ('  executed tip error', millimetres(certificate.tip_error)),
+        ('  executed residual vibration', millimetres(certificate.residual_vibration)),
+        ('  without feedback', f'tip error {millimetres(certificate.open_loop_tip_error)}, '
+         f'residual vibration {millimetres(certificate.open_loop_residual_vibration)}; a small '
+         f'error at the start grows to {certificate.open_loop_amplification:.2g} times its size')]
+
+
+def robustness_rows(robustness: Robustness, arm: Arm) -> list[Row]:
+    """Return the residual vibration on other arms: of a rigid arm there is none."""
+    if not arm.n_modes:
+        return []
+    return [('residual vibration if', 'the arm is not quite the one of the plan, with feedback'),
+            *((f'  {change}', length) for change, length in vibrations(robustness))]
+
+
+def vibrations(robustness: Robustness) -> list[Row]:
+    """Return what differs, and the residual vibration then."""
+    return [(f'{MORE_MODES} more modes per link', millimetres(robustness.more_modes)),
+            (f'stiffness +-{DIFFERENCE:.0%}', millimetres(robustness.stiffness_differs)),
+            (f'payload +-{DIFFERENCE:.0%}', millimetres(robustness.payload_differs)),
+            ('nothing differs', millimetres(robustness.nominal))]
+
+
+def millimetres(length: float) -> str:
+    """Return a length [m] in words."""
+    return f'{length * 1e3:.2g} mm' if np.isfinite(length) else 'without bound'

@@ -1,0 +1,62 @@
+"""The joint controller of a recording, and what it made of the trajectory when it was planned."""
+
+from __future__ import annotations
+
+from flex_planner.control.default_gains import default_gains
+from flex_planner.control.joint_controller import EffortHold, Gains, JointController
+from flex_planner.dynamics.arm_dynamics import ArmDynamics
+from flex_planner.planning.execution import ExecutionCertificate, Robustness
+from flex_planner.reports.recording.contents import RecordedRequest
+import numpy as np
+
+
+def recorded_controller(request: RecordedRequest) -> JointController:
+    """Return the joint controller that the plan was published for."""
+    report = request.report
+    if not _is_told(request):
+        return JointController(gains=default_gains(ArmDynamics.of(request.arm)),
+                               hold=EffortHold.LINEAR)
+    gains = Gains(stiffness=np.asarray(report.controller_stiffness),
+                  damping=np.asarray(report.controller_damping))
+    return JointController(gains=gains, rate=float(report.controller_rate),
+                           hold=EffortHold.named(report.effort_hold))
+
+
+def effort_delay(request: RecordedRequest) -> float:
+    """Return by how much efforts come later than the planned torques [s]."""
+    if not _is_told(request):
+        return 0.0
+    half = float(request.report.controller_period) / 2
+    return -half if request.report.effort_hold == EffortHold.START.value else half
+
+
+def recorded_execution(request: RecordedRequest) -> ExecutionCertificate | None:
+    """Return the certificate of the trajectory; None in older recordings, which have none."""
+    if not _is_told(request):
+        return None
+    report = request.report
+    return ExecutionCertificate(
+        controller=recorded_controller(request), tip_error=float(report.executed_tip_error),
+        residual_vibration=float(report.executed_residual_vibration),
+        open_loop_tip_error=float(report.open_loop_tip_error),
+        open_loop_residual_vibration=float(report.open_loop_residual_vibration),
+        open_loop_amplification=float(report.open_loop_amplification),
+        feedback_growth=float(report.feedback_growth))
+
+
+def recorded_robustness(request: RecordedRequest) -> Robustness | None:
+    """Return the figures of other arms; None where nobody has found them."""
+    report = request.report
+    if not _is_told(request) or not np.isfinite(report.feedback_growth_if_more_modes):
+        return None
+    return Robustness(
+        nominal=float(report.executed_residual_vibration),
+        more_modes=float(report.vibration_if_more_modes),
+        stiffness_differs=float(report.vibration_if_stiffness_differs),
+        payload_differs=float(report.vibration_if_payload_differs),
+        more_modes_growth=float(report.feedback_growth_if_more_modes))
+
+
+def _is_told(request: RecordedRequest) -> bool:
+    """Return whether the recording knows of a controller, as older ones do not."""
+    return bool(getattr(request.report, 'controller_rate', 0.0))

@@ -1,0 +1,69 @@
+"""Whether the efforts of a recording are those of an optimal motion, by its costates."""
+
+from __future__ import annotations
+
+from flex_planner.base.validation import Array
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.parameters import Parameters
+from flex_planner.optimal_control.torque_limits import TorqueLimits
+from flex_planner.reports.recording.contents import RecordedMotion
+from flex_planner.reports.recording.findings import CheckLimits, Finding
+import numpy as np
+
+_TINY = float(np.finfo(float).tiny)
+
+
+def optimality_findings(model: ArmModel, motion: RecordedMotion, parameters: Parameters,
+                        limits: CheckLimits, delay: float,
+                        interpolation_error: float) -> list[Finding]:
+    """
+    Return the violation of the torque bounds, and the errors of efforts and Hamiltonian.
+
+    Parameters
+    ----------
+    model : ArmModel
+        Of the recorded arm.
+    motion : RecordedMotion
+        The motion.
+    parameters : Parameters
+        Of its plan.
+    limits : CheckLimits
+        What must be kept.
+    delay : float
+        By which efforts come later than the planned torques [s].
+    interpolation_error : float
+        Of the efforts, as the report has it [N m].
+
+    """
+    # the last sample holds the arm, it is not of the extremal
+    z, efforts = motion.extended_states[:-1], motion.torques[:-1]
+    controls = model.controls(z, parameters.stack())
+    powers = np.abs(motion.position_costates * motion.rates).max()
+    scale = max(float(controls.cost_rate.max()), float(powers), _TINY)
+    share, applied, more = limits.torque_error, z, 0.0
+    if delay:
+        share, more = limits.shifted_torque_error, interpolation_error
+        applied = _shifted(model, motion, parameters, delay)
+    n, n_t = model.arm.n_joints, model.arm.n_coordinates
+    lower, upper = TorqueLimits.of(model.arm).bounds(applied[:, n_t:n_t + n])
+    beyond = np.abs(efforts) - np.where(efforts >= 0, upper, -lower)
+    expected = model.controls(applied, parameters.stack()).torque
+    size = share * max(float(np.abs(motion.torques).max()), _TINY) + more
+    return [
+        Finding(name='torque beyond its bounds', unit='N m', limit=size,
+                value=max(float(beyond.max()), 0.0)),
+        Finding(name='torques against eq. (14)', unit='N m', limit=size,
+                value=float(np.abs(expected - efforts).max())),
+        Finding(name='Hamiltonian drift', unit='', limit=limits.hamiltonian_drift,
+                value=float(np.ptp(controls.hamiltonian)) / scale)]
+
+
+def _shifted(model: ArmModel, motion: RecordedMotion, parameters: Parameters,
+             delay: float) -> Array:
+    """Return extended states at the times whose torques the efforts are, shape (k, 4 n_t)."""
+    from scipy.interpolate import CubicHermiteSpline  # see `ArmDynamics.prepare`
+
+    z, times = motion.extended_states[:-1], motion.times[:-1]
+    spline = CubicHermiteSpline(times, z, model.optimality(z, parameters.stack()))
+    states: Array = spline(np.clip(times - delay, 0, times[-1]))
+    return states
