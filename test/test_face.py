@@ -70,7 +70,7 @@ def test_names_are_loaded_when_they_are_used() -> None:
 def test_file_of_a_user_runs_and_is_strictly_typed(tmp_path: Path) -> None:
     file = tmp_path / 'mine.py'
     file.write_text(USER)
-    assert python(f'exec(open({str(file)!r}).read())') == '5.85 0.64 (2, 2)\n'
+    assert python(f'exec(open({str(file)!r}).read())') == '5.86 0.64 (2, 2)\n'
     mypy = pytest.importorskip('mypy.api')
     report, errors, code = mypy.run(['--strict', '--cache-dir', str(tmp_path / 'cache'),
                                      str(file)])

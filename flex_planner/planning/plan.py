@@ -41,8 +41,8 @@ class PlanStatus(Enum):
 
     SOLVED = 'solved and certified'
     NOT_CONVERGED = 'not converged, which does not show that the motion is impossible'
-    NOT_FOUND = 'no motion found, which does not show that there is none'
-    INFEASIBLE = 'impossible: a proof that holds for all motions is named'
+    NOT_FOUND = 'no motion found'
+    INFEASIBLE = 'impossible for every motion'
     CERTIFICATE_FAILED = 'converged, but the re-simulated motion misses its tolerances'
     LIMIT_VIOLATED = 'solved, but the motion leaves a limit of the arm on its way'
     BENT_TOO_FAR = 'solved, but links bend further than the model of the arm holds'

@@ -150,6 +150,8 @@ def _bracket(found: MaxPayload) -> str:
         return below
     if found.held:
         return f'{below}; {found.local_upper:.6g} kg cannot be held at the goal'
+    if found.trials:
+        return f'{below}; no solution at {found.local_upper:.6g} kg'
     return f'{below}; this kind of motion ends at {found.local_upper:.6g} kg'
 
 

@@ -182,7 +182,7 @@ def test_trajectory_that_cannot_be_carried_out_is_a_failure(tmp_path: Path) -> N
 
 
 def test_progress_is_a_line_per_phase(planned: Outcome, searched: Outcome) -> None:
-    for outcome, phase in ((planned, 'cold start'), (searched, 'payload at a rising price')):
+    for outcome, phase in ((planned, 'cold start'), (searched, 'kinds of motion, start 1 of 16')):
         lines = outcome.err.splitlines()
         assert all(re.fullmatch(r' *[\d.]+ s  .+', line) for line in lines)
         phases = [line.split(' s  ')[1] for line in lines]
@@ -232,7 +232,7 @@ def test_search_is_drawn_and_recorded(searched: Outcome, folder: Path) -> None:
 def test_payloads_tried_are_told_and_recorded(raised: Outcome) -> None:
     assert raised.code == 0
     assert raised.rows['method'] == 'payload raised step by step'
-    assert raised.rows['largest payload'] == '5.5 kg; 6 kg is too much'
+    assert raised.rows['largest payload'] == '5.5 kg; no solution at 6 kg'
     trials = [line.split() for line in raised.out.split('\n\n')[1].splitlines()[1:]]
     assert [line[1:4] for line in trials] == [
         ['5.500000', '0.500000', 'yes'], ['6.000000', '0.500000', 'no']]
@@ -298,13 +298,22 @@ def test_impossible_payload_is_a_failure_that_is_told_and_recorded(command: str,
                                                                    tmp_path: Path) -> None:
     outcome = run(command, 'korayem_rigid', *MOTION, '--payload', '7', '--output', str(tmp_path))
     assert outcome.code == 1
-    assert outcome.reason.startswith('flex-planner: impossible within the limits of the motors: ')
-    assert 'at most 5.855 kg' in outcome.reason
-    assert outcome.rows['status'] == 'impossible within the limits of the motors'
+    # the motors' power proves it from 14 W 8/9 (1 s)^3 / (0.5 m)^2 = 50 kg on; 7 kg is only not found
+    assert outcome.reason.startswith('flex-planner: no motion found: ')
+    assert re.search(r'the heaviest payload found in 1 s is 5\.8\d* kg', outcome.reason)
+    assert outcome.rows['status'] == 'no motion found'
     assert 'iterations' in outcome.rows['planned in']
     report = recorded(outcome.rows['recording'])['plan_report']
-    assert report.error_code == PlanReport.INFEASIBLE
+    assert report.error_code == PlanReport.NOT_FOUND
     assert not list(tmp_path.glob('*.png'))
+
+
+@pytest.mark.parametrize('command', ['plan', 'payload'])
+def test_payload_that_is_proved_impossible_is_refused_with_the_proof(command: str) -> None:
+    outcome = run(command, 'korayem_rigid', *MOTION, *DRY, '--payload', '100')
+    assert (outcome.code, outcome.rows['status']) == (1, 'impossible for every motion')
+    assert outcome.reason.startswith('flex-planner: impossible for every motion: the motors give')
+    assert outcome.reason.endswith('(POWER)')
 
 
 def test_time_limit_is_named_where_it_ends_a_search() -> None:

@@ -205,7 +205,7 @@ def test_turning_arm_takes_its_inertias_and_motors() -> None:
 
 
 def test_motion_that_cannot_be_planned_ends_the_run() -> None:
-    with pytest.raises(NoPlanError, match=r'rigid, 7 kg: .*5\.85'):
+    with pytest.raises(NoPlanError, match=r'rigid, 7 kg: .*5\.849 kg'):
         plan_certified(point_to_point(paper_arm(math.inf), 7.0))
 
 

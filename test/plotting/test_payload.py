@@ -20,7 +20,7 @@ def search(arm: Arm, method: PayloadMethod, **found: Any) -> MaxPayload:
     """Return a search, whether or not it would have gone like that."""
     task = Task(arm=arm, start_positions=[0, 1], goal_positions=[1, 1], duration=1.0)
     return MaxPayload(task=task, method=method, message='', **{
-        'status': PlanStatus.SOLVED, 'payload': 2.0, 'upper': 2.001, **found})
+        'status': PlanStatus.SOLVED, 'payload': 2.0, 'local_upper': 2.001, **found})
 
 
 def trials(*outcomes: tuple[float, bool, float]) -> tuple[PayloadTrial, ...]:
@@ -32,7 +32,7 @@ FRONT = PayloadFront(payloads=np.array([1.0, 1.9, 2.0]), efforts=np.array([1.0, 
                      prices=np.array([1.0, 20.0, 300.0]))
 MET = {'front': FRONT}
 TRIED = {'trials': trials((1, True, 1e-18), (2, True, 0.0), (3, False, np.inf), (2.5, False, 1))}
-FAILED = {'status': PlanStatus.NOT_CONVERGED, 'payload': 0.0, 'upper': np.inf}
+FAILED = {'status': PlanStatus.NOT_CONVERGED, 'payload': 0.0, 'local_upper': np.inf}
 
 
 @pytest.mark.parametrize(('method', 'found'), [

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from flex_planner.arms.arm import Arm
+from flex_planner.capacity.incremental import PayloadTrial
 from flex_planner.capacity.results import MaxPayload, PayloadMethod
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import PlanStatus
@@ -42,7 +43,9 @@ def test_failed_search_has_no_bracket(rigid_arm: Arm) -> None:
 
 
 def test_search_that_did_not_end_says_what_was_tried(rigid_arm: Arm) -> None:
-    found = search(rigid_arm, status=PlanStatus.NOT_CONVERGED, payload=2.0, local_upper=3.0)
+    found = search(rigid_arm, status=PlanStatus.NOT_CONVERGED, payload=2.0, local_upper=3.0,
+                   trials=(PayloadTrial(payload=3.0, step=1.0, solved=False, boundary_error=1.0,
+                                        result=None),))
     assert dict(payload_rows(found))['largest payload'] == '2 kg; no solution at 3 kg'
 
 
