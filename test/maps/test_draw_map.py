@@ -68,7 +68,7 @@ def result(of: Study, index: tuple[int, ...], outcome: Outcome) -> CellResult:
 
 def every_failure(index: tuple[int, ...], values: dict[str, float]) -> float | CellCode:
     if sum(index) % 3 == 0:
-        return FAILURES[(index[0] + 2 * index[1]) % len(FAILURES)]
+        return FAILURES[(index[0] + 2 * index[-1]) % len(FAILURES)]
     return value(index, values)
 
 
