@@ -194,8 +194,7 @@ class LimitSearch:
     def _explore(self, bare: MotionProblem, solver: Solver) -> Extremal | None:
         """Look for kinds of motion, and return the motion that the best one leads to."""
         self.starts = self._effort.starts
-        self.kinds = find_kinds(bare, self._parameter.unknown, self.starts,
-                                self._solver.monitor)
+        self.kinds = find_kinds(bare, self._parameter.unknown, self.starts, self._solver)
         self._announce()
         easiest = self._parameter.easiest(bare)
         return solve_best_kind(self._parameter, easiest, self.kinds, solver)

@@ -81,8 +81,9 @@ def _look_for_cheaper(problem: MotionProblem, attempt: Attempt, solver: Solver) 
 def _solve_in_any_time(problem: MotionProblem, solver: Solver, strategies: Sequence[Strategy],
                        ) -> tuple[MotionProblem, str, Attempt]:
     """Solve for the duration of the task or a longer one, then free it."""
-    quick = [strategy for strategy in strategies if strategy.quick] or list(strategies)
-    slow = [strategy for strategy in strategies if strategy not in quick]
+    useful = [_without_verdict(strategy) for strategy in strategies]
+    quick = [strategy for strategy in useful if strategy.quick] or useful
+    slow = [strategy for strategy in useful if strategy not in quick]
     strategy, attempt = _solve_first(problem, solver, quick)
     for factor in _GUESSES:
         longer = factor * problem.task.duration
@@ -103,6 +104,15 @@ def _solve_in_any_time(problem: MotionProblem, solver: Solver, strategies: Seque
         problem, result = free_duration(problem, attempt.result, solver)
         attempt = replace(attempt, result=result)
     return problem, strategy, attempt
+
+
+def _without_verdict(strategy: Strategy) -> Strategy:
+    """Return a strategy that says nothing against a task whose duration is but a guess."""
+    def attempt(problem: MotionProblem, solver: Solver) -> Attempt | None:
+        found = strategy.attempt(problem, solver)
+        return None if found is None else replace(found, not_found=False, hopeless=False)
+
+    return replace(strategy, attempt=attempt)
 
 
 def _conclude(problem: MotionProblem, strategy: str, attempt: Attempt, solver: Solver) -> Plan:

@@ -93,8 +93,9 @@ def find_cheaper(problem: MotionProblem, found: CollocationResult,
 def _explore(problem: MotionProblem, rigid: MotionProblem, own: KindOfMotion,
              solver: Solver) -> tuple[list[ExploredMotion], int]:
     """Return motions of the rigid arm, its own included where it is rigid, and the starts."""
+    finest = min(_MOST_INTERVALS, solver.settings.max_intervals)
     coarse = solver.with_settings(
-        stages=_STAGES, intervals=_INTERVALS, max_intervals=_MOST_INTERVALS,
+        stages=_STAGES, intervals=min(_INTERVALS, finest), max_intervals=finest,
         error_tolerance=_TOLERANCE, max_iterations=_ITERATIONS, max_meshes=_MESHES)
     is_rigid, monitor = rigid is problem, solver.monitor
     motions = [own.motion] if is_rigid else []
@@ -116,7 +117,7 @@ def _solve_from_path(rigid: MotionProblem, path: JointPath,
                      solver: Solver) -> ExploredMotion | None:
     """Return the rigid arm's motion that Newton's method finds from a path, or None."""
     duration = rigid.task.duration
-    mesh = np.linspace(0, 1, _INTERVALS + 1, dtype=np.float64)
+    mesh = np.linspace(0, 1, solver.settings.intervals + 1, dtype=np.float64)
     q, v, _ = path(mesh, duration)
     nodes = np.hstack([q, v, np.zeros((mesh.size, rigid.size // 2))])
     guess = CollocationSolution.from_values(mesh * duration, nodes, solver.settings.rule)

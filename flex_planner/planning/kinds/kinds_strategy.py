@@ -36,7 +36,7 @@ def explore_kinds(problem: MotionProblem, solver: Solver) -> Attempt | None:
     if rigid_twin(bare) is None:
         return None
     starts = SearchEffort.NORMAL.starts
-    kinds = find_kinds(bare, Free.NOTHING, starts, solver.monitor)
+    kinds = find_kinds(bare, Free.NOTHING, starts, solver)
     attempt = _solve_first(problem, bare, kinds, solver)
     if attempt.decides:
         return attempt
@@ -62,7 +62,7 @@ class _Limits:
     @classmethod
     def find(cls, bare: MotionProblem, starts: int, solver: Solver) -> _Limits:
         """Explore both."""
-        heaviest, shortest = (find_kinds(bare, free, starts, solver.monitor)
+        heaviest, shortest = (find_kinds(bare, free, starts, solver)
                               for free in (Free.PAYLOAD, Free.DURATION))
         return cls(bare=bare, starts=starts, heaviest=heaviest, shortest=shortest)
 
