@@ -71,13 +71,11 @@ def _follow(search: LimitSearch, problem: MotionProblem, solver: Solver,
     plan = search.plan()
     last, near = search.last, search.is_near
     found = replace(_result(search, problem, plan.status, plan.message), plan=plan,
-                    payload=last.value, local_upper=last.value + last.gap)
-    if not near:
-        held = _hold(problem, last, found, solver)
-        if held is not None:
-            return held
-    if not plan.solved:
-        return _certified_so_far(search, problem, solver, replace(found, payload=0.0))
+                    payload=last.value if plan.solved else 0.0,
+                    local_upper=last.value + last.gap)
+    held = None if near else _hold(problem, last, found, solver)
+    if held is not None or not plan.solved:
+        return _certified_so_far(search, problem, solver, held or found)
     if not near:
         return replace(found, status=PlanStatus.NOT_CONVERGED, message=(
             f'{found.payload:.6g} kg can be carried, but where this kind of motion ends was not '
@@ -116,8 +114,7 @@ def _hold(problem: MotionProblem, last: Extremal, found: MaxPayload,
 def _held(plan: Plan, limit: float, joint: int, found: MaxPayload) -> MaxPayload | None:
     """Return the outcome with a plan that carries what can be held; None without one."""
     if plan.status in INTERRUPTED_STATUS.values():
-        return replace(found, status=plan.status, message=plan.message, payload=0.0,
-                       local_upper=np.inf, plan=None)
+        return replace(found, status=plan.status, message=plan.message)
     if not plan.solved:
         return None
     return replace(found, status=plan.status, payload=limit * _HELD, local_upper=limit,

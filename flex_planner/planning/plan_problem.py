@@ -37,7 +37,8 @@ def plan_problem(problem: MotionProblem, solver: Solver,
     """
     Return the certified plan of a problem by the first strategy that solves it.
 
-    Unless it was a warm start, other kinds of motion are looked for then.
+    Unless it was a warm start, cheaper kinds of motion are looked for then; where that ends for
+    want of time, or leads to nothing that can be certified, the plan is the first one.
 
     Parameters
     ----------
@@ -56,12 +57,10 @@ def plan_problem(problem: MotionProblem, solver: Solver,
             problem, strategy, attempt = _solve_in_any_time(problem, solver, strategies)
         else:
             strategy, attempt = _solve_first(problem, solver, strategies)
-        if effort.explores and strategy != WARM_START and attempt.result.converged:
-            attempt = _look_for_cheaper(problem, attempt, solver)
-            if problem.task.time_weight:
-                problem, result = free_duration(problem, attempt.result, solver)
-                attempt = replace(attempt, result=result)
         plan = _conclude(problem, strategy, attempt, solver)
+        if (effort.explores and strategy != WARM_START and plan.solution is not None
+                and plan.status not in STOP_STATUS.values()):
+            plan = _look_for_cheaper(plan, attempt, solver)
     except StoppedError as error:
         plan = Plan(task=problem.task, status=STOP_STATUS[error.reason], message=str(error),
                     strategy='', problem=problem, solution=None)
@@ -69,13 +68,32 @@ def plan_problem(problem: MotionProblem, solver: Solver,
                    planning_time=solver.monitor.elapsed)
 
 
-def _look_for_cheaper(problem: MotionProblem, attempt: Attempt, solver: Solver) -> Attempt:
-    """Return the cheapest motion of other kinds, too, with the kinds that were met."""
-    cheapest = find_cheaper(problem, attempt.result, solver)
+def _look_for_cheaper(plan: Plan, attempt: Attempt, solver: Solver) -> Plan:
+    """Return the plan of the cheapest kind of motion, with the kinds that were met."""
+    cheapest = find_cheaper(plan.problem, attempt.result, solver)
+    if solver.monitor.canceled():
+        raise StoppedError(StopReason.CANCELED)
     others = [kind for kind in attempt.kinds if not any(
         are_alike(kind.motion.angles, one.motion.angles) for one in cheapest.kinds)]
-    return Attempt(result=cheapest.result, kinds=(*cheapest.kinds, *others),
-                   starts=cheapest.starts + attempt.starts - 1)
+    met = Attempt(result=cheapest.result, kinds=(*cheapest.kinds, *others),
+                  starts=cheapest.starts + attempt.starts - 1)
+    if met.result is attempt.result:
+        plan = replace(plan, kinds=met.kinds[:MOST_KINDS], starts=met.starts)
+        return replace(plan, message=describe_choice(plan)) if plan.solved else plan
+    other = _conclude_in_time(plan, met, solver)
+    if other.status is PlanStatus.CANCELED:
+        return other
+    better = other.solved > plan.solved or other.cost < plan.cost
+    return other if better and other.solved >= plan.solved else plan
+
+
+def _conclude_in_time(plan: Plan, attempt: Attempt, solver: Solver) -> Plan:
+    """Return the plan of another motion of the same task, in the time that is best for it."""
+    problem = plan.problem
+    if problem.task.time_weight:
+        problem, result = free_duration(problem, attempt.result, solver)
+        attempt = replace(attempt, result=result)
+    return _conclude(problem, plan.strategy, attempt, solver)
 
 
 def _solve_in_any_time(problem: MotionProblem, solver: Solver, strategies: Sequence[Strategy],
