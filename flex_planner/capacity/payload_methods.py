@@ -126,7 +126,7 @@ def _certified_so_far(search: LimitSearch, problem: MotionProblem, solver: Solve
     """Return the outcome of a search that failed with the heaviest payload that it can certify."""
     if found.status is PlanStatus.CANCELED or found.plan is not None and found.plan.solved:
         return found
-    short = solver.watched_by(Monitor(time_limit=_GRACE, canceled=solver.monitor.canceled))
+    short = _in_grace(solver)
     for extremal in reversed(search.certifiable):
         try:
             plan = plan_near(PAYLOAD.with_value(problem, extremal.value),
@@ -140,6 +140,11 @@ def _certified_so_far(search: LimitSearch, problem: MotionProblem, solver: Solve
         if short.monitor.stop_reason():
             break
     return found
+
+
+def _in_grace(solver: Solver) -> Solver:
+    """Return a solver whose time is just enough to certify what is there."""
+    return solver.watched_by(Monitor(time_limit=_GRACE, canceled=solver.monitor.canceled))
 
 
 def search_in_steps(problem: MotionProblem, solver: Solver, step: float,
@@ -165,11 +170,12 @@ def search_in_steps(problem: MotionProblem, solver: Solver, step: float,
                 upper = trial.payload
     except StoppedError as error:
         stopped = STOP_STATUS[error.reason], str(error)
-    if stopped is not None:
-        solver = solver.watched_by(Monitor(time_limit=_GRACE, canceled=solver.monitor.canceled))
-    plan = plan_near(PAYLOAD.with_value(problem, best[0]), best[1], solver)
-    held = holding_limit(problem.model, task, problem.parameters)[0]
+    heaviest = PAYLOAD.with_value(problem, best[0])
+    plan = plan_near(heaviest, best[1], solver)
     status, message = stopped or (plan.status, plan.message)
+    if status is PlanStatus.TIMEOUT:
+        plan = plan_near(heaviest, best[1], _in_grace(solver))
+    held = holding_limit(problem.model, task, problem.parameters)[0]
     found = replace(found, status=status, message=message, trials=tuple(trials),
                     local_upper=min(upper, held))
     if plan.solved:

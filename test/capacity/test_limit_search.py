@@ -14,7 +14,7 @@ from flex_planner.planning.plan import PlanStatus
 from flex_planner.planning.plan_path import plan_path
 from known_limits import HEAVIEST
 import numpy as np
-from payload_searches import assert_stopped, assert_stopped_at, followed, stopped_after
+from payload_searches import assert_stopped, assert_stopped_at, followed, moments, stopped_after
 from plan_checks import solution_of
 import pytest
 
@@ -149,20 +149,19 @@ def test_search_over_kinds_is_stopped_wherever_it_is(rigid_model: ArmModel,
     assert_stopped_at(
         lambda monitor: find_max_payload(task, model=rigid_model, monitor=monitor),
         {('kinds of motion, start 7 of 16', False): False,
-         ('kinds of motion, start 16 of 16', True): False,  # on finer meshes
          ('payload at a rising price', False): False,
          ('continuation to the limit', False): True, ('continuation to the limit', True): True})
 
 
 def test_heaviest_motion_met_is_certified_when_time_is_up(rigid_model: ArmModel,
                                                           paper_task: TaskFactory) -> None:
-    task, payloads = paper_task(rigid_model.arm), []
+    task, payloads = paper_task(rigid_model.arm), list[float]()
     for calls in (25, 50, 70):
         found = followed(task, model=rigid_model,
                          monitor=stopped_after(calls, PlanStatus.TIMEOUT))
         assert_stopped(found, PlanStatus.TIMEOUT, certified=True)
-        # the last motion met, and it is known where its kind ends
-        assert found.payload == found.extremals[-1].value
+        # the last motion met; where its kind ends is known once there is a price
+        assert found.payload == max((one.value for one in found.extremals), default=1.0)
         assert found.payload <= HEAVIEST['rigid'] <= found.local_upper
         payloads.append(found.payload)
     assert payloads == sorted(set(payloads))
@@ -180,11 +179,14 @@ def test_direct_search_is_stopped_at_every_payload(rigid_model: ArmModel,
         assert monitor.phase == 'payload at a rising price'
 
 
-@pytest.mark.parametrize('calls', [5, 100, 400])
+@pytest.mark.parametrize('share', [0.01, 0.5, 0.99])  # the last on finer meshes
 def test_exploration_is_stopped_at_every_iteration(rigid_model: ArmModel, paper_task: TaskFactory,
-                                                   calls: int) -> None:
+                                                   share: float) -> None:
+    task = paper_task(rigid_model.arm)
+    ended = moments(lambda monitor: find_max_payload(task, model=rigid_model, monitor=monitor))
+    calls = int(share * ended['payload at a rising price', False])
     monitor = stopped_after(calls, PlanStatus.CANCELED)
-    found = find_max_payload(paper_task(rigid_model.arm), model=rigid_model, monitor=monitor)
+    found = find_max_payload(task, model=rigid_model, monitor=monitor)
     assert_stopped(found, PlanStatus.CANCELED)
     assert found.iterations <= calls + 1  # IPOPT asks after an iteration
     assert monitor.phase.startswith('kinds of motion, start ')

@@ -282,7 +282,7 @@ def test_tolerance_that_no_motion_meets_fails_the_certificate(
         rigid_model: ArmModel, paper_task: TaskFactory, plan_of: PlanFactory) -> None:
     lines: list[Progress] = []
     plan = plan_path(paper_task(rigid_model.arm, tolerance=1e-40), model=rigid_model,
-                     monitor=Monitor(report=lines.append))
+                     monitor=Monitor(report=lines.append), search='fast')
     assert (plan.status, plan.solved) == (PlanStatus.CERTIFICATE_FAILED, False)
     assert plan.message.startswith('boundary error is ')
     assert plan.message.endswith(', but must be <= 1e-40')

@@ -9,7 +9,7 @@ from typing import Any
 from factories import PlanFactory, TaskFactory
 from flex_planner.base.progress import Monitor, Progress
 from flex_planner.optimal_control.arm_model import ArmModel
-from flex_planner.planning.objectives import Objective
+from flex_planner.planning.objectives import Objective, Objectives
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_path import plan_path
 import numpy as np
@@ -319,6 +319,19 @@ def test_search_reports_its_phases(rigid_model: ArmModel, paper_task: TaskFactor
     assert phases == ['cold start', 'weight of joint speeds', 'weights adapted']
     assert len(reports) == plan.iterations
     assert {each.payload for each in reports} == {0.0}
+
+
+def test_cheaper_kinds_are_looked_for_before_weights_are(rigid_model: ArmModel,
+                                                         paper_task: TaskFactory) -> None:
+    reports: list[Progress] = []
+    plan = plan_path(paper_task(rigid_model.arm), model=rigid_model,
+                     monitor=Monitor(report=reports.append),
+                     objectives=Objectives(max_joint_speeds=[BOUND, BOUND]))
+    phases = list(dict.fromkeys(each.phase for each in reports))
+    kinds = [phase for phase in phases if phase.startswith('kinds of motion, start ')]
+    assert kinds
+    assert phases == ['cold start', *kinds, 'weight of joint speeds', 'weights adapted']
+    assert search_of(plan).met
 
 
 @both_stops
