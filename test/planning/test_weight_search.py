@@ -113,10 +113,11 @@ def test_weight_is_added_to_those_of_the_task(rigid_model: ArmModel,
     {'max_torque_shares': [0.8, 0.8]}, {'max_joint_speeds': [2.0, 2.0],
                                         'max_torque_shares': [1.0, 0.6]}], ids=str)
 def test_motion_that_keeps_its_limits_stays_as_it_is(
-        rigid_model: ArmModel, paper_task: TaskFactory, plan_of: PlanFactory,
+        rigid_model: ArmModel, paper_task: TaskFactory,
         limits: dict[str, Any]) -> None:
     plan = within(rigid_model, paper_task(rigid_model.arm), **limits)
-    search, bare = search_of(plan), plan_of('rigid')
+    search = search_of(plan)
+    bare = plan_path(paper_task(rigid_model.arm), model=rigid_model, search='fast')
     assert plan.solved, plan.message
     assert (search.met, search.trials, search.margins) == (True, (), ())
     assert (plan.cost, plan.iterations) == (bare.cost, bare.iterations)
