@@ -49,7 +49,7 @@ def test_search_of_an_arm_that_bends_is_a_start_for_a_rigid_one(
 def test_search_that_found_nothing_is_no_start_but_no_harm(rigid_model: ArmModel,
                                                            paper_task: TaskFactory) -> None:
     nothing = followed(paper_task(rigid_model.arm), model=rigid_model,
-                               monitor=Monitor(time_limit=0.0))
+                       monitor=Monitor(time_limit=0.0))
     task = paper_task(rigid_model.arm)
     found = followed(task, model=rigid_model, start_from=nothing)
     assert nothing.restart_point is None
@@ -103,7 +103,7 @@ def test_direct_search_reports_phases_and_payloads(rigid_model: ArmModel,
                                                    paper_task: TaskFactory) -> None:
     reports: list[Progress] = []
     found = followed(paper_task(rigid_model.arm), model=rigid_model,
-                             monitor=Monitor(report=reports.append))
+                     monitor=Monitor(report=reports.append))
     assert list(dict.fromkeys(each.phase for each in reports)) == ['payload at a rising price',
                                                                    'continuation to the limit']
     assert [each.iteration for each in reports] == list(range(1, found.iterations + 1))
@@ -116,8 +116,8 @@ def test_direct_search_reports_phases_and_payloads(rigid_model: ArmModel,
 def test_searches_that_share_a_monitor_count_for_themselves(rigid_model: ArmModel,
                                                             paper_task: TaskFactory) -> None:
     monitor = Monitor()
-    first, second = (followed(paper_task(rigid_model.arm), model=rigid_model,
-                                      monitor=monitor) for _ in range(2))
+    first, second = (followed(paper_task(rigid_model.arm), model=rigid_model, monitor=monitor)
+                     for _ in range(2))
     assert first.iterations == second.iterations > 0
     assert monitor.iteration == 2 * first.iterations
 

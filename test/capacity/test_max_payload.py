@@ -235,7 +235,7 @@ def test_front_knows_no_weights_but_those_of_effort(rigid_model: ArmModel,
 def test_front_scales_with_the_weights_of_effort(rigid_model: ArmModel,
                                                  paper_task: TaskFactory) -> None:
     one, ten = (followed(paper_task(rigid_model.arm, 3.0, effort_weights=[R, R]),
-                                 model=rigid_model).front for R in (0.125, 1.25))
+                         model=rigid_model).front for R in (0.125, 1.25))
     # the first price is ten times as high, so are all
     np.testing.assert_allclose(ten.prices, 10 * one.prices, rtol=1e-3)
     np.testing.assert_allclose(ten.payloads, one.payloads, rtol=1e-3)

@@ -43,10 +43,18 @@ def assert_encloses(found: MinDuration, duration: float, accuracy: float = 1e-4)
     assert 0 < found.duration - found.local_lower <= accuracy
 
 
-def assert_stopped(found: MinDuration, status: PlanStatus) -> None:
-    assert (found.status, found.message) == (status, status.value)
-    assert (found.solved, found.duration) == (False, inf)
-    assert found.plan is None or not found.plan.solved
+def assert_stopped(found: MinDuration, status: PlanStatus, *, certified: bool = False,
+                   limit: float = SHORTEST['rigid']) -> None:
+    """Check the outcome of a search that was stopped, with or without something certified."""
+    assert (found.status, found.solved) == (status, False)
+    if not certified:
+        assert (found.message, found.duration) == (status.value, inf)
+        assert found.plan is None or not found.plan.solved
+        return
+    assert found.message == f'{status.value} ({found.duration:.6g} s are certified)'
+    assert found.plan is not None
+    assert (found.plan.solved, found.plan.task.duration) == (True, found.duration)
+    assert found.local_lower <= limit <= found.duration
 
 
 # Shortest
@@ -335,7 +343,8 @@ def test_search_is_stopped_wherever_it_is(rigid_model: ArmModel, paper_task: Tas
                                           phase: str, iterations: int, status: PlanStatus) -> None:
     monitor = stopped_in(phase, status, iterations)
     found = shortest(paper_task(rigid_model.arm), model=rigid_model, monitor=monitor)
-    assert_stopped(found, status)
+    begun = iterations > 0 or phase == 'continuation to the limit'
+    assert_stopped(found, status, certified=begun and status is PlanStatus.TIMEOUT)
     assert monitor.phase == phase
 
 
@@ -344,8 +353,9 @@ def test_search_from_a_guess_that_is_too_short_is_stopped(
         rigid_model: ArmModel, paper_task: TaskFactory, status: PlanStatus) -> None:
     for iterations in (10, 60, 120):
         monitor = stopped_in('duration at a rising price', status, iterations)
-        assert_stopped(shortest(paper_task(rigid_model.arm, duration=0.3), model=rigid_model,
-                                monitor=monitor), status)
+        found = shortest(paper_task(rigid_model.arm, duration=0.3), model=rigid_model,
+                         monitor=monitor)
+        assert_stopped(found, status, certified=status is PlanStatus.TIMEOUT and math.isfinite(found.duration))
         assert monitor.iteration <= iterations + 1
 
 
@@ -353,15 +363,15 @@ def test_search_from_a_guess_that_is_too_short_is_stopped(
 def test_search_of_an_arm_that_bends_is_stopped(ei5_model: ArmModel, paper_task: TaskFactory,
                                                 status: PlanStatus) -> None:
     monitor = stopped_in('duration at a rising price', status, 30)
-    assert_stopped(find_min_duration(paper_task(ei5_model.arm), model=ei5_model,
-                                     monitor=monitor), status)
+    found = find_min_duration(paper_task(ei5_model.arm), model=ei5_model, monitor=monitor)
+    assert_stopped(found, status, certified=status is PlanStatus.TIMEOUT, limit=SHORTEST['ei5'])
 
 
 @both_stops
 def test_search_is_stopped_in_its_last_simulation(rigid_model: ArmModel, paper_task: TaskFactory,
                                                   status: PlanStatus) -> None:
     task = paper_task(rigid_model.arm)
-    whole = find_min_duration(task, model=rigid_model).iterations
+    whole = shortest(task, model=rigid_model).iterations
     monitor = Monitor()
 
     def due() -> bool:
@@ -371,8 +381,8 @@ def test_search_is_stopped_in_its_last_simulation(rigid_model: ArmModel, paper_t
         return late and status is PlanStatus.CANCELED
 
     monitor.canceled = due
-    found = find_min_duration(task, model=rigid_model, monitor=monitor)
-    assert_stopped(found, status)
+    found = shortest(task, model=rigid_model, monitor=monitor)
+    assert_stopped(found, status, certified=status is PlanStatus.TIMEOUT)
     assert (monitor.phase, found.iterations) == ('continuation to the limit', whole)
 
 

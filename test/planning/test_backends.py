@@ -12,7 +12,6 @@ from flex_planner.planning.strategies.strategy import Strategy
 import pytest
 from scipy_backend import CountingBackend, FINE, solve_by_scipy
 
-
 BY_IPOPT = ('direct collocation', 'kinds of motion')
 
 

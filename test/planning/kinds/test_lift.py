@@ -89,15 +89,17 @@ def test_kind_whose_value_newtons_method_does_not_reach_is_passed_over(
     assert second.value == pytest.approx(true.value, rel=1e-3)
 
 
+@pytest.mark.parametrize(('values', 'best_at'), [((4.0, 5.0, 6.0), 1), ((5.0, 4.0, 6.0), 0)])
 def test_best_of_two_lifted_motions_is_taken(
         monkeypatch: pytest.MonkeyPatch, flexible: MotionProblem,
-        kinds: dict[Free, KindOfMotion]) -> None:
+        kinds: dict[Free, KindOfMotion], values: tuple[float, ...], best_at: int) -> None:
     kind = kinds[Free.PAYLOAD]
     best = solved(PAYLOAD, flexible, kind)
-    lifted = [replace(best, value=value) for value in (4.0, 5.0, 6.0)]
-    monkeypatch.setattr(module, '_lift', lambda *rest, values=iter(lifted): next(values))
+    lifted = [replace(best, value=value) for value in values]
+    turn = iter(lifted)
+    monkeypatch.setattr(module, '_lift', lambda *rest: next(turn))
     found = solve_best_kind(PAYLOAD, flexible, [kind] * 3, COARSE)
-    assert found is lifted[1]  # a third one is not tried
+    assert found is lifted[best_at]  # the third one is not tried
 
 
 def test_interrupted_motion_says_so(rigid: MotionProblem, flexible: MotionProblem,

@@ -92,7 +92,7 @@ class FakeExplorer:
     """Meets motions of given values in turn, and confirms them at others, or not at all."""
 
     values: tuple[float | None, ...] = ()
-    confirmed: dict[float, float | None] = {}  # noqa: RUF012
+    confirmed: dict[float, float | None] = {}
 
     def __init__(self, problem: MotionProblem, *others: Any) -> None:
         self.problem, self.turn = problem, iter(self.values)
