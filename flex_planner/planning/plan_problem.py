@@ -60,7 +60,7 @@ def plan_problem(problem: MotionProblem, solver: Solver,
         plan = _conclude(problem, strategy, attempt, solver)
         if (effort.explores and strategy != WARM_START and plan.solution is not None
                 and plan.status not in STOP_STATUS.values()):
-            plan = _look_for_cheaper(plan, attempt, solver)
+            plan = _look_for_cheaper(plan, attempt, solver, effort)
     except StoppedError as error:
         plan = Plan(task=problem.task, status=STOP_STATUS[error.reason], message=str(error),
                     strategy='', problem=problem, solution=None)
@@ -68,9 +68,10 @@ def plan_problem(problem: MotionProblem, solver: Solver,
                    planning_time=solver.monitor.elapsed)
 
 
-def _look_for_cheaper(plan: Plan, attempt: Attempt, solver: Solver) -> Plan:
+def _look_for_cheaper(plan: Plan, attempt: Attempt, solver: Solver,
+                      effort: SearchEffort) -> Plan:
     """Return the plan of the cheapest kind of motion, with the kinds that were met."""
-    cheapest = find_cheaper(plan.problem, attempt.result, solver)
+    cheapest = find_cheaper(plan.problem, attempt.result, solver, effort)
     if solver.monitor.canceled():
         raise StoppedError(StopReason.CANCELED)
     others = [kind for kind in attempt.kinds if not any(

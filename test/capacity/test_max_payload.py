@@ -251,7 +251,7 @@ def test_front_scales_with_the_weights_of_effort(rigid_model: ArmModel,
      'is 0.5652 kg, the shortest duration found with 1 kg is 0.6434 s'),
     (PayloadMethod.INCREMENTAL, 0.0, {'duration': 0.5},
      'no motion with 0 kg in 0.5 s was found from 16 starts; the shortest duration found with '
-     '0 kg is 0.5367 s')])
+     '0 kg is 0.5367 s')], ids=['direct', 'incremental'])
 def test_payload_that_no_motion_was_found_to_carry_is_told_with_what_was_found_instead(
         rigid_model: ArmModel, paper_task: TaskFactory, method: PayloadMethod,
         payload_mass: float, changes: dict[str, float], found_instead: str) -> None:

@@ -19,6 +19,7 @@ from flex_planner.planning.kinds.clusters import (
     kind_of,
     KindOfMotion,
 )
+from flex_planner.planning.kinds.effort import SearchEffort
 from flex_planner.planning.kinds.explorer import ExploredMotion, sample_angles
 from flex_planner.planning.kinds.paths import JointPath
 from flex_planner.planning.kinds.search import has_settled, rigid_twin, starting_paths
@@ -55,8 +56,8 @@ class CheapestMotion:
     starts: int
 
 
-def find_cheaper(problem: MotionProblem, found: CollocationResult,
-                 solver: Solver) -> CheapestMotion:
+def find_cheaper(problem: MotionProblem, found: CollocationResult, solver: Solver,
+                 effort: SearchEffort = SearchEffort.NORMAL) -> CheapestMotion:
     """
     Look for a cheaper kind of motion than one that is solved.
 
@@ -68,13 +69,16 @@ def find_cheaper(problem: MotionProblem, found: CollocationResult,
         Its solution.
     solver : Solver
         Its monitor may end the search early: the best motion so far is returned.
+    effort : SearchEffort
+        ``THOROUGH`` takes all starts; else they end within a budget of iterations, or once the
+        cheapest kind came twice.
 
     """
     rigid = rigid_twin(problem)
     own = _as_kind(problem, found.solution)
     if rigid is None:
         return CheapestMotion(result=found, kinds=(own,), starts=1)
-    motions, starts = _explore(problem, rigid, own, solver)
+    motions, starts = _explore(problem, rigid, own, solver, effort)
     kinds = cluster(motions, lambda value, other: value < other)
     for kind in _cheaper_kinds(kinds, own)[:_SOLVED]:
         result = solver.solve(problem, _guess(problem, kind.motion.solution, solver))
@@ -90,8 +94,8 @@ def find_cheaper(problem: MotionProblem, found: CollocationResult,
                           kinds=(replace(own, met=max(same, 1)), *others))
 
 
-def _explore(problem: MotionProblem, rigid: MotionProblem, own: KindOfMotion,
-             solver: Solver) -> tuple[list[ExploredMotion], int]:
+def _explore(problem: MotionProblem, rigid: MotionProblem, own: KindOfMotion, solver: Solver,
+             effort: SearchEffort) -> tuple[list[ExploredMotion], int]:
     """Return motions of the rigid arm, its own included where it is rigid, and the starts."""
     finest = min(_MOST_INTERVALS, solver.settings.max_intervals)
     coarse = solver.with_settings(
@@ -100,10 +104,12 @@ def _explore(problem: MotionProblem, rigid: MotionProblem, own: KindOfMotion,
     is_rigid, monitor = rigid is problem, solver.monitor
     motions = [own.motion] if is_rigid else []
     budget = _RIGID_BUDGET if is_rigid else _FLEXIBLE_BUDGET * monitor.iteration
+    thorough = effort is SearchEffort.THOROUGH
     began, starts = monitor.iteration, 1
-    for path in list(starting_paths(rigid, _STARTS))[is_rigid:]:
-        if (monitor.iteration - began >= budget or monitor.stop_reason()
-                or has_settled(motions, lambda value, other: value < other)):
+    for path in list(starting_paths(rigid, effort.starts if thorough else _STARTS))[is_rigid:]:
+        enough = not thorough and (monitor.iteration - began >= budget
+                                   or has_settled(motions, lambda value, other: value < other))
+        if enough or monitor.stop_reason():
             break
         starts += 1
         monitor.phase = f'kinds of motion, start {starts}'

@@ -12,8 +12,8 @@ class SearchEffort(Enum):
     How many starts a search over kinds of motion may take.
 
     ``FAST`` follows the kind that a straight start leads to. ``NORMAL`` explores the arm made
-    rigid from 16 starts where a limit is wanted, and from 4 to 12 for a plan. ``THOROUGH``
-    explores from 48.
+    rigid from 16 starts where a limit is wanted, and for a plan from 4 to 12, until the best kind
+    came twice. ``THOROUGH`` explores from 48 for both, whatever was met.
 
     """
 

@@ -17,7 +17,7 @@ from flex_planner.planning.kinds import cheaper as module
 from flex_planner.planning.kinds.cheaper import CheapestMotion, find_cheaper
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_path import plan_path
-from flex_planner.planning.strategies.initial_guesses import cold_start
+from flex_planner.planning.strategies.initial_guesses import cold_start, warm_start
 from plan_checks import problem_of, stopped_in
 import pytest
 
@@ -54,6 +54,18 @@ def test_cheaper_kind_is_found(payload: float) -> None:
     assert own.value == cost_of(problem, found.result)
     assert other.value == pytest.approx(dear, rel=1e-3)
     assert 4 <= found.starts <= 12
+
+
+def test_kind_that_is_rare_is_found_by_more_starts() -> None:
+    # with 1 kg the dearer kind comes twice first
+    normal, thorough = (plan_path(level_task('S12', 1.0), search=search)
+                        for search in ('normal', 'thorough'))
+    assert normal.kinds[0].met > 1
+    assert normal.starts < 12
+    assert thorough.solved, thorough.message
+    assert thorough.starts == 48
+    assert thorough.cost < 0.9 * normal.cost
+    assert thorough.kinds[0].sentence.startswith(SWING)
 
 
 def test_cheapest_kind_is_kept(plan_of: PlanFactory) -> None:
@@ -159,6 +171,36 @@ def test_plan_is_the_first_one_if_the_cheaper_is_not_certified(
     assert len(calls) > 1
     assert plan.solved, plan.message
     assert plan.cost == pytest.approx(DEARER[1.12][0], rel=1e-3)
+
+
+def test_plan_is_the_first_one_if_the_other_is_dearer(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = s12(1.12)
+    dear = solved(problem)
+    cheap = find_cheaper(problem, dear, Solver())
+    wrong = replace(cheap, result=dear)
+    monkeypatch.setattr(planning, 'find_cheaper', lambda *rest: wrong)
+    plan = plan_path(problem.task, strategies=[
+        warm_start(cheap.result.solution, 'the cheap one')])
+    assert plan.solved, plan.message
+    assert plan.cost == pytest.approx(DEARER[1.12][1], rel=1e-3)
+
+
+def test_cheaper_motion_is_the_plan_if_the_first_one_is_not_certified(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    certify = planning.certify
+
+    def certified(problem: MotionProblem, result: CollocationResult, *others: Any,
+                  **options: Any) -> Any:
+        certificate = certify(problem, result, *others, **options)
+        dear = cost_of(problem, result) > 0.9
+        return replace(certificate, boundary_error=1.0) if dear else certificate
+
+    monkeypatch.setattr(planning, 'certify', certified)
+    assert plan_path(level_task('S12', 1.12), search='fast').status is (
+        PlanStatus.CERTIFICATE_FAILED)
+    plan = plan_path(level_task('S12', 1.12))
+    assert plan.solved, plan.message
+    assert plan.cost == pytest.approx(DEARER[1.12][1], rel=1e-3)
 
 
 # Where it does not apply, and its budget
