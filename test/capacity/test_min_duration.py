@@ -355,7 +355,8 @@ def test_search_from_a_guess_that_is_too_short_is_stopped(
         monitor = stopped_in('duration at a rising price', status, iterations)
         found = shortest(paper_task(rigid_model.arm, duration=0.3), model=rigid_model,
                          monitor=monitor)
-        assert_stopped(found, status, certified=status is PlanStatus.TIMEOUT and math.isfinite(found.duration))
+        met = status is PlanStatus.TIMEOUT and math.isfinite(found.duration)
+        assert_stopped(found, status, certified=met)
         assert monitor.iteration <= iterations + 1
 
 
