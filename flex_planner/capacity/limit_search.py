@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from flex_planner.base.errors import FlexPlannerError
+from flex_planner.base.progress import Monitor
 from flex_planner.capacity.bracket import (
     bracket_width,
     collect_to_limit,
@@ -38,6 +39,8 @@ from flex_planner.planning.strategies.strategy import Attempt, Strategy
 _KEPT = 0.01
 # starts for each other way round to a point
 _OTHER_WAY = 3
+# time to certify what a search has when its own is over [s]
+_GRACE = 1.0
 
 
 class Failure(NamedTuple):
@@ -147,10 +150,19 @@ class LimitSearch:
             return replace(found, message=f'{plan.message}; {found.message}')
         return found
 
-    @property
-    def certifiable(self) -> list[Extremal]:
-        """Return the motions that were solved, the one nearest to the limit last."""
-        return [one for one in self.extremals if one.result.converged]
+    def certify_so_far(self) -> tuple[Extremal, Plan] | None:
+        """Return the motion nearest to the limit with a plan; None if there is none at once."""
+        short = in_grace(self._solver)
+        for extremal in (one for one in reversed(self.extremals) if one.result.converged):
+            try:
+                plan = plan_near(self._at(extremal), extremal.result.solution, short)
+            except FlexPlannerError:  # too heavy to hold
+                continue
+            if plan.solved:
+                return extremal, plan
+            if short.monitor.stop_reason():
+                break
+        return None
 
     @property
     def explored_best(self) -> KindOfMotion | None:
@@ -205,13 +217,13 @@ class LimitSearch:
 
     def _find_kinds(self, bare: MotionProblem) -> tuple[MotionProblem, list[KindOfMotion]]:
         """Note all kinds of motion; return those of the best way round to the goal."""
-        unknown, monitor = self._parameter.unknown, self._solver.monitor
+        unknown, solver = self._parameter.unknown, self._solver
         ways = other_windings(bare) if self._effort.explores else []
         self.starts = self._effort.starts + _OTHER_WAY * len(ways)
-        found = {bare: find_kinds(bare, unknown, self._effort.starts, monitor)}
+        found = {bare: find_kinds(bare, unknown, self._effort.starts, solver)}
         for way in ways:
             found[way] = [replace(kind, sentence=say_turns(bare, way)) for kind in find_kinds(
-                way, unknown, _OTHER_WAY, monitor)]
+                way, unknown, _OTHER_WAY, solver)]
         best = bare
         for way in ways:
             if found[way] and (not found[best] or self._parameter.improves(
@@ -259,6 +271,11 @@ class LimitSearch:
         except FlexPlannerError:  # too heavy to hold, or no duration
             return None
         return found if found is not None and found.result.converged else None
+
+
+def in_grace(solver: Solver) -> Solver:
+    """Return a solver whose time is just enough to certify what a stopped search has."""
+    return solver.watched_by(Monitor(time_limit=_GRACE, canceled=solver.monitor.canceled))
 
 
 def start_strategy(start: CollocationSolution, extremal: Extremal | None = None) -> Strategy:

@@ -11,10 +11,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 from flex_planner.base.errors import FlexPlannerError
-from flex_planner.base.progress import Monitor, StoppedError
+from flex_planner.base.progress import StoppedError
 from flex_planner.capacity.extrapolation import Neighbours
 from flex_planner.capacity.incremental import PayloadTrial, raise_payload
-from flex_planner.capacity.limit_search import LimitSearch, plan_near
+from flex_planner.capacity.limit_search import in_grace, LimitSearch, plan_near
 from flex_planner.capacity.results import (
     describe_kinds,
     MaxPayload,
@@ -41,8 +41,6 @@ _HELD = 1 - 1e-9
 _ROUNDING = 1e-6
 # Newton iterations of a first try with that payload
 _FIRST_TRY = 15
-# time to certify what a search has when its own is over [s]
-_GRACE = 1.0
 
 
 def search_directly(problem: MotionProblem, solver: Solver, accuracy: float,
@@ -54,10 +52,10 @@ def search_directly(problem: MotionProblem, solver: Solver, accuracy: float,
         held = None if start is not None else _hold_at_once(problem, solver)
         found = held or _follow(search, problem, solver, start)
     except StoppedError as error:
-        found = _certified_so_far(search, problem, solver, _result(
+        found = _certified_so_far(search, _result(
             search, problem, STOP_STATUS[error.reason], str(error)))
     except FlexPlannerError as error:  # of a payload that was tried
-        found = _certified_so_far(search, problem, solver, _result(
+        found = _certified_so_far(search, _result(
             search, problem, PlanStatus.NOT_CONVERGED, str(error)))
     return _describe(_with_bound(found, problem))
 
@@ -68,18 +66,16 @@ def _follow(search: LimitSearch, problem: MotionProblem, solver: Solver,
     neighbours = start if isinstance(start, Neighbours) else Neighbours()
     failure = search.follow_price(_start(start), neighbours)
     if failure is not None:
-        return _certified_so_far(search, problem, solver, _result(
+        return _certified_so_far(search, _result(
             search, problem, failure.status, failure.message))
     plan = search.plan()
     last, near = search.last, search.is_near
     found = replace(_result(search, problem, plan.status, plan.message), plan=plan,
-                    payload=last.value, local_upper=last.value + last.gap)
-    if not near:
-        held = _hold(problem, last, found, solver)
-        if held is not None:
-            return held
-    if not plan.solved:
-        return _certified_so_far(search, problem, solver, replace(found, payload=0.0))
+                    payload=last.value if plan.solved else 0.0,
+                    local_upper=last.value + last.gap)
+    held = None if near else _hold(problem, last, found, solver)
+    if held is not None or not plan.solved:
+        return _certified_so_far(search, held or found)
     if not near:
         return replace(found, status=PlanStatus.NOT_CONVERGED, message=(
             f'{found.payload:.6g} kg can be carried, but where this kind of motion ends was not '
@@ -118,33 +114,23 @@ def _hold(problem: MotionProblem, last: Extremal, found: MaxPayload,
 def _held(plan: Plan, limit: float, joint: int, found: MaxPayload) -> MaxPayload | None:
     """Return the outcome with a plan that carries what can be held; None without one."""
     if plan.status in INTERRUPTED_STATUS.values():
-        return replace(found, status=plan.status, message=plan.message, payload=0.0,
-                       local_upper=np.inf, plan=None)
+        return replace(found, status=plan.status, message=plan.message)
     if not plan.solved:
         return None
     return replace(found, status=plan.status, payload=limit * _HELD, local_upper=limit,
                    plan=plan, held=True, limiting_joint=joint)
 
 
-def _certified_so_far(search: LimitSearch, problem: MotionProblem, solver: Solver,
-                      found: MaxPayload) -> MaxPayload:
+def _certified_so_far(search: LimitSearch, found: MaxPayload) -> MaxPayload:
     """Return the outcome of a search that failed with the heaviest payload that it can certify."""
     if found.status is PlanStatus.CANCELED or found.plan is not None and found.plan.solved:
         return found
-    short = solver.watched_by(Monitor(time_limit=_GRACE, canceled=solver.monitor.canceled))
-    for extremal in reversed(search.certifiable):
-        try:
-            plan = plan_near(PAYLOAD.with_value(problem, extremal.value),
-                             extremal.result.solution, short)
-        except FlexPlannerError:  # too heavy to hold
-            continue
-        if plan.solved:
-            gap = extremal.gap if np.isfinite(extremal.gap) else np.inf
-            return replace(found, plan=plan, payload=extremal.value,
-                           local_upper=extremal.value + gap)
-        if short.monitor.stop_reason():
-            break
-    return found
+    known = search.certify_so_far()
+    if known is None:
+        return found
+    extremal, plan = known
+    return replace(found, plan=plan, payload=extremal.value,
+                   local_upper=extremal.value + extremal.gap)
 
 
 def search_in_steps(problem: MotionProblem, solver: Solver, step: float,
@@ -170,11 +156,12 @@ def search_in_steps(problem: MotionProblem, solver: Solver, step: float,
                 upper = trial.payload
     except StoppedError as error:
         stopped = STOP_STATUS[error.reason], str(error)
-    if stopped is not None:
-        solver = solver.watched_by(Monitor(time_limit=_GRACE, canceled=solver.monitor.canceled))
-    plan = plan_near(PAYLOAD.with_value(problem, best[0]), best[1], solver)
-    held = holding_limit(problem.model, task, problem.parameters)[0]
+    heaviest = PAYLOAD.with_value(problem, best[0])
+    plan = plan_near(heaviest, best[1], solver)
     status, message = stopped or (plan.status, plan.message)
+    if status is PlanStatus.TIMEOUT:
+        plan = plan_near(heaviest, best[1], in_grace(solver))
+    held = holding_limit(problem.model, task, problem.parameters)[0]
     found = replace(found, status=status, message=message, trials=tuple(trials),
                     local_upper=min(upper, held))
     if plan.solved:

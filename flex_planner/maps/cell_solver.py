@@ -193,8 +193,8 @@ def _late_result(index: tuple[int, ...], found: MinDuration) -> CellResult:
     """Return the result of a cell whose motion takes longer than it may."""
     task = found.task
     return CellResult(index=index, code=CellCode.NOT_FOUND, iterations=found.iterations, message=(
-        f'the shortest duration found with {task.payload_mass:g} kg is {found.duration:.4g} s, and '
-        f'{task.duration:g} s were asked for'))
+        f'the shortest duration found with {task.payload_mass:g} kg is {found.duration:.4g} s, '
+        f'and {task.duration:g} s were asked for'))
 
 
 def task_of(found: CellSolution) -> Task:
