@@ -90,12 +90,19 @@ def find_cheaper(problem: MotionProblem, found: CollocationResult, solver: Solve
         if result.status in INTERRUPTED:
             break
         if result.converged:
-            best = best.or_better(home, result, kind)
-    others = [kind for kind in kinds
-              if not are_alike(kind.motion.angles, best.kind.motion.angles)]
-    same = sum(kind.met for kind in kinds if kind not in others)
+            best = best.or_better(home, result, say_turns(problem, home))
     return CheapestMotion(problem=best.problem, result=best.result, starts=starts + len(ways),
-                          kinds=(replace(best.kind, met=max(same, 1)), *others))
+                          kinds=_list_kinds(best.kind, own, kinds))
+
+
+def _list_kinds(best: KindOfMotion, own: KindOfMotion,
+                kinds: list[KindOfMotion]) -> tuple[KindOfMotion, ...]:
+    """Return the kinds, the best first; of the arm's own motions the exact values count."""
+    others = [kind for kind in kinds if not are_alike(kind.motion.angles, best.motion.angles)]
+    met = max(sum(kind.met for kind in kinds if kind not in others), 1)
+    exact = [replace(own, met=kind.met) if are_alike(kind.motion.angles, own.motion.angles)
+             else kind for kind in others]
+    return (replace(best, met=met), *exact)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -107,10 +114,10 @@ class _Best:
     kind: KindOfMotion
     refused: bool
 
-    def or_better(self, home: MotionProblem, result: CollocationResult,
-                  kind: KindOfMotion) -> _Best:
+    def or_better(self, home: MotionProblem, result: CollocationResult, turns: str) -> _Best:
         """Return another solution if the arm may do it and it is cheaper, or the only such."""
-        other = replace(as_kind(home, result.solution), sentence=kind.sentence)
+        other = as_kind(home, result.solution)
+        other = replace(other, sentence=turns or other.sentence)
         kept = find_refusal(home, result.solution) is None
         if kept and (self.refused or other.value < self.kind.value):
             return _Best(problem=home, result=result, kind=other, refused=False)

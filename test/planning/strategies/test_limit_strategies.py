@@ -174,7 +174,7 @@ def test_duration_tried_on_the_way_may_be_too_long() -> None:
 
 @pytest.mark.parametrize(('changes', 'search', 'phase'), [
     (TOO_HEAVY, continue_in_payload, 'continuation in payload'),
-    (TOO_SHORT, continue_in_duration, 'continuation in duration')])
+    ({'duration': 0.6}, continue_in_duration, 'continuation in duration')])
 @pytest.mark.parametrize('status', [PlanStatus.CANCELED, PlanStatus.TIMEOUT])
 def test_search_for_a_limit_is_stopped(
         rigid_model: ArmModel, paper_task: TaskFactory, changes: dict[str, float],
