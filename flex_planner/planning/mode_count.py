@@ -57,7 +57,7 @@ def estimate_left_out(task: Task, times: Array, weights: Array, torques: Array) 
     end = _vibration_after(mass, stiffness, left, forces)
     block = np.ix_(kept, kept)
     end[:, kept] -= _vibration_after(mass[block], stiffness[block], left, forces)
-    return _locked_deflection(richer, mass[n:, n:], stiffness[n:, n:], end[:, n:])
+    return _locked_deflection(richer, mass, stiffness[n:, n:], end)
 
 
 def _with_another_mode(arm: Arm) -> Arm:
@@ -93,11 +93,14 @@ def _locked_deflection(arm: Arm, mass: Array, stiffness: Array, state: Array) ->
     """
     Return the largest deflection of a link after the joints are locked, all modes in phase.
 
-    Mass, stiffness (n_f, n_f) and state (2, n_f) are those of the modal coordinates.
+    Mass (n_t, n_t) and state (2, n_t) are those of all coordinates, the stiffness (n_f, n_f) that
+    of the modal ones, whose momenta the locks leave as they are.
 
     """
-    rates, shapes = free_vibrations(mass, stiffness, 0)
-    displacement, rate = state @ mass @ shapes
+    n = arm.n_joints
+    rates, shapes = free_vibrations(mass[n:, n:], stiffness, 0)
+    displacement = state[0, n:] @ mass[n:, n:] @ shapes
+    rate = state[1] @ mass[:, n:] @ shapes
     amplitude, largest = np.hypot(displacement, rate / rates), 0.0
     for link, part in zip(arm.links, arm.modal_slices, strict=True):
         stations = np.linspace(0, link.length, _STATIONS, dtype=np.float64)
