@@ -20,7 +20,7 @@ import numpy as np
 from plan_checks import solution_of
 import pytest
 
-# of estimate and simulation; what twenty arms and motions had
+# of estimate and simulation, for these arms; more have more
 ABOUT = 3.0
 
 
