@@ -67,6 +67,7 @@ def test_arm_moves_as_scipy_has_it_period_by_period(
         wanted = (GAINS.stiffness * (position - state[:2])
                   + GAINS.damping * (velocity - state[n_t:n_t + 2])
                   + reference.torque((k + hold.delay) / rate))
+
         # the motors have their limits at the speeds of every instant
         def state_rate(time: float, x: Array, wanted: Array = wanted) -> Array:
             torque = np.clip(wanted, *limits.bounds(x[n_t:n_t + 2]))
