@@ -1,8 +1,9 @@
 """
 An arm carried through a trajectory by its joint controller, all of it in compiled code.
 
-Periods of the controller follow one another in one call; where the error of a step is too large,
-the steps of some periods are taken again, shorter.
+Periods of the controller follow one another in one call. A motor that reaches or leaves its limit
+bends the motion, so a step is cut there; where the error of a step is too large otherwise, the
+steps of some periods are taken again, shorter.
 
 """
 
@@ -15,17 +16,21 @@ from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
 from flex_planner.control.joint_controller import JointController
 from flex_planner.control.joint_reference import Reference
+from flex_planner.control.period_steps import limit_crossings, PeriodSteps
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
-from flex_planner.dynamics.integration import step_error
+from flex_planner.dynamics.integration import step_errors
 from flex_planner.dynamics.physical_parameters import PhysicalParameters
 from flex_planner.dynamics.statics import equilibrium, residual_vibration
 from flex_planner.optimal_control.torque_limits import TorqueLimits
 import numpy as np
+from numpy.typing import NDArray
 
 _LONGEST_STEP = 1e-3
 _TOLERANCES = 1e-8, 1e-10
 # periods in one call, and the most steps of one: the arm must have run away
 _TOGETHER, _MOST_STEPS = 256, 256
+# rounds of cutting steps at limits: each knows better than the last where they lie
+_MOST_CUTS = 8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -97,40 +102,62 @@ class ControlledArm:
         while first < count and steps <= _MOST_STEPS:
             watch.check()
             last = min(first + max(_TOGETHER // steps, 1), count)
-            found, error = self._cross(reference, states[first], times[first:last], steps)
-            if error <= 1:
+            found = self._cross(reference, states[first], times[first:last], steps)
+            if found is None:
+                steps *= 2
+            else:
                 states[first + 1:last + 1] = found
                 first, steps = last, max(fewest, steps // 2)
-            else:
-                steps *= 2
         return ControlledMotion(times=times, states=states)
 
     def _cross(self, reference: Reference, state: Array, times: Array,
-               steps: int) -> tuple[Array, float]:
-        """Return the states after periods that begin at times, and the error of the worst step."""
-        step = self.controller.period / steps
-        rows = self._rows(reference, times, steps)
-        timing = np.tile([[step, 0.0]], (len(rows), 1))
-        timing[::steps, 1] = 1
-        after, fifth, third = self.dynamics.controlled_steps(
-            state, rows, timing, self._constants, self.parameters.physical)
-        error = step_error(np.vstack([state, after]), fifth, third, _TOLERANCES)
-        return after[steps - 1::steps], error
+               count: int) -> Array | None:
+        """Return the states after periods that begin at times; None if they need more steps."""
+        steps, done = PeriodSteps.even(times, self.controller.period, count), list[Array]()
+        for _ in range(_MOST_CUTS):
+            after, too_long, (crossed, shares) = self._take(reference, state, steps)
+            ends = after[np.append(steps.firsts[1:], True)]
+            if not too_long.any():
+                return np.vstack([*done, ends])
+            if np.setdiff1d(np.flatnonzero(too_long), crossed).size:
+                return None
+            good, wanted = int(steps.numbers[too_long.argmax()]), too_long[crossed]
+            done.append(ends[:good])
+            state = ends[good - 1] if good else state
+            steps = steps.cut(crossed[wanted], shares[wanted]).since(good)
+        return None
 
-    def _rows(self, reference: Reference, times: Array, steps: int) -> Array:
+    def _take(self, reference: Reference, state: Array, steps: PeriodSteps) -> tuple[
+            Array, NDArray[np.bool_], tuple[NDArray[np.intp], Array]]:
+        """Return states after steps, which steps are too long, and where limits cross some."""
+        rows, n = self._rows(reference, steps), self.dynamics.arm.n_joints
+        after, feedback, fifth, third = self.dynamics.controlled_steps(
+            state, rows, np.stack([steps.lengths, steps.firsts], axis=1), self._constants,
+            self.parameters.physical)
+        states, n_t = np.vstack([state, after]), self.dynamics.arm.n_coordinates
+        speeds = states[:, n_t:n_t + n]
+        efforts = rows[:, 2 * n:3 * n] + feedback, rows[:, 3 * n:] + feedback
+        return (after, step_errors(states, fifth, third, _TOLERANCES) > 1,
+                limit_crossings(self._limits, efforts, (speeds[:-1], speeds[1:])))
+
+    def _rows(self, reference: Reference, steps: PeriodSteps) -> Array:
         """Return angles, speeds, and efforts at both ends of every step, shape (k, 4 n)."""
-        first, last = self.controller.hold.efforts(reference, times, self.controller.period)
-        share = (np.arange(steps + 1) / steps)[:, None]
-        efforts = first[:, None] + share * (last - first)[:, None]
-        motion = [np.repeat(values, steps, axis=0) for values in reference.motion(times)]
-        rows: Array = np.hstack([*motion, *(part.reshape(-1, first.shape[1])
-                                            for part in (efforts[:, :-1], efforts[:, 1:]))])
+        first, last = self.controller.hold.efforts(reference, steps.times, steps.period)
+        numbers = steps.numbers
+        change = (last - first)[numbers]
+        efforts = [first[numbers] + change * share[:, None] for share in steps.shares()]
+        rows: Array = np.hstack([*(values[numbers] for values in reference.motion(steps.times)),
+                                 *efforts])
         return rows
+
+    @property
+    def _limits(self) -> TorqueLimits:
+        return TorqueLimits.of(self.dynamics.arm)
 
     @property
     def _constants(self) -> Array:
         """Return gains and limits, shape (4 n,)."""
-        gains, limits = self.controller.gains, TorqueLimits.of(self.dynamics.arm)
+        gains, limits = self.controller.gains, self._limits
         return np.concatenate([gains.stiffness, gains.damping, limits.stall, limits.slope])
 
 
@@ -141,13 +168,10 @@ def locked_bending(dynamics: ArmDynamics, state: Array, parameters: PhysicalPara
     Infinite where the state is not finite, or the arm cannot rest there.
 
     """
-    n, n_t = dynamics.arm.n_joints, dynamics.arm.n_coordinates
     if not np.isfinite(state).all():
         return np.inf
     try:
-        rest, _ = equilibrium(dynamics, state[:n], parameters)
+        rest, _ = equilibrium(dynamics, state[:dynamics.arm.n_joints], parameters)
     except NoEquilibriumError:
         return np.inf
-    locked = state.copy()
-    locked[n_t:n_t + n] = 0
-    return residual_vibration(dynamics, locked, rest, parameters)
+    return residual_vibration(dynamics, state, rest, parameters)

@@ -124,9 +124,11 @@ class ArmDynamics:
         return advance
 
     def controlled_steps(self, state: Array, reference: Array, timing: Array, controller: Array,
-                         physical: Array) -> tuple[Array, Array, Array]:
+                         physical: Array) -> tuple[Array, Array, Array, Array]:
         """
         Return the states after each of k steps under a joint controller, and their errors.
+
+        Motors have the limits of eq. (15) at the speeds of every instant.
 
         Parameters
         ----------
@@ -145,7 +147,11 @@ class ArmDynamics:
 
         Returns
         -------
-        states, fifth, third : numpy.ndarray, shape (k, 2 n_t)
+        states : numpy.ndarray, shape (k, 2 n_t)
+            After each step.
+        feedback : numpy.ndarray, shape (k, n)
+            Torque of the PD in each step [N m].
+        fifth, third : numpy.ndarray, shape (k, 2 n_t)
             As `runge_kutta_steps` has them.
 
         """
@@ -153,7 +159,7 @@ class ArmDynamics:
         first[0, :state.size] = state
         after, fifth, third = self._load('controlled_step').evaluate_chain(
             first, reference, timing, controller, physical)
-        return after[:, :state.size], fifth, third
+        return after[:, :state.size], after[:, state.size:], fifth, third
 
     def held_step(self, physical: Array) -> HeldStep:
         """

@@ -107,13 +107,16 @@ def _controlled_step(rate: Any, n: int) -> BatchedFunction:
     x, held = state[:size], state[size:]
     angles, speeds, first, last = ca.vertsplit(reference, n)
     stiffness, damping, stall, loss = ca.vertsplit(controller, n)
-    speed = x[size // 2:size // 2 + n]
-    sampled = stiffness * (angles - x[:n]) + damping * (speeds - speed)
+    sampled = stiffness * (angles - x[:n]) + damping * (speeds - x[size // 2:size // 2 + n])
     held += timing[1] * (sampled - held)
-    begin, end = (ca.fmin(ca.fmax(effort + held, -stall - loss * speed), stall - loss * speed)
-                  for effort in (first, last))
-    stages = [begin + float(share) * (end - begin) for share in DOP853.C[:DOP853.n_stages]]
-    after, fifth, third = _advance(rate, x, [*stages, end], timing[0], p)
+
+    def limited(at: Any, torque: Any, physical: Any) -> Any:
+        lost = loss * at[size // 2:size // 2 + n]
+        return rate(at, ca.fmin(ca.fmax(torque, -stall - lost), stall - lost), physical)
+
+    stages = [first + float(share) * (last - first) + held
+              for share in DOP853.C[:DOP853.n_stages]]
+    after, fifth, third = _advance(limited, x, [*stages, last + held], timing[0], p)
     return ca.Function('controlled_step', [state, reference, timing, controller, p], [
         ca.vertcat(after, held), fifth, third]), 3
 

@@ -224,8 +224,14 @@ def _cross(advance: RungeKuttaSteps, state: Array, torques: Array, step: float,
 
 def step_error(states: Array, fifth: Array, third: Array,
                tolerances: tuple[float, float]) -> float:
+    """Return the largest of `step_errors`."""
+    return float(step_errors(states, fifth, third, tolerances).max())
+
+
+def step_errors(states: Array, fifth: Array, third: Array,
+                tolerances: tuple[float, float]) -> Array:
     """
-    Return the error of the worst of k steps, at most 1 if the tolerances are kept.
+    Return the errors of k steps, shape (k,), at most 1 if the tolerances are kept.
 
     Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, section II.10.
 
@@ -244,8 +250,8 @@ def step_error(states: Array, fifth: Array, third: Array,
     scale = atol + rtol * np.maximum(size[:-1], size[1:])
     first, second = (((error / scale) ** 2).sum(axis=1) for error in (fifth, third))
     bound = np.sqrt(np.maximum((first + 0.01 * second) * states.shape[1], _SMALLEST))
-    worst = float((first / bound).max())
-    return worst if np.isfinite(worst) else np.inf
+    errors: Array = np.nan_to_num(first / bound, nan=np.inf)
+    return errors
 
 
 def _stage_shares(count: int) -> Array:

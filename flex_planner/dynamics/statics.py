@@ -101,7 +101,9 @@ def residual_vibration(dynamics: ArmDynamics, state: Array, rest: Array,
     Return how far the links still bend after the joints are locked [m].
 
     The largest distance of any point of a link from its place at rest, with all modes of the
-    locked arm in phase: what the free vibration may reach but not exceed.
+    locked arm in phase: what the free vibration may reach but not exceed. What stops joints that
+    still turn acts on them alone, so the momenta of the modes stay as they are, and their rates
+    jump.
 
     Parameters
     ----------
@@ -120,8 +122,10 @@ def residual_vibration(dynamics: ArmDynamics, state: Array, rest: Array,
     if not arm.n_modes:
         return 0.0
     frequencies, vectors = natural_modes(dynamics, rest, parameters, locked=True)
+    mass = dynamics.mass_and_energy(state[None], parameters.physical)[0][0, n:]
+    momenta = mass @ state[n_t:]
     displacement = np.linalg.solve(vectors, state[n:n_t] - rest[n:])
-    rate = np.linalg.solve(vectors, state[n_t + n:])
+    rate = np.linalg.solve(vectors, np.linalg.solve(mass[:, n:], momenta))
     amplitude = np.hypot(displacement, rate / frequencies)
     return max(float((np.abs(_bending(dynamics, link, vectors)) @ amplitude).max())
                for link in range(n) if arm.links[link].modes)

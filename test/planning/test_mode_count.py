@@ -20,7 +20,7 @@ import numpy as np
 from plan_checks import solution_of
 import pytest
 
-# of estimate and simulation; what twenty arms and motions had
+# of estimate and simulation, for these arms; more have more
 ABOUT = 3.0
 
 
@@ -79,7 +79,7 @@ def test_one_mode_of_soft_pinned_links_is_not_enough(ei5_arm: Arm, plan_of: Plan
 def test_clamped_links_swing_by_millimetres_that_their_modes_do_not_have(clamped: Plan) -> None:
     left = simulated(clamped)
     assert clamped.certificate.residual_vibration < 1e-6
-    assert left > 5e-3
+    assert left > 3e-3
     assert left / ABOUT < estimate(clamped) < ABOUT * left
 
 
