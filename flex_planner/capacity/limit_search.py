@@ -36,6 +36,7 @@ from flex_planner.planning.strategies.strategy import Attempt, Strategy
 
 # a search has finished a kind of motion if it comes to this share of its value
 _KEPT = 0.01
+_CONTINUED = 'continuation to the limit'
 # starts for each other way round to a point
 _OTHER_WAY = 3
 
@@ -87,6 +88,11 @@ class LimitSearch:
         self.starts = 0
         self.extremals: list[Extremal] = []
         self.extrapolated = self.warm = False
+
+    @property
+    def weighted(self) -> bool:
+        """Return whether the task has weights besides those of effort."""
+        return has_weights(self._problem)
 
     @property
     def last(self) -> Extremal:
@@ -261,14 +267,20 @@ class LimitSearch:
         return found if found is not None and found.result.converged else None
 
 
+def continue_strategy(start: CollocationSolution) -> Strategy:
+    """Return the strategy that starts from a motion with the weights of the task."""
+    return Strategy(_CONTINUED, lambda problem, solver: Attempt(
+        result=solver.solve(problem, start)), quick=True)
+
+
 def start_strategy(start: CollocationSolution, extremal: Extremal | None = None) -> Strategy:
-    """Return the strategy that starts from a motion; that of an extremal may be the solution."""
+    """Return the strategy that starts from a motion without weights, perhaps the solution."""
     def attempt(problem: MotionProblem, solver: Solver) -> Attempt:
         if extremal is not None and _is_solution(extremal, problem, solver):
             return Attempt(result=extremal.result)
         return Attempt(result=raise_weights_from(problem, start, solver))
 
-    return Strategy('continuation to the limit', attempt, quick=True)
+    return Strategy(_CONTINUED, attempt, quick=True)
 
 
 def plan_near(problem: MotionProblem, start: CollocationSolution, solver: Solver) -> Plan:
