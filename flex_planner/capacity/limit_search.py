@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from flex_planner.base.errors import FlexPlannerError
+from flex_planner.base.progress import Monitor
 from flex_planner.capacity.bracket import (
     bracket_width,
     collect_to_limit,
@@ -30,6 +31,7 @@ from flex_planner.planning.strategies.homotopies import (
     drop_weights,
     has_weights,
     raise_weights_from,
+    without_weights,
 )
 from flex_planner.planning.strategies.price_continuation import continue_in_price
 from flex_planner.planning.strategies.strategy import Attempt, Strategy
@@ -39,6 +41,8 @@ _KEPT = 0.01
 _CONTINUED = 'continuation to the limit'
 # starts for each other way round to a point
 _OTHER_WAY = 3
+# time to certify what a search has when its own is over [s]
+_GRACE = 1.0
 
 
 class Failure(NamedTuple):
@@ -153,10 +157,32 @@ class LimitSearch:
             return replace(found, message=f'{plan.message}; {found.message}')
         return found
 
-    @property
-    def certifiable(self) -> list[Extremal]:
-        """Return the motions that were solved, the one nearest to the limit last."""
-        return [one for one in self.extremals if one.result.converged]
+    def certify_so_far(self) -> tuple[Extremal, Plan] | None:
+        """
+        Return the motion nearest to the limit with a plan; None if there is none at once.
+
+        Where the weights of the task leave none, the plan is without them.
+
+        """
+        known = self._certify_at_once(self._problem)
+        if known is None and self.weighted:
+            known = self._certify_at_once(without_weights(self._problem))
+        return known
+
+    def _certify_at_once(self, problem: MotionProblem) -> tuple[Extremal, Plan] | None:
+        """Return the motion nearest to the limit with a plan of a problem like the task's."""
+        short = in_grace(self._solver, _GRACE / 2 if self.weighted else _GRACE)
+        for extremal in (one for one in reversed(self.extremals) if one.result.converged):
+            try:
+                near = self._parameter.with_value(problem, extremal.value)
+                plan = plan_near(near, extremal.result.solution, short)
+            except FlexPlannerError:  # too heavy to hold
+                continue
+            if plan.solved:
+                return extremal, plan
+            if short.monitor.stop_reason():
+                break
+        return None
 
     @property
     def explored_best(self) -> KindOfMotion | None:
@@ -211,13 +237,13 @@ class LimitSearch:
 
     def _find_kinds(self, bare: MotionProblem) -> tuple[MotionProblem, list[KindOfMotion]]:
         """Note all kinds of motion; return those of the best way round to the goal."""
-        unknown, monitor = self._parameter.unknown, self._solver.monitor
+        unknown, solver = self._parameter.unknown, self._solver
         ways = other_windings(bare) if self._effort.explores else []
         self.starts = self._effort.starts + _OTHER_WAY * len(ways)
-        found = {bare: find_kinds(bare, unknown, self._effort.starts, monitor)}
+        found = {bare: find_kinds(bare, unknown, self._effort.starts, solver)}
         for way in ways:
             found[way] = [replace(kind, sentence=say_turns(bare, way)) for kind in find_kinds(
-                way, unknown, _OTHER_WAY, monitor)]
+                way, unknown, _OTHER_WAY, solver)]
         best = bare
         for way in ways:
             if found[way] and (not found[best] or self._parameter.improves(
@@ -271,6 +297,11 @@ def continue_strategy(start: CollocationSolution) -> Strategy:
     """Return the strategy that starts from a motion with the weights of the task."""
     return Strategy(_CONTINUED, lambda problem, solver: Attempt(
         result=solver.solve(problem, start)), quick=True)
+
+
+def in_grace(solver: Solver, seconds: float = _GRACE) -> Solver:
+    """Return a solver whose time is just enough to certify what a stopped search has."""
+    return solver.watched_by(Monitor(time_limit=seconds, canceled=solver.monitor.canceled))
 
 
 def start_strategy(start: CollocationSolution, extremal: Extremal | None = None) -> Strategy:

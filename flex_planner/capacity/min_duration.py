@@ -16,7 +16,7 @@ from flex_planner.base.validation import number, vector
 from flex_planner.capacity.extrapolation import Neighbours, step_ratio
 from flex_planner.capacity.limit_search import LimitSearch
 from flex_planner.capacity.max_payload import find_max_payload
-from flex_planner.capacity.results import describe_kinds, MaxPayload, MinDuration
+from flex_planner.capacity.results import describe_kinds, MaxPayload, MinDuration, say_lost_weights
 from flex_planner.collocation import Solver
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
@@ -94,9 +94,11 @@ def find_min_duration(task: Task, *, model: ArmModel | None = None,
     try:
         found = _search(task, limits, neighbours)
     except StoppedError as error:
-        found = _result(task, limits, STOP_STATUS[error.reason], str(error))
+        found = _certified_so_far(limits, _result(task, limits, STOP_STATUS[error.reason],
+                                                  str(error)))
     except FlexPlannerError as error:  # of a duration that was tried
-        found = _result(task, limits, PlanStatus.NOT_CONVERGED, str(error))
+        found = _certified_so_far(limits, _result(task, limits, PlanStatus.NOT_CONVERGED,
+                                                  str(error)))
     found = replace(found, proved_lower=bound_duration(problem))
     return replace(found, iterations=solver.monitor.iteration - began[0],
                    planning_time=solver.monitor.elapsed - began[1])
@@ -107,13 +109,13 @@ def _search(task: Task, search: LimitSearch, neighbours: Neighbours) -> MinDurat
     point = None if neighbours.near is None else neighbours.near.restart_point
     failure = search.follow_price(None if point is None else SearchStart.of(point), neighbours)
     if failure is not None:
-        return _result(task, search, failure.status, failure.message)
+        return _certified_so_far(search, _result(task, search, failure.status, failure.message))
     plan, last = search.plan(), search.last
     lower = max(0.0, last.value - last.gap)
     found = replace(_result(task, search, plan.status, plan.message), plan=plan,
                     duration=last.value if plan.solved else np.inf, local_lower=lower)
     if not plan.solved:
-        return found
+        return _certified_so_far(search, found)
     if not search.is_near:
         return replace(found, status=PlanStatus.NOT_CONVERGED, message=(
             f'{last.value:.6g} s are enough, but where this kind of motion ends was not found'))
@@ -125,6 +127,18 @@ def _search(task: Task, search: LimitSearch, neighbours: Neighbours) -> MinDurat
     return replace(found, message=(
         f'{last.value:.6g} s are enough, certified{describe_kinds(found)}; this kind of motion '
         f'ends at {lower:.6g} s'))
+
+
+def _certified_so_far(search: LimitSearch, found: MinDuration) -> MinDuration:
+    """Return the outcome of a search that failed with the shortest duration it can certify."""
+    known = None if found.status is PlanStatus.CANCELED else search.certify_so_far()
+    if known is None:
+        return found
+    extremal, plan = known
+    return replace(found, plan=plan, duration=extremal.value,
+                   local_lower=max(0.0, extremal.value - extremal.gap),
+                   message=f'{found.message}{say_lost_weights(found.task, plan)} '
+                           f'({extremal.value:.6g} s are certified)')
 
 
 def _result(task: Task, search: LimitSearch, status: PlanStatus, message: str) -> MinDuration:

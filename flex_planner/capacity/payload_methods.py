@@ -11,11 +11,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from flex_planner.base.errors import FlexPlannerError
-from flex_planner.base.progress import Monitor, StoppedError
+from flex_planner.base.progress import StoppedError
 from flex_planner.capacity.extrapolation import Neighbours
 from flex_planner.capacity.limit_search import LimitSearch, plan_near
-from flex_planner.capacity.payload_outcome import describe, GRACE, with_bound
-from flex_planner.capacity.results import MaxPayload, PayloadFront, PayloadMethod
+from flex_planner.capacity.payload_outcome import describe, with_bound
+from flex_planner.capacity.results import MaxPayload, PayloadFront, PayloadMethod, say_lost_weights
 from flex_planner.collocation import Solver
 from flex_planner.optimal_control.holding import holding_limit
 from flex_planner.optimal_control.motion_problem import MotionProblem
@@ -27,7 +27,6 @@ from flex_planner.planning.plan_problem import INTERRUPTED_STATUS, plan_problem,
 from flex_planner.planning.strategies.catalogue import QUICK
 from flex_planner.planning.strategies.extremals import Extremal, SearchStart
 from flex_planner.planning.strategies.free_parameters import PAYLOAD
-from flex_planner.planning.strategies.homotopies import has_weights, without_weights
 import numpy as np
 
 # of the payload that the motors can just hold, kept clear of rounding
@@ -45,10 +44,10 @@ def search_directly(problem: MotionProblem, solver: Solver, accuracy: float,
         held = None if start is not None else _hold_at_once(problem, solver)
         found = held or _follow(search, problem, solver, start)
     except StoppedError as error:
-        found = _certified_so_far(search, problem, solver, _result(
+        found = _certified_so_far(search, _result(
             search, problem, STOP_STATUS[error.reason], str(error)))
     except FlexPlannerError as error:  # of a payload that was tried
-        found = _certified_so_far(search, problem, solver, _result(
+        found = _certified_so_far(search, _result(
             search, problem, PlanStatus.NOT_CONVERGED, str(error)))
     return describe(with_bound(found, problem))
 
@@ -59,18 +58,16 @@ def _follow(search: LimitSearch, problem: MotionProblem, solver: Solver,
     neighbours = start if isinstance(start, Neighbours) else Neighbours()
     failure = search.follow_price(_start(start), neighbours)
     if failure is not None:
-        return _certified_so_far(search, problem, solver, _result(
+        return _certified_so_far(search, _result(
             search, problem, failure.status, failure.message))
     plan = search.plan()
     last, near = search.last, search.is_near
     found = replace(_result(search, problem, plan.status, plan.message), plan=plan,
-                    payload=last.value, local_upper=last.value + last.gap)
-    if not near:
-        held = _hold(problem, last, found, solver)
-        if held is not None:
-            return held
-    if not plan.solved:
-        return _certified_so_far(search, problem, solver, replace(found, payload=0.0))
+                    payload=last.value if plan.solved else 0.0,
+                    local_upper=last.value + last.gap)
+    held = None if near else _hold(problem, last, found, solver)
+    if held is not None or not plan.solved:
+        return _certified_so_far(search, held or found)
     if not near:
         return replace(found, status=PlanStatus.NOT_CONVERGED, message=(
             f'{found.payload:.6g} kg can be carried, but where this kind of motion ends was not '
@@ -109,47 +106,24 @@ def _hold(problem: MotionProblem, last: Extremal, found: MaxPayload,
 def _held(plan: Plan, limit: float, joint: int, found: MaxPayload) -> MaxPayload | None:
     """Return the outcome with a plan that carries what can be held; None without one."""
     if plan.status in INTERRUPTED_STATUS.values():
-        return replace(found, status=plan.status, message=plan.message, payload=0.0,
-                       local_upper=np.inf, plan=None)
+        return replace(found, status=plan.status, message=plan.message)
     if not plan.solved:
         return None
     return replace(found, status=plan.status, payload=limit * _HELD, local_upper=limit,
                    plan=plan, held=True, limiting_joint=joint)
 
 
-def _certified_so_far(search: LimitSearch, problem: MotionProblem, solver: Solver,
-                      found: MaxPayload) -> MaxPayload:
+def _certified_so_far(search: LimitSearch, found: MaxPayload) -> MaxPayload:
     """Return the outcome of a search that failed with the heaviest payload that it can certify."""
     if found.status is PlanStatus.CANCELED or found.plan is not None and found.plan.solved:
         return found
-    certified = _certify_last(search, problem, solver, found)
-    if certified is not None or not has_weights(problem):
-        return certified or found
-    bare = without_weights(problem)
-    certified = _certify_last(search, bare, solver, found)
-    return found if certified is None else replace(certified, message=(
-        f'{found.message}; with the weights of the task on positions and speeds no motion near '
-        'the limit was solved, so that the plan is without them'))
-
-
-def _certify_last(search: LimitSearch, problem: MotionProblem, solver: Solver,
-                  found: MaxPayload) -> MaxPayload | None:
-    """Return the outcome with the heaviest payload whose motion is certified at once."""
-    grace = GRACE / 2 if search.weighted else GRACE
-    short = solver.watched_by(Monitor(time_limit=grace, canceled=solver.monitor.canceled))
-    for extremal in reversed(search.certifiable):
-        try:
-            plan = plan_near(PAYLOAD.with_value(problem, extremal.value),
-                             extremal.result.solution, short)
-        except FlexPlannerError:  # too heavy to hold
-            continue
-        if plan.solved:
-            gap = extremal.gap if np.isfinite(extremal.gap) else np.inf
-            return replace(found, plan=plan, payload=extremal.value,
-                           local_upper=extremal.value + gap)
-        if short.monitor.stop_reason():
-            break
-    return None
+    known = search.certify_so_far()
+    if known is None:
+        return found
+    extremal, plan = known
+    return replace(found, plan=plan, payload=extremal.value,
+                   local_upper=extremal.value + extremal.gap,
+                   message=f'{found.message}{say_lost_weights(found.task, plan)}')
 
 
 def _result(search: LimitSearch, problem: MotionProblem, status: PlanStatus,

@@ -10,8 +10,6 @@ from flex_planner.planning.plan import PlanStatus
 from flex_planner.planning.proofs import bound_payload
 import numpy as np
 
-# time to certify what a search has when its own is over [s]
-GRACE = 1.0
 # of a bound that is reached, which gives away a millionth itself
 _ROUNDING = 2e-6
 

@@ -189,3 +189,11 @@ def describe_kinds(found: LimitResult) -> str:
     count = len(found.kinds)
     kinds = 'the only kind of motion' if count == 1 else f'the best of {count} kinds of motion'
     return f', {kinds} found from {found.starts} starts'
+
+
+def say_lost_weights(task: Task, plan: Plan) -> str:
+    """Return the words for a plan without the weights of the task; none if it has them."""
+    lost = any(getattr(task, name).any() and not getattr(plan.task, name).any()
+               for name in ('position_weights', 'velocity_weights'))
+    return ('; with the weights of the task on positions and speeds no motion near the limit was '
+            'solved, so that the plan is without them') if lost else ''

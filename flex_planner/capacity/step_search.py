@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from flex_planner.base.progress import Monitor, StoppedError
+from flex_planner.base.progress import StoppedError
 from flex_planner.capacity.incremental import PayloadTrial, raise_payload
-from flex_planner.capacity.limit_search import continue_strategy
-from flex_planner.capacity.payload_outcome import describe, GRACE, with_bound
+from flex_planner.capacity.limit_search import continue_strategy, in_grace
+from flex_planner.capacity.payload_outcome import describe, with_bound
 from flex_planner.capacity.results import MaxPayload, PayloadMethod
 from flex_planner.collocation import CollocationSolution, Solver
 from flex_planner.optimal_control.holding import holding_limit
@@ -66,10 +66,13 @@ def search_in_steps(problem: MotionProblem, solver: Solver, step: float,
             climb.add(trial)
     except StoppedError as error:
         climb.stopped = STOP_STATUS[error.reason], str(error)
-    if climb.stopped is not None:
-        solver = solver.watched_by(Monitor(time_limit=GRACE, canceled=solver.monitor.canceled))
-    plan = plan_problem(PAYLOAD.with_value(problem, climb.payload), solver,
-                        (continue_strategy(climb.motion), *QUICK))
+    heaviest = PAYLOAD.with_value(problem, climb.payload)
+    strategies = continue_strategy(climb.motion), *QUICK
+    plan = plan_problem(heaviest, solver, strategies)
+    if plan.status in INTERRUPTED_STATUS.values():
+        climb.stopped = climb.stopped or (plan.status, plan.message)
+    if climb.stopped is not None and climb.stopped[0] is PlanStatus.TIMEOUT:
+        plan = plan_problem(heaviest, in_grace(solver), strategies)
     return _conclude(found, climb, plan, problem)
 
 

@@ -7,6 +7,7 @@ import math
 from typing import NamedTuple, TypeAlias
 
 from flex_planner.arms.kinematics import tip_position
+from flex_planner.base.errors import HoldingError
 from flex_planner.base.progress import Monitor
 from flex_planner.capacity.extrapolation import Neighbours, thin_out
 from flex_planner.capacity.max_payload import find_max_payload
@@ -83,7 +84,10 @@ class CellSolver:
 
         """
         study, model = self._study, self._model
-        problem = MotionProblem(model, task, task_parameters(task))
+        try:
+            problem = MotionProblem(model, task, task_parameters(task))
+        except HoldingError:  # there is no motion, and the plan says why
+            return plan_path(task, model=model)
         solver = Solver(_settings(problem), monitor)
         if study.quantity is Quantity.MAX_PAYLOAD:
             return self._find_payload(problem, solver, start)
@@ -188,9 +192,9 @@ def _motion_to_keep(found: CellSolution, plan: Plan) -> KeptMotion | None:
 def _late_result(index: tuple[int, ...], found: MinDuration) -> CellResult:
     """Return the result of a cell whose motion takes longer than it may."""
     task = found.task
-    return CellResult(index=index, code=CellCode.INFEASIBLE, iterations=found.iterations, message=(
-        f'the motion takes at least {found.local_lower:.4g} s with {task.payload_mass:g} kg, and '
-        f'{task.duration:g} s were asked for'))
+    return CellResult(index=index, code=CellCode.NOT_FOUND, iterations=found.iterations, message=(
+        f'the shortest duration found with {task.payload_mass:g} kg is {found.duration:.4g} s, '
+        f'and {task.duration:g} s were asked for'))
 
 
 def task_of(found: CellSolution) -> Task:

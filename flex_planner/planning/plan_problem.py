@@ -39,7 +39,8 @@ def plan_problem(problem: MotionProblem, solver: Solver,
     """
     Return the certified plan of a problem by the first strategy that solves it.
 
-    Unless it was a warm start, other kinds of motion are looked for then.
+    Unless it was a warm start, cheaper kinds of motion are looked for then; where that ends for
+    want of time, or leads to nothing that can be certified, the plan is the first one.
 
     Parameters
     ----------
@@ -58,12 +59,10 @@ def plan_problem(problem: MotionProblem, solver: Solver,
             problem, strategy, attempt = _solve_in_any_time(problem, solver, strategies)
         else:
             strategy, attempt = _solve_first(problem, solver, strategies)
-        if effort.explores and strategy != WARM_START and attempt.result.converged:
-            problem, attempt = _look_for_cheaper(problem, attempt, solver)
-            if problem.task.time_weight:
-                problem, result = free_duration(problem, attempt.result, solver)
-                attempt = replace(attempt, result=result)
         plan = _conclude(problem, strategy, attempt, solver)
+        if (effort.explores and strategy != WARM_START and plan.solution is not None
+                and plan.status not in STOP_STATUS.values()):
+            plan = _look_for_cheaper(plan, attempt, solver, effort)
     except StoppedError as error:
         plan = Plan(task=problem.task, status=STOP_STATUS[error.reason], message=str(error),
                     strategy='', problem=problem, solution=None)
@@ -73,22 +72,41 @@ def plan_problem(problem: MotionProblem, solver: Solver,
                    planning_time=solver.monitor.elapsed)
 
 
-def _look_for_cheaper(problem: MotionProblem, attempt: Attempt,
-                      solver: Solver) -> tuple[MotionProblem, Attempt]:
-    """Return the cheapest motion of other kinds, too, with the kinds that were met."""
-    cheapest = find_cheaper(problem, attempt.result, solver)
+def _look_for_cheaper(plan: Plan, attempt: Attempt, solver: Solver,
+                      effort: SearchEffort) -> Plan:
+    """Return the plan of the cheapest kind of motion, with the kinds that were met."""
+    cheapest = find_cheaper(plan.problem, attempt.result, solver, effort)
+    if solver.monitor.canceled():
+        raise StoppedError(StopReason.CANCELED)
     others = [kind for kind in attempt.kinds if not any(
         are_alike(kind.motion.angles, one.motion.angles) for one in cheapest.kinds)]
-    return cheapest.problem, Attempt(
-        result=cheapest.result, kinds=(*cheapest.kinds, *others),
-        starts=cheapest.starts + attempt.starts - 1)
+    met = Attempt(result=cheapest.result, kinds=(*cheapest.kinds, *others),
+                  starts=cheapest.starts + attempt.starts - 1)
+    if met.result is attempt.result:
+        plan = replace(plan, kinds=met.kinds[:MOST_KINDS], starts=met.starts)
+        return replace(plan, message=describe_choice(plan)) if plan.solved else plan
+    other = _conclude_in_time(cheapest.problem, plan.strategy, met, solver)
+    if other.status is PlanStatus.CANCELED:
+        return other
+    better = other.solved > plan.solved or other.cost < plan.cost
+    return other if better and other.solved >= plan.solved else plan
+
+
+def _conclude_in_time(problem: MotionProblem, strategy: str, attempt: Attempt,
+                      solver: Solver) -> Plan:
+    """Return the plan of another motion of the same task, in the time that is best for it."""
+    if problem.task.time_weight:
+        problem, result = free_duration(problem, attempt.result, solver)
+        attempt = replace(attempt, result=result)
+    return _conclude(problem, strategy, attempt, solver)
 
 
 def _solve_in_any_time(problem: MotionProblem, solver: Solver, strategies: Sequence[Strategy],
                        ) -> tuple[MotionProblem, str, Attempt]:
     """Solve for the duration of the task or a longer one, then free it."""
-    quick = [strategy for strategy in strategies if strategy.quick] or list(strategies)
-    slow = [strategy for strategy in strategies if strategy not in quick]
+    useful = [_without_verdict(strategy) for strategy in strategies]
+    quick = [strategy for strategy in useful if strategy.quick] or useful
+    slow = [strategy for strategy in useful if strategy not in quick]
     strategy, attempt = _solve_first(problem, solver, quick)
     for factor in _GUESSES:
         longer = factor * problem.task.duration
@@ -109,6 +127,15 @@ def _solve_in_any_time(problem: MotionProblem, solver: Solver, strategies: Seque
         problem, result = free_duration(problem, attempt.result, solver)
         attempt = replace(attempt, result=result)
     return problem, strategy, attempt
+
+
+def _without_verdict(strategy: Strategy) -> Strategy:
+    """Return a strategy that says nothing against a task whose duration is but a guess."""
+    def attempt(problem: MotionProblem, solver: Solver) -> Attempt | None:
+        found = strategy.attempt(problem, solver)
+        return None if found is None else replace(found, not_found=False, hopeless=False)
+
+    return replace(strategy, attempt=attempt)
 
 
 def _conclude(problem: MotionProblem, strategy: str, attempt: Attempt, solver: Solver) -> Plan:

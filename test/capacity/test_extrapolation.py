@@ -10,13 +10,13 @@ from flex_planner.arms.arm import Arm
 from flex_planner.arms.inverse_kinematics import inverse_kinematics
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.capacity.extrapolation import extrapolate, Neighbours, SwitchedMotion
-from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.capacity.min_duration import find_min_duration, payload_against_duration
 from flex_planner.capacity.results import MaxPayload, MinDuration
 from flex_planner.collocation import CollocationSolution, GaussRule
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.task import Task
 import numpy as np
+from payload_searches import followed
 import pytest
 
 Array = np.ndarray
@@ -53,7 +53,7 @@ def test_payloads_on_a_line_are_those_found_one_by_one(
     tasks, model = line(arm, paper_task, 5), ArmModel(arm)
 
     def search(task: Task, **start: object) -> MaxPayload:
-        return find_max_payload(task, model=model, **start)
+        return followed(task, model=model, **start)
 
     warm = continued_along(tasks, search)
     for task, one in zip(tasks[2:], warm[2:], strict=True):
@@ -71,7 +71,7 @@ def test_durations_on_a_line_are_those_found_one_by_one(
     tasks, model = line(rigid_arm, paper_task, 5, payload=1.0), ArmModel(rigid_arm)
 
     def search(task: Task, **start: object) -> MinDuration:
-        return find_min_duration(task, model=model, **start)
+        return find_min_duration(task, model=model, search='fast', **start)
 
     warm = continued_along(tasks, search)
     for task, one in zip(tasks[2:], warm[2:], strict=True):
@@ -88,7 +88,7 @@ def test_durations_on_a_line_are_those_found_one_by_one(
 def test_meshes_do_not_grow_along_a_line(rigid_arm: Arm, paper_task: TaskFactory) -> None:
     model = ArmModel(rigid_arm)
     found = continued_along(line(rigid_arm, paper_task, 10), lambda task, **start: (
-        find_max_payload(task, model=model, **start)))
+        followed(task, model=model, **start)))
     sizes = [one.plan.mesh_intervals for one in found if one.plan is not None]
     assert len(sizes) == 10
     assert max(sizes[5:]) <= max(sizes[:3])
@@ -97,22 +97,22 @@ def test_meshes_do_not_grow_along_a_line(rigid_arm: Arm, paper_task: TaskFactory
 def test_uneven_steps_take_their_ratio(rigid_arm: Arm, paper_task: TaskFactory) -> None:
     model = ArmModel(rigid_arm)
     far, near, there = (towards(rigid_arm, paper_task, y) for y in (0.4, 0.41, 0.435))
-    first = find_max_payload(far, model=model)
-    second = find_max_payload(near, model=model, start_from=first)
-    right = find_max_payload(there, model=model, start_from=Neighbours(
+    first = followed(far, model=model)
+    second = followed(near, model=model, start_from=first)
+    right = followed(there, model=model, start_from=Neighbours(
         near=second, far=first, ratio=2.5))
-    assert right.payload == pytest.approx(find_max_payload(there, model=model).payload, abs=1e-3)
+    assert right.payload == pytest.approx(followed(there, model=model).payload, abs=1e-3)
     assert right.iterations <= 12
 
 
 def test_line_that_leads_nowhere_costs_no_answer(rigid_arm: Arm, paper_task: TaskFactory) -> None:
     model = ArmModel(rigid_arm)
-    first, second = (find_max_payload(task, model=model)
+    first, second = (followed(task, model=model)
                      for task in line(rigid_arm, paper_task, 2))
     elsewhere = towards(rigid_arm, paper_task, -0.3)
-    expected = find_max_payload(elsewhere, model=model)
+    expected = followed(elsewhere, model=model)
     for ratio in (1.0, 50.0, -50.0):
-        found = find_max_payload(elsewhere, model=model, start_from=Neighbours(
+        found = followed(elsewhere, model=model, start_from=Neighbours(
             near=second, far=first, ratio=ratio))
         assert found.solved, found.message
         assert found.payload == pytest.approx(expected.payload, abs=1e-3)
@@ -120,11 +120,11 @@ def test_line_that_leads_nowhere_costs_no_answer(rigid_arm: Arm, paper_task: Tas
 
 def test_searches_of_another_arm_are_left_aside(rigid_arm: Arm, ei50_arm: Arm,
                                                 paper_task: TaskFactory) -> None:
-    first, second = (find_max_payload(task) for task in line(rigid_arm, paper_task, 2))
+    first, second = (followed(task) for task in line(rigid_arm, paper_task, 2))
     task = towards(ei50_arm, paper_task, 0.425)
-    found = find_max_payload(task, start_from=Neighbours(near=second, far=first))
+    found = followed(task, start_from=Neighbours(near=second, far=first))
     assert found.solved, found.message
-    assert found.payload == pytest.approx(find_max_payload(task).payload, abs=1e-3)
+    assert found.payload == pytest.approx(followed(task).payload, abs=1e-3)
 
 
 @pytest.mark.parametrize('ratio', [np.nan, 101.0, -101.0])
@@ -138,7 +138,7 @@ def test_payload_against_duration_continues(rigid_arm: Arm, paper_task: TaskFact
     found = list(payload_against_duration(task, durations))
     assert [one.task.duration for one in found] == durations
     for one in found:
-        alone = find_max_payload(replace(task, duration=one.task.duration))
+        alone = followed(replace(task, duration=one.task.duration))
         assert one.payload == pytest.approx(alone.payload, abs=1e-3)
     assert sum(one.iterations for one in found[2:]) < 60
 
@@ -147,10 +147,10 @@ def test_plan_with_weights_is_not_taken_from_the_search(rigid_arm: Arm,
                                                         paper_task: TaskFactory) -> None:
     tasks = [replace(task, velocity_weights=[10.0, 10.0])
              for task in line(rigid_arm, paper_task, 3)]
-    last = continued_along(tasks, find_max_payload)[-1]
+    last = continued_along(tasks, followed)[-1]
     assert last.plan is not None
     assert last.plan.task.velocity_weights[0] == 10.0
-    bare = find_max_payload(replace(tasks[-1], velocity_weights=[]))
+    bare = followed(replace(tasks[-1], velocity_weights=[]))
     assert bare.plan is not None
     assert last.plan.cost > bare.plan.cost + 1
     assert last.payload == pytest.approx(bare.payload, abs=1e-3)
@@ -219,7 +219,7 @@ def test_motions_with_other_numbers_of_stages_go_together() -> None:
 
 def test_kind_of_a_switch_is_the_limit_that_is_met(rigid_arm: Arm,
                                                    paper_task: TaskFactory) -> None:
-    found = find_max_payload(paper_task(rigid_arm))
+    found = followed(paper_task(rigid_arm))
     extremal = found.extremals[-1]
     motion = SwitchedMotion.of(extremal.problem, extremal.result.solution,
                                extremal.result.switches)

@@ -14,7 +14,7 @@ from flex_planner.planning.plan import PlanStatus
 from flex_planner.planning.plan_path import plan_path
 from known_limits import HEAVIEST
 import numpy as np
-from payload_searches import assert_stopped, assert_stopped_at, stopped_after
+from payload_searches import assert_stopped, assert_stopped_at, followed, moments, stopped_after
 from plan_checks import solution_of
 import pytest
 
@@ -24,8 +24,8 @@ import pytest
 def test_search_from_a_similar_one_needs_fewer_iterations(
         rigid_model: ArmModel, paper_task: TaskFactory, search_of: SearchFactory) -> None:
     task = paper_task(rigid_model.arm, duration=1.1)
-    cold = find_max_payload(task, model=rigid_model)
-    warm = find_max_payload(task, model=rigid_model, start_from=search_of('rigid'))
+    cold = followed(task, model=rigid_model)
+    warm = followed(task, model=rigid_model, start_from=search_of('rigid'))
     assert warm.solved, warm.message
     assert warm.iterations < 0.9 * cold.iterations
     # the same limit is in both
@@ -48,12 +48,12 @@ def test_search_of_an_arm_that_bends_is_a_start_for_a_rigid_one(
 
 def test_search_that_found_nothing_is_no_start_but_no_harm(rigid_model: ArmModel,
                                                            paper_task: TaskFactory) -> None:
-    nothing = find_max_payload(paper_task(rigid_model.arm), model=rigid_model,
-                               monitor=Monitor(time_limit=0.0))
+    nothing = followed(paper_task(rigid_model.arm), model=rigid_model,
+                       monitor=Monitor(time_limit=0.0))
     task = paper_task(rigid_model.arm)
-    found = find_max_payload(task, model=rigid_model, start_from=nothing)
+    found = followed(task, model=rigid_model, start_from=nothing)
     assert nothing.restart_point is None
-    assert found.iterations == find_max_payload(task, model=rigid_model).iterations
+    assert found.iterations == followed(task, model=rigid_model).iterations
 
 
 # Ended
@@ -66,7 +66,7 @@ def test_limit_that_is_not_met_by_its_payload_is_met_by_its_price(
         payload: float) -> None:
     start, there = postures_from_points(rigid_model.arm, (0.5, 0.0), goal, elbow=-1)
     task = paper_task(rigid_model.arm, 0.0, start_positions=start, goal_positions=there)
-    found = find_max_payload(task, model=rigid_model)
+    found = followed(task, model=rigid_model)
     assert found.solved, found.message
     assert found.payload == pytest.approx(payload, abs=1e-3)
     assert found.payload <= found.local_upper <= found.payload + 1e-3
@@ -78,10 +78,10 @@ def test_effort_of_light_payloads_that_is_not_convex_does_not_end_the_search(
         rigid_model: ArmModel, paper_task: TaskFactory) -> None:
     start, goal = postures_from_points(rigid_model.arm, (0.5, 0.0), (0.9, -0.231), elbow=-1)
     task = paper_task(rigid_model.arm, 0.0, start_positions=start, goal_positions=goal)
-    found = find_max_payload(task, model=rigid_model)
+    found = followed(task, model=rigid_model)
     prices = found.front.prices
     assert prices[1] < prices[0]  # more payload costs less, at first
-    heavy = find_max_payload(replace(task, payload_mass=3.0), model=rigid_model)
+    heavy = followed(replace(task, payload_mass=3.0), model=rigid_model)
     assert found.payload == pytest.approx(heavy.payload, abs=1e-3)
 
 
@@ -102,8 +102,8 @@ def test_plan_of_a_search_is_a_plan_like_others(rigid_model: ArmModel, paper_tas
 def test_direct_search_reports_phases_and_payloads(rigid_model: ArmModel,
                                                    paper_task: TaskFactory) -> None:
     reports: list[Progress] = []
-    found = find_max_payload(paper_task(rigid_model.arm), model=rigid_model,
-                             monitor=Monitor(report=reports.append))
+    found = followed(paper_task(rigid_model.arm), model=rigid_model,
+                     monitor=Monitor(report=reports.append))
     assert list(dict.fromkeys(each.phase for each in reports)) == ['payload at a rising price',
                                                                    'continuation to the limit']
     assert [each.iteration for each in reports] == list(range(1, found.iterations + 1))
@@ -116,19 +116,55 @@ def test_direct_search_reports_phases_and_payloads(rigid_model: ArmModel,
 def test_searches_that_share_a_monitor_count_for_themselves(rigid_model: ArmModel,
                                                             paper_task: TaskFactory) -> None:
     monitor = Monitor()
-    first, second = (find_max_payload(paper_task(rigid_model.arm), model=rigid_model,
-                                      monitor=monitor) for _ in range(2))
+    first, second = (followed(paper_task(rigid_model.arm), model=rigid_model, monitor=monitor)
+                     for _ in range(2))
     assert first.iterations == second.iterations > 0
     assert monitor.iteration == 2 * first.iterations
+
+
+def test_search_over_kinds_reports_its_starts_first(rigid_model: ArmModel,
+                                                    paper_task: TaskFactory) -> None:
+    reports: list[Progress] = []
+    found = find_max_payload(paper_task(rigid_model.arm), model=rigid_model,
+                             monitor=Monitor(report=reports.append))
+    phases = list(dict.fromkeys(each.phase for each in reports))
+    assert phases == [*(f'kinds of motion, start {i} of 16' for i in range(1, 17)),
+                      'payload at a rising price', 'continuation to the limit']
+    assert [each.iteration for each in reports] == list(range(1, found.iterations + 1))
+    assert (found.starts, len(found.kinds)) == (16, 1)
 
 
 def test_direct_search_is_stopped_wherever_it_is(rigid_model: ArmModel,
                                                  paper_task: TaskFactory) -> None:
     task = paper_task(rigid_model.arm)
     assert_stopped_at(
+        lambda monitor: followed(task, model=rigid_model, monitor=monitor),
+        {('payload at a rising price', False): False, ('continuation to the limit', False): True,
+         ('continuation to the limit', True): True})
+
+
+def test_search_over_kinds_is_stopped_wherever_it_is(rigid_model: ArmModel,
+                                                     paper_task: TaskFactory) -> None:
+    task = paper_task(rigid_model.arm)
+    assert_stopped_at(
         lambda monitor: find_max_payload(task, model=rigid_model, monitor=monitor),
-        {('payload at a rising price', False), ('continuation to the limit', False),
-         ('continuation to the limit', True)})
+        {('kinds of motion, start 7 of 16', False): False,
+         ('payload at a rising price', False): False,
+         ('continuation to the limit', False): True, ('continuation to the limit', True): True})
+
+
+def test_heaviest_motion_met_is_certified_when_time_is_up(rigid_model: ArmModel,
+                                                          paper_task: TaskFactory) -> None:
+    task, payloads = paper_task(rigid_model.arm), list[float]()
+    for calls in (25, 50, 70):
+        found = followed(task, model=rigid_model,
+                         monitor=stopped_after(calls, PlanStatus.TIMEOUT))
+        assert_stopped(found, PlanStatus.TIMEOUT, certified=True)
+        # the last motion met; where its kind ends is known once there is a price
+        assert found.payload == max((one.value for one in found.extremals), default=1.0)
+        assert found.payload <= HEAVIEST['rigid'] <= found.local_upper
+        payloads.append(found.payload)
+    assert payloads == sorted(set(payloads))
 
 
 def test_direct_search_is_stopped_at_every_payload(rigid_model: ArmModel,
@@ -136,11 +172,24 @@ def test_direct_search_is_stopped_at_every_payload(rigid_model: ArmModel,
     task = paper_task(rigid_model.arm)
     for calls in (5, 25, 50, 70):
         monitor = stopped_after(calls, PlanStatus.CANCELED)
-        found = find_max_payload(task, model=rigid_model, monitor=monitor)
+        found = followed(task, model=rigid_model, monitor=monitor)
         assert_stopped(found, PlanStatus.CANCELED)
         # asked after every iteration at least
         assert found.iterations <= calls
         assert monitor.phase == 'payload at a rising price'
+
+
+@pytest.mark.parametrize('share', [0.01, 0.5, 0.99])  # the last on finer meshes
+def test_exploration_is_stopped_at_every_iteration(rigid_model: ArmModel, paper_task: TaskFactory,
+                                                   share: float) -> None:
+    task = paper_task(rigid_model.arm)
+    ended = moments(lambda monitor: find_max_payload(task, model=rigid_model, monitor=monitor))
+    calls = int(share * ended['payload at a rising price', False])
+    monitor = stopped_after(calls, PlanStatus.CANCELED)
+    found = find_max_payload(task, model=rigid_model, monitor=monitor)
+    assert_stopped(found, PlanStatus.CANCELED)
+    assert found.iterations <= calls + 1  # IPOPT asks after an iteration
+    assert monitor.phase.startswith('kinds of motion, start ')
 
 
 @pytest.mark.parametrize('calls', [20, 120])
@@ -148,6 +197,6 @@ def test_search_of_an_arm_that_bends_is_stopped(ei5_model: ArmModel, paper_task:
                                                 calls: int) -> None:
     # with the arm made rigid, and as it is
     monitor = stopped_after(calls, PlanStatus.CANCELED)
-    found = find_max_payload(paper_task(ei5_model.arm), model=ei5_model, monitor=monitor)
+    found = followed(paper_task(ei5_model.arm), model=ei5_model, monitor=monitor)
     assert_stopped(found, PlanStatus.CANCELED)
     assert found.iterations <= calls

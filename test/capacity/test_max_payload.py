@@ -12,7 +12,7 @@ from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.errors import InvalidTaskError, InvalidValueError
 from flex_planner.base.progress import Monitor
 from flex_planner.capacity.max_payload import find_max_payload
-from flex_planner.capacity.results import PayloadMethod
+from flex_planner.capacity.results import MaxPayload, PayloadMethod
 from flex_planner.collocation import Solver, SolverSettings
 from flex_planner.dynamics.integration import PiecewisePolynomial, simulate
 from flex_planner.dynamics.statics import equilibrium
@@ -23,10 +23,18 @@ from flex_planner.optimal_control.motion_problem import task_parameters
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import PlanStatus
 from flex_planner.planning.plan_path import plan_path
+from kinds_support import assert_says
 from known_limits import G, HEAVIEST, lifted_to, one_link
 import numpy as np
 from numpy.polynomial import legendre
-from payload_searches import assert_stopped, assert_stopped_at, raised
+from payload_searches import (
+    assert_stopped,
+    assert_stopped_at,
+    followed,
+    moments,
+    raised,
+    stopped_after,
+)
 from plan_checks import problem_of
 import pytest
 
@@ -47,7 +55,7 @@ def arm_with(arm: Arm, torques: tuple[float, float], no_load_speed: float = 3.5)
 
 
 def test_stronger_motors_carry_more(rigid_arm: Arm, paper_task: TaskFactory) -> None:
-    found = [find_max_payload(paper_task(arm_with(rigid_arm, (torque, torque))))
+    found = [followed(paper_task(arm_with(rigid_arm, (torque, torque))))
              for torque in (4.0, 8.0, 8.01, 16.0)]
     assert all(each.solved for each in found)
     assert all(less.local_upper < more.payload
@@ -56,14 +64,14 @@ def test_stronger_motors_carry_more(rigid_arm: Arm, paper_task: TaskFactory) -> 
 
 def test_stronger_second_motor_alone_carries_more(rigid_arm: Arm,
                                                   paper_task: TaskFactory) -> None:
-    less, more = (find_max_payload(paper_task(arm_with(rigid_arm, (8.0, torque))))
+    less, more = (followed(paper_task(arm_with(rigid_arm, (8.0, torque))))
                   for torque in (8.0, 9.0))
     assert less.local_upper < more.payload
 
 
 def test_more_time_carries_more_in_the_horizontal_plane(rigid_model: ArmModel,
                                                         paper_task: TaskFactory) -> None:
-    found = [find_max_payload(paper_task(rigid_model.arm, 0.0, duration=T), model=rigid_model)
+    found = [followed(paper_task(rigid_model.arm, 0.0, duration=T), model=rigid_model)
              for T in (0.6, 1.0, 1.001, 4.0)]
     assert all(each.solved for each in found)
     assert all(less.local_upper < more.payload
@@ -73,7 +81,7 @@ def test_more_time_carries_more_in_the_horizontal_plane(rigid_model: ArmModel,
 def test_slower_motion_of_motors_as_much_weaker_carries_the_same(rigid_arm: Arm,
                                                                  paper_task: TaskFactory) -> None:
     # time in units of t_f: torques go with 1 / t_f^2, speeds with 1 / t_f
-    found = find_max_payload(paper_task(arm_with(rigid_arm, (0.5, 0.5), 0.875), duration=4.0))
+    found = followed(paper_task(arm_with(rigid_arm, (0.5, 0.5), 0.875), duration=4.0))
     assert found.payload <= HEAVIEST['rigid'] <= found.local_upper
 
 
@@ -81,7 +89,7 @@ def test_heavier_arm_of_motors_as_much_stronger_carries_as_much_more(
         rigid_arm: Arm, paper_task: TaskFactory) -> None:
     link = Link(length=0.5, linear_density=18.0)
     arm = replace(arm_with(rigid_arm, (24.0, 24.0)), links=(link, link))
-    found = find_max_payload(paper_task(arm))
+    found = followed(paper_task(arm))
     assert found.payload <= 3 * HEAVIEST['rigid'] <= found.local_upper
 
 
@@ -102,7 +110,7 @@ def test_weights_do_not_matter_where_links_bend(ei5_model: ArmModel,
                                                 paper_task: TaskFactory) -> None:
     task = paper_task(ei5_model.arm, effort_weights=[1.0, 4.0],
                       velocity_weights=[5.0, 5.0, 1.0, 1.0, 1.0, 1.0])
-    found = find_max_payload(task, model=ei5_model)
+    found = followed(task, model=ei5_model)
     assert found.payload <= HEAVIEST['ei5'] <= found.local_upper
     assert found.plan is not None
     assert found.plan.task.velocity_weights.tolist() == task.velocity_weights.tolist()
@@ -111,7 +119,7 @@ def test_weights_do_not_matter_where_links_bend(ei5_model: ArmModel,
 @pytest.mark.parametrize('payload_mass', [0.0, 3.0, 5.85, 5.8551])
 def test_first_payload_does_not_matter(rigid_model: ArmModel, paper_task: TaskFactory,
                                        payload_mass: float) -> None:
-    found = find_max_payload(paper_task(rigid_model.arm, payload_mass), model=rigid_model)
+    found = followed(paper_task(rigid_model.arm, payload_mass), model=rigid_model)
     assert max(found.payload, payload_mass) == found.payload
     assert found.payload <= HEAVIEST['rigid'] <= found.local_upper
 
@@ -128,17 +136,17 @@ def test_maximum_payload_of_one_link_has_its_closed_form(duration: float) -> Non
 
 def test_payload_inertia_is_carried_too() -> None:
     # M = 1 + J_p + m_p
-    found = find_max_payload(one_link(2.0, payload_inertia=0.5))
+    found = followed(one_link(2.0, payload_inertia=0.5))
     assert found.payload <= 2.5 <= found.local_upper
 
 
 def test_first_payload_may_cost_next_to_nothing(rigid_model: ArmModel,
                                                 paper_task: TaskFactory) -> None:
-    found = find_max_payload(paper_task(rigid_model.arm, duration=100.0), model=rigid_model)
+    found = followed(paper_task(rigid_model.arm, duration=100.0), model=rigid_model)
     # the same in units of t_f
-    same = find_max_payload(paper_task(arm_with(rigid_model.arm, (8e4, 8e4), 350.0)))
+    same = followed(paper_task(arm_with(rigid_model.arm, (8e4, 8e4), 350.0)))
     assert same.solved, same.message
-    assert max(found.payload, same.payload) <= min(found.local_upper, same.upper)
+    assert max(found.payload, same.payload) <= min(found.local_upper, same.local_upper)
 
 
 # An independent method
@@ -220,7 +228,7 @@ def test_payload_of_the_front_costs_what_its_plan_costs(
 
 def test_front_knows_no_weights_but_those_of_effort(rigid_model: ArmModel,
                                                     paper_task: TaskFactory) -> None:
-    bare, weighted = (find_max_payload(paper_task(rigid_model.arm, 3.0, w_2), model=rigid_model)
+    bare, weighted = (followed(paper_task(rigid_model.arm, 3.0, w_2), model=rigid_model)
                       for w_2 in (0.0, 50.0))
     assert weighted.front.efforts.tolist() == bare.front.efforts.tolist()
     assert weighted.plan is not None
@@ -230,31 +238,34 @@ def test_front_knows_no_weights_but_those_of_effort(rigid_model: ArmModel,
 
 def test_front_scales_with_the_weights_of_effort(rigid_model: ArmModel,
                                                  paper_task: TaskFactory) -> None:
-    one, ten = (find_max_payload(paper_task(rigid_model.arm, 3.0, effort_weights=[R, R]),
-                                 model=rigid_model).front for R in (0.125, 1.25))
+    one, ten = (followed(paper_task(rigid_model.arm, 3.0, effort_weights=[R, R]),
+                         model=rigid_model).front for R in (0.125, 1.25))
     # the first price is ten times as high, so are all
     np.testing.assert_allclose(ten.prices, 10 * one.prices, rtol=1e-3)
     np.testing.assert_allclose(ten.payloads, one.payloads, rtol=1e-3)
     np.testing.assert_allclose(ten.efforts, 10 * one.efforts, rtol=1e-3)
 
 
-# Impossible motions
+# Motions that were not found
 
 
-@pytest.mark.parametrize(('method', 'payload_mass', 'changes', 'reason'), [
+@pytest.mark.parametrize(('method', 'payload_mass', 'changes', 'found_instead'), [
     (PayloadMethod.DIRECT, 1.0, {'duration': 0.6},
-     'the arm carries at most 0.5786 kg from start to goal in 0.6 s, and 1 kg were asked for'),
+     'no motion with 1 kg in 0.6 s was found from 16 starts; the heaviest payload found in 0.6 s '
+     'is 0.5652 kg, the shortest duration found with 1 kg is 0.6434 s'),
     (PayloadMethod.INCREMENTAL, 0.0, {'duration': 0.5},
-     'the motion takes at least 0.5358 s with 0 kg, and 0.5 s were asked for')])
-def test_payload_that_cannot_be_carried_is_infeasible_with_the_reason(
+     'no motion with 0 kg in 0.5 s was found from 16 starts; the shortest duration found with '
+     '0 kg is 0.5367 s')], ids=['direct', 'incremental'])
+def test_payload_that_no_motion_was_found_to_carry_is_told_with_what_was_found_instead(
         rigid_model: ArmModel, paper_task: TaskFactory, method: PayloadMethod,
-        payload_mass: float, changes: dict[str, float], reason: str) -> None:
-    found = find_max_payload(paper_task(rigid_model.arm, payload_mass, **changes),
-                             model=rigid_model, method=method)
-    assert (found.status, found.solved) == (PlanStatus.INFEASIBLE, False)
-    assert found.message.startswith(f'{reason} (the price of more has grown ')
+        payload_mass: float, changes: dict[str, float], found_instead: str) -> None:
+    found = followed(paper_task(rigid_model.arm, payload_mass, **changes), model=rigid_model,
+                     method=method)
+    assert (found.status, found.solved) == (PlanStatus.NOT_FOUND, False)
+    assert_says(found.message, f'{found_instead}. This does not show that there is none')
     assert (found.payload, found.local_upper, found.plan) == (0.0, inf, None)
     assert (found.limiting_joint, found.held, found.method) == (None, False, method)
+    assert (found.proved_upper, found.proof) == (inf, None)
 
 
 # Gravity
@@ -271,11 +282,15 @@ def test_payload_that_the_motor_just_holds_at_the_goal_is_the_limit() -> None:
         assert found.payload < found.local_upper
         assert found.limiting_joint == 0
         assert found.message.endswith(
-            'kg cannot: the motor of joint 1 can hold no more at the goal')
+            'joint 1 can hold no more at the goal: no motion carries more')
+        # that is a proof for all kinds of motion, which need not be looked for
+        assert (found.proved_upper, found.starts) == (found.local_upper, 0)
+        assert str(found.proof) == (
+            'joint 1 can hold no more at the goal: no motion ends there (HOLDING)')
 
 
 def test_plan_with_what_the_motor_just_holds_is_certified() -> None:
-    found = find_max_payload(lifted_to(0.0, 2.0))
+    found = followed(lifted_to(0.0, 2.0))
     assert found.plan is not None
     assert found.plan.solved
     assert found.plan.task.payload_mass == found.payload
@@ -287,21 +302,22 @@ def test_plan_with_what_the_motor_just_holds_is_certified() -> None:
 @pytest.mark.parametrize(('angle', 'duration'), [(0.0, 0.5), (0.0, 0.3), (0.5, 1.0)])
 def test_payload_of_a_quick_lift_is_less_than_the_motor_holds(angle: float,
                                                               duration: float) -> None:
-    found = find_max_payload(lifted_to(angle, duration))
+    found = followed(lifted_to(angle, duration))
     assert found.solved, found.message
     assert not found.held
     assert found.local_upper < 6 / (G * math.cos(angle)) - 0.15
     assert found.local_upper - found.payload <= 1e-3
     assert found.message.split(': ')[1].startswith('the motor of joint 1 is on its limit for 9')
+    assert (found.proof, found.proved_upper) == (None, inf)
 
 
 def test_quick_lift_carries_less_than_the_same_motion_without_gravity() -> None:
     task = lifted_to(0.0, 0.5)
     level = replace(task, arm=replace(task.arm, gravity=[0.0, 0.0]))
     # bang-bang: u_max T^2 = 4 M d
-    free = find_max_payload(level)
-    assert free.payload <= 6 * 0.5**2 / 2 - 0.1 <= free.upper
-    assert find_max_payload(task).upper < free.payload
+    free = followed(level)
+    assert free.payload <= 6 * 0.5**2 / 2 - 0.1 <= free.local_upper
+    assert followed(task).local_upper < free.payload
 
 
 def test_joint_that_can_hold_no_more_is_named() -> None:
@@ -310,7 +326,7 @@ def test_joint_that_can_hold_no_more_is_named() -> None:
     arm = Arm(name='two', links=(link, link), gravity=[0, -G],
               joints=(Joint(), Joint(motor=Motor(stall_torque=4.0))))
     task = Task(arm=arm, start_positions=[-0.7, 0.5], goal_positions=[-0.5, 0.5], duration=0.4)
-    found = find_max_payload(task)
+    found = followed(task)
     assert found.solved, found.message
     assert (found.held, found.limiting_joint) == (True, 1)
     assert found.local_upper == pytest.approx((4 / G - 0.125) / 0.5, rel=1e-9)
@@ -394,18 +410,33 @@ def test_bad_option_is_named_with_its_bound(rigid_model: ArmModel, paper_task: T
 # Stopped
 
 
-def test_search_for_the_reason_is_stopped(rigid_model: ArmModel, paper_task: TaskFactory) -> None:
+def test_search_for_any_motion_is_stopped(rigid_model: ArmModel, paper_task: TaskFactory) -> None:
     monitor = Monitor()
-    monitor.canceled = lambda: monitor.phase == 'continuation in payload'
-    found = find_max_payload(paper_task(rigid_model.arm, duration=0.6), model=rigid_model,
-                             monitor=monitor)
+    monitor.canceled = lambda: monitor.phase.startswith('kinds of motion, start 3')
+    found = followed(paper_task(rigid_model.arm, duration=0.6), model=rigid_model,
+                     monitor=monitor)
     assert_stopped(found, PlanStatus.CANCELED)
 
 
 def test_search_is_stopped_in_the_plan_with_what_the_motor_holds() -> None:
     task = lifted_to(0.0, 2.0)
     assert_stopped_at(lambda monitor: find_max_payload(task, monitor=monitor),
-                      {('continuation to the limit', True)})
+                      {('cold start', True): False})
+
+
+@pytest.mark.parametrize('status', [PlanStatus.CANCELED, PlanStatus.TIMEOUT])
+def test_plan_with_less_is_kept_if_that_with_what_the_motor_holds_is_stopped(
+        status: PlanStatus) -> None:
+    # a search that is given a motion comes to what the motor holds last
+    task, start = lifted_to(0.0, 2.0), find_max_payload(lifted_to(0.0, 0.5))
+
+    def search(monitor: Monitor) -> MaxPayload:
+        return find_max_payload(task, monitor=monitor, start_from=start)
+
+    last = moments(search)['continuation to the limit', True]
+    found = search(stopped_after(last, status))
+    assert not found.held
+    assert_stopped(found, status, certified=True)
 
 
 def test_time_limit_that_has_passed_leaves_nothing(rigid_model: ArmModel,

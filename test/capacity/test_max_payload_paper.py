@@ -82,8 +82,9 @@ def test_plan_with_the_maximum_payload_is_certified(search_of: SearchFactory,
     assert found.plan.saturation.min() > 0.9
     assert found.limiting_joint == found.plan.saturation.argmax()
     assert found.message.startswith(
-        f'{found.payload:.6g} kg can be carried, {found.local_upper:.6g} kg cannot: '
-        f'the motor of joint {found.limiting_joint + 1} is on its limit for 9')
+        f'{found.payload:.6g} kg can be carried, certified, the only kind of motion found from 16 '
+        f'starts; this kind of motion ends at {found.local_upper:.6g} kg: the motor of joint '
+        f'{found.limiting_joint + 1} is on its limit for 9')
 
 
 def test_softer_links_carry_less(search_of: SearchFactory) -> None:

@@ -19,6 +19,7 @@ from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import PlanStatus
 from known_limits import HEAVIEST, one_link, SHORTEST
 import numpy as np
+from payload_searches import followed
 from plan_checks import problem_of, stopped_in
 import pytest
 
@@ -30,6 +31,11 @@ every_arm = pytest.mark.parametrize('name', SHORTEST)
 both_stops = pytest.mark.parametrize('status', [PlanStatus.CANCELED, PlanStatus.TIMEOUT])
 
 
+def shortest(task: Task, **options: Any) -> MinDuration:
+    """Search along one kind of motion, where that is what matters, or the task has no others."""
+    return find_min_duration(task, search='fast', **options)
+
+
 def assert_encloses(found: MinDuration, duration: float, accuracy: float = 1e-4) -> None:
     assert found.solved, found.message
     # the motion at the upper end is as exact as the bracket is narrow
@@ -37,10 +43,18 @@ def assert_encloses(found: MinDuration, duration: float, accuracy: float = 1e-4)
     assert 0 < found.duration - found.local_lower <= accuracy
 
 
-def assert_stopped(found: MinDuration, status: PlanStatus) -> None:
-    assert (found.status, found.message) == (status, status.value)
-    assert (found.solved, found.duration) == (False, inf)
-    assert found.plan is None or not found.plan.solved
+def assert_stopped(found: MinDuration, status: PlanStatus, *, certified: bool = False,
+                   limit: float = SHORTEST['rigid']) -> None:
+    """Check the outcome of a search that was stopped, with or without something certified."""
+    assert (found.status, found.solved) == (status, False)
+    if not certified:
+        assert (found.message, found.duration) == (status.value, inf)
+        assert found.plan is None or not found.plan.solved
+        return
+    assert found.message == f'{status.value} ({found.duration:.6g} s are certified)'
+    assert found.plan is not None
+    assert (found.plan.solved, found.plan.task.duration) == (True, found.duration)
+    assert found.local_lower <= limit <= found.duration
 
 
 # Shortest
@@ -53,7 +67,10 @@ def test_shortest_duration_is_enclosed(request: pytest.FixtureRequest, paper_tas
     found = find_min_duration(paper_task(model.arm), model=model)
     assert_encloses(found, SHORTEST[name])
     assert found.duration == pytest.approx(SHORTEST[name], abs=1e-4)
-    assert found.message == f'{found.duration:.6g} s are enough, {found.local_lower:.6g} s are not'
+    assert (found.starts, len(found.kinds), found.proved_lower) == (16, 1, 0.0)
+    assert found.message == (
+        f'{found.duration:.6g} s are enough, certified, the only kind of motion found from 16 '
+        f'starts; this kind of motion ends at {found.local_lower:.6g} s')
     assert found.plan is not None
     assert found.plan.solved
     assert found.plan.task.duration == found.duration
@@ -63,8 +80,7 @@ def test_shortest_duration_is_enclosed(request: pytest.FixtureRequest, paper_tas
 
 def test_accuracy_is_what_is_asked(rigid_model: ArmModel, paper_task: TaskFactory) -> None:
     for accuracy in (0.1, 1e-6):
-        found = find_min_duration(paper_task(rigid_model.arm), model=rigid_model,
-                                  accuracy=accuracy)
+        found = shortest(paper_task(rigid_model.arm), model=rigid_model, accuracy=accuracy)
         assert_encloses(found, SHORTEST['rigid'], accuracy)
     assert found.duration == pytest.approx(SHORTEST['rigid'], abs=1e-6 + HALF_A_DIGIT)
 
@@ -106,8 +122,8 @@ def test_weights_do_not_matter(rigid_model: ArmModel, paper_task: TaskFactory,
 
 def test_shortest_duration_of_the_maximum_payload_is_its_duration(
         rigid_model: ArmModel, paper_task: TaskFactory) -> None:
-    heavy = find_max_payload(paper_task(rigid_model.arm), model=rigid_model)
-    quick = find_min_duration(paper_task(rigid_model.arm, heavy.payload), model=rigid_model)
+    heavy = followed(paper_task(rigid_model.arm), model=rigid_model)
+    quick = shortest(paper_task(rigid_model.arm, heavy.payload), model=rigid_model)
     # a kilogram more takes 60 ms more, and a bracket is 1 g wide
     assert quick.local_lower < 1.0 <= quick.duration + 1e-5
     assert quick.duration < 1.0 + 1e-4
@@ -115,9 +131,8 @@ def test_shortest_duration_of_the_maximum_payload_is_its_duration(
 
 def test_maximum_payload_of_the_shortest_duration_is_its_payload(
         rigid_model: ArmModel, paper_task: TaskFactory) -> None:
-    quick = find_min_duration(paper_task(rigid_model.arm, 3.0), model=rigid_model)
-    heavy = find_max_payload(paper_task(rigid_model.arm, 2.0, duration=quick.duration),
-                             model=rigid_model)
+    quick = shortest(paper_task(rigid_model.arm, 3.0), model=rigid_model)
+    heavy = followed(paper_task(rigid_model.arm, 2.0, duration=quick.duration), model=rigid_model)
     # 0.1 ms more carries a gram more
     assert heavy.payload <= 3.0 + 2e-3
     assert 3.0 <= heavy.local_upper
@@ -125,7 +140,7 @@ def test_maximum_payload_of_the_shortest_duration_is_its_payload(
 
 def test_less_time_is_not_enough_and_a_little_more_is(rigid_model: ArmModel,
                                                       paper_task: TaskFactory) -> None:
-    found = find_min_duration(paper_task(rigid_model.arm), model=rigid_model)
+    found = shortest(paper_task(rigid_model.arm), model=rigid_model)
     # by another method
     problem = problem_of(rigid_model, paper_task(rigid_model.arm))
     direct = DirectProblem(rigid_model, DirectSettings(degree=4, intervals=20))
@@ -139,7 +154,7 @@ def test_less_time_is_not_enough_and_a_little_more_is(rigid_model: ArmModel,
 def test_gap_bounds_the_limit_at_every_extremal(request: pytest.FixtureRequest,
                                                 paper_task: TaskFactory, name: str) -> None:
     model = request.getfixturevalue(f'{name}_model')
-    extremals = find_min_duration(paper_task(model.arm), model=model, accuracy=1e-3).extremals
+    extremals = shortest(paper_task(model.arm), model=model, accuracy=1e-3).extremals
     assert len(extremals) > 1
     assert all(one.value - one.gap < SHORTEST[name] < one.value for one in extremals)
     assert all(np.diff([one.value for one in extremals]) < 0)
@@ -167,11 +182,20 @@ def test_lift_of_more_payload_against_gravity_takes_longer() -> None:
 
 @pytest.mark.parametrize('payload_mass', [0.0, 0.4])
 def test_search_that_ends_elsewhere_claims_nothing(payload_mass: float) -> None:
-    # from a slow lift the way leads to swings, or nowhere
-    found = find_min_duration(lift(payload_mass, 2.0))
+    # from a slow lift one way leads to swings, or nowhere
+    found = shortest(lift(payload_mass, 2.0))
     assert 0 <= found.local_lower <= found.duration
-    assert found.solved == found.message.endswith(' s are not')
+    assert found.solved == found.message.endswith(
+        f'this kind of motion ends at {found.local_lower:.6g} s')
     assert found.solved or found.message != PlanStatus.SOLVED.value
+
+
+@pytest.mark.parametrize('payload_mass', [0.0, 0.4])
+def test_first_guess_of_a_lift_does_not_matter_where_kinds_are_explored(
+        payload_mass: float) -> None:
+    long, short = (find_min_duration(lift(payload_mass, guess)) for guess in (2.0, 0.75))
+    assert_encloses(long, short.duration, 2e-4)
+    assert_encloses(short, long.duration, 2e-4)
 
 
 # Progress
@@ -181,8 +205,9 @@ def test_search_reports_its_phases(rigid_model: ArmModel, paper_task: TaskFactor
     reports: list[Progress] = []
     found = find_min_duration(paper_task(rigid_model.arm), model=rigid_model,
                               monitor=Monitor(report=reports.append))
-    assert list(dict.fromkeys(each.phase for each in reports)) == ['duration at a rising price',
-                                                                   'continuation to the limit']
+    assert list(dict.fromkeys(each.phase for each in reports)) == [
+        *(f'kinds of motion, start {i} of 16' for i in range(1, 17)),
+        'duration at a rising price', 'continuation to the limit']
     assert len(reports) == found.iterations
     assert found.planning_time > 0
 
@@ -194,8 +219,9 @@ def test_payload_grows_with_the_duration_and_is_that_of_single_searches(
         rigid_model: ArmModel, paper_task: TaskFactory) -> None:
     durations, task = [0.7, 0.8, 0.9, 1.0, 1.1], paper_task(rigid_model.arm)
     found = list(payload_against_duration(task, durations, model=rigid_model))
-    alone = [find_max_payload(replace(task, duration=duration), model=rigid_model)
-             for duration in durations]
+    alone = [find_max_payload(replace(task, duration=0.7), model=rigid_model), *(
+        followed(replace(task, duration=duration), model=rigid_model)
+        for duration in durations[1:])]
     assert [each.task.duration for each in found] == durations
     assert all(each.solved for each in found)
     assert all(less.local_upper < more.payload
@@ -206,7 +232,8 @@ def test_payload_grows_with_the_duration_and_is_that_of_single_searches(
     assert found[3].payload <= HEAVIEST['rigid'] <= found[3].local_upper
     # the first has nothing to start from
     assert found[0].iterations == alone[0].iterations
-    assert sum(each.iterations for each in found) < sum(each.iterations for each in alone)
+    assert [each.starts for each in found] == [16, 0, 0, 0, 0]
+    assert sum(each.iterations for each in found[1:]) < sum(each.iterations for each in alone[1:])
 
 
 def test_payload_of_an_arm_that_bends_grows_with_the_duration(ei5_model: ArmModel,
@@ -221,7 +248,7 @@ def test_duration_that_is_too_short_is_passed_over(rigid_model: ArmModel,
                                                    paper_task: TaskFactory) -> None:
     short, first, second, third = payload_against_duration(
         paper_task(rigid_model.arm), [0.6, 1.0, 1.05, 1.1], model=rigid_model)
-    assert short.status is PlanStatus.INFEASIBLE
+    assert short.status is PlanStatus.NOT_FOUND
     assert first.payload <= HEAVIEST['rigid'] <= first.local_upper
     assert second.iterations < first.iterations
     assert third.iterations < first.iterations / 2  # two neighbours tell where the motion goes
@@ -315,8 +342,9 @@ def test_bad_accuracy_is_named_with_its_bound(rigid_model: ArmModel, paper_task:
 def test_search_is_stopped_wherever_it_is(rigid_model: ArmModel, paper_task: TaskFactory,
                                           phase: str, iterations: int, status: PlanStatus) -> None:
     monitor = stopped_in(phase, status, iterations)
-    found = find_min_duration(paper_task(rigid_model.arm), model=rigid_model, monitor=monitor)
-    assert_stopped(found, status)
+    found = shortest(paper_task(rigid_model.arm), model=rigid_model, monitor=monitor)
+    begun = iterations > 0 or phase == 'continuation to the limit'
+    assert_stopped(found, status, certified=begun and status is PlanStatus.TIMEOUT)
     assert monitor.phase == phase
 
 
@@ -325,8 +353,10 @@ def test_search_from_a_guess_that_is_too_short_is_stopped(
         rigid_model: ArmModel, paper_task: TaskFactory, status: PlanStatus) -> None:
     for iterations in (10, 60, 120):
         monitor = stopped_in('duration at a rising price', status, iterations)
-        assert_stopped(find_min_duration(paper_task(rigid_model.arm, duration=0.3),
-                                         model=rigid_model, monitor=monitor), status)
+        found = shortest(paper_task(rigid_model.arm, duration=0.3), model=rigid_model,
+                         monitor=monitor)
+        met = status is PlanStatus.TIMEOUT and math.isfinite(found.duration)
+        assert_stopped(found, status, certified=met)
         assert monitor.iteration <= iterations + 1
 
 
@@ -334,15 +364,15 @@ def test_search_from_a_guess_that_is_too_short_is_stopped(
 def test_search_of_an_arm_that_bends_is_stopped(ei5_model: ArmModel, paper_task: TaskFactory,
                                                 status: PlanStatus) -> None:
     monitor = stopped_in('duration at a rising price', status, 30)
-    assert_stopped(find_min_duration(paper_task(ei5_model.arm), model=ei5_model,
-                                     monitor=monitor), status)
+    found = find_min_duration(paper_task(ei5_model.arm), model=ei5_model, monitor=monitor)
+    assert_stopped(found, status, certified=status is PlanStatus.TIMEOUT, limit=SHORTEST['ei5'])
 
 
 @both_stops
 def test_search_is_stopped_in_its_last_simulation(rigid_model: ArmModel, paper_task: TaskFactory,
                                                   status: PlanStatus) -> None:
     task = paper_task(rigid_model.arm)
-    whole = find_min_duration(task, model=rigid_model).iterations
+    whole = shortest(task, model=rigid_model).iterations
     monitor = Monitor()
 
     def due() -> bool:
@@ -352,6 +382,17 @@ def test_search_is_stopped_in_its_last_simulation(rigid_model: ArmModel, paper_t
         return late and status is PlanStatus.CANCELED
 
     monitor.canceled = due
-    found = find_min_duration(task, model=rigid_model, monitor=monitor)
-    assert_stopped(found, status)
+    found = shortest(task, model=rigid_model, monitor=monitor)
+    assert_stopped(found, status, certified=status is PlanStatus.TIMEOUT)
     assert (monitor.phase, found.iterations) == ('continuation to the limit', whole)
+
+
+@both_stops
+def test_exploration_is_stopped(rigid_model: ArmModel, paper_task: TaskFactory,
+                                status: PlanStatus) -> None:
+    for start, iterations in (('start 1 of 16', 5), ('start 9 of 16', 0)):
+        phase = f'kinds of motion, {start}'
+        monitor = stopped_in(phase, status, iterations)
+        found = find_min_duration(paper_task(rigid_model.arm), model=rigid_model, monitor=monitor)
+        assert_stopped(found, status)
+        assert monitor.phase == phase

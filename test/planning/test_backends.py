@@ -12,19 +12,34 @@ from flex_planner.planning.strategies.strategy import Strategy
 import pytest
 from scipy_backend import CountingBackend, FINE, solve_by_scipy
 
+BY_IPOPT = ('direct collocation', 'kinds of motion')
+
 
 @pytest.mark.parametrize('strategy', [
-    each for each in CATALOGUE if each.name != 'direct collocation'], ids=lambda each: each.name)
+    each for each in CATALOGUE if each.name not in BY_IPOPT], ids=lambda each: each.name)
 def test_every_iteration_of_a_plan_is_made_by_its_backend(
         ei5_model: ArmModel, paper_task: TaskFactory, strategy: Strategy) -> None:
     backend, monitor = CountingBackend(), Monitor()
     plan = plan_path(paper_task(ei5_model.arm, w_2=10.0), model=ei5_model, monitor=monitor,
-                     strategies=[strategy], solver=Solver(FINE, backend=backend))
+                     strategies=[strategy], solver=Solver(FINE, backend=backend), search='fast')
     assert plan.solved, plan.message
     # a solve that went past it would count in the monitor alone
     assert backend.iterations == monitor.iteration == plan.iterations > 0
     assert all(watch is monitor for watch in backend.monitors)
     assert backend.settings[-1] == FINE  # whatever the way to it was
+
+
+def test_cheaper_kinds_are_looked_for_by_the_backend(ei5_model: ArmModel,
+                                                     paper_task: TaskFactory) -> None:
+    backend, monitor = CountingBackend(), Monitor()
+    plan = plan_path(paper_task(ei5_model.arm), model=ei5_model, monitor=monitor,
+                     solver=Solver(FINE, backend=backend))
+    assert plan.starts > 1
+    assert backend.iterations == monitor.iteration == plan.iterations
+    assert all(watch is monitor for watch in backend.monitors)
+    # coarse meshes for the other kinds, within the limit
+    assert min(each.intervals for each in backend.settings) < FINE.intervals
+    assert max(each.max_intervals for each in backend.settings) == FINE.max_intervals
 
 
 def test_weights_are_adapted_and_durations_freed_by_the_backend(

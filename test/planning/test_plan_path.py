@@ -73,7 +73,7 @@ def test_one_link_has_the_cubic_motion_of_a_double_integrator() -> None:
     arm = Arm(name='one link', links=(Link(length=0.8, linear_density=2.0),), joints=(Joint(),))
     task = Task(arm=arm, start_positions=[0.2], goal_positions=[1.7], duration=2.0,
                 payload_mass=0.5, effort_weights=[0.25])
-    plan = plan_path(task)
+    plan = plan_path(task, search='fast')
     M, change = 2.0 * 0.8**3 / 3 + 0.5 * 0.8**2, 1.5
     samples, s = plan.uniform_samples(101), np.linspace(0, 1, 101)
     # the collocation polynomials contain the cubic: rounding is left
@@ -133,7 +133,9 @@ def test_plan_is_solved_within_its_limits_and_work(plan_of: PlanFactory, case: C
     assert plan.certificate.hamiltonian_drift <= 2e-7
     assert plan.certificate.collocation_residual <= 1e-3
     assert max(plan.certificate.state_error, plan.certificate.costate_error) <= 1e-6  # asked for
-    assert plan.iterations <= 30
+    assert plan.iterations <= 150  # with those for cheaper kinds, of which there are none
+    assert len(plan.kinds) == 1
+    assert plan_path(plan.task, model=plan.model, search='fast').iterations <= 30
     assert plan.mesh_intervals <= {'rigid': 45, 'ei50': 130}.get(case[0], 50)
 
 

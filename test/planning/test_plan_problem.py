@@ -27,10 +27,10 @@ TaskFactory = Callable[..., Task]
 Attempting = Callable[[MotionProblem, Solver], Attempt | None]
 
 
-def failed(result: CollocationResult, message: str, evidence: str = '') -> Attempting:
+def failed(result: CollocationResult, message: str, **others: bool) -> Attempting:
     """Return a strategy that fails."""
     attempt = Attempt(result=replace(result, status=SolverStatus.NEWTON_FAILED, message=message),
-                      evidence=evidence)
+                      **others)
     return lambda problem, solver: attempt
 
 
@@ -76,13 +76,29 @@ def test_all_failures_are_told_with_their_names(
         plan.uniform_samples(2)
 
 
-def test_evidence_ends_the_trials(
+def test_what_speaks_against_a_task_ends_the_trials(
+        rigid_model: ArmModel, paper_task: TaskFactory,
+        result: CollocationResult) -> None:
+    task = paper_task(rigid_model.arm)
+    hopeless = failed(result, 'too much', not_found=True, hopeless=True)
+    plan = planned(rigid_model, task, ('first', hopeless), ('second', cold_start))
+    assert (plan.status, plan.strategy) == (PlanStatus.NOT_FOUND, 'first')
+    assert plan.message == 'too much'
+    assert 'does not show that there is none' in plan.status.value
+    assert unsolved(plan)
+    # where it is only not found, the others are tried
+    lost = failed(result, 'none', not_found=True)
+    assert planned(rigid_model, task, ('first', lost), ('second', cold_start)).solved
+
+
+def test_motion_that_many_starts_did_not_find_is_told_after_all_others(
         rigid_model: ArmModel, paper_task: TaskFactory,
         result: CollocationResult) -> None:
     plan = planned(rigid_model, paper_task(rigid_model.arm),
-                   ('first', failed(result, 'lost', 'too much')), ('second', cold_start))
-    assert (plan.status, plan.strategy) == (PlanStatus.INFEASIBLE, 'first')
-    assert plan.message == 'too much'
+                   ('first', failed(result, 'none', not_found=True)),
+                   ('second', failed(result, 'lost')))
+    assert (plan.status, plan.strategy) == (PlanStatus.NOT_FOUND, 'first, second')
+    assert plan.message == 'first: none; second: lost'
     assert unsolved(plan)
 
 
@@ -94,7 +110,8 @@ def test_monitor_hears_the_name_of_each_strategy(
         return cold_start(problem, solver.with_settings(max_iterations=1))
 
     plan = planned(rigid_model, paper_task(rigid_model.arm, 5.8), ('first', hasty),
-                   ('second', hasty), ('third', cold_start), monitor=Monitor(report=lines.append))
+                   ('second', hasty), ('third', cold_start), monitor=Monitor(report=lines.append),
+                   search='fast')
     assert list(dict.fromkeys(line.phase for line in lines)) == ['first', 'second', 'third']
     assert len(lines) == lines[-1].iteration == plan.iterations
 
@@ -169,17 +186,22 @@ def test_free_duration_is_guessed_longer_where_the_first_guess_fails(
     assert guesses == [('alone', 1.0), ('alone', 2.0)]
 
 
+@pytest.mark.parametrize('quick', [False, True])
 def test_free_duration_is_never_refused_for_its_guess(
-        rigid_model: ArmModel, paper_task: TaskFactory, result: CollocationResult) -> None:
-    # what the guess forbids is no limit of the task: that strategy is not even asked
+        rigid_model: ArmModel, paper_task: TaskFactory, result: CollocationResult,
+        quick: bool) -> None:
+    # what the guess forbids is no limit of the task
+    limit = Strategy('limit', failed(result, 'too short', not_found=True, hopeless=True), quick)
     task = paper_task(rigid_model.arm, time_weight=10.0)
-    plan = plan_path(task, model=rigid_model, strategies=[
-        Strategy('limit', failed(result, '', 'too much'), shows_infeasibility=True)])
-    assert (plan.status, plan.message) == (PlanStatus.NOT_CONVERGED,
-                                           'no strategy applies to this motion')
+    plan = plan_path(task, model=rigid_model, strategies=[limit, Strategy('slow', cold_start)])
+    assert (plan.solved, plan.strategy) == (True, 'slow'), plan.message
+    alone = plan_path(task, model=rigid_model, strategies=[limit])
+    assert (alone.status, alone.message) == (PlanStatus.NOT_CONVERGED, 'limit: too short')
 
 
 # Stopped, and out of limits
+
+BY_IPOPT = ('direct collocation', 'kinds of motion')
 
 
 @pytest.mark.parametrize('strategy', CATALOGUE, ids=[each.name for each in CATALOGUE])
@@ -193,7 +215,7 @@ def test_every_strategy_is_canceled_between_its_iterations(
                        (strategy.name, strategy.attempt), monitor=monitor)
         assert (plan.status, plan.message) == (PlanStatus.CANCELED, 'canceled')
         # IPOPT asks after an iteration
-        assert plan.iterations in (last, last + (strategy.name == 'direct collocation'))
+        assert plan.iterations in (last, last + (strategy.name in BY_IPOPT))
         assert unsolved(plan)
 
 
@@ -260,7 +282,7 @@ def test_tolerance_that_no_motion_meets_fails_the_certificate(
         rigid_model: ArmModel, paper_task: TaskFactory, plan_of: PlanFactory) -> None:
     lines: list[Progress] = []
     plan = plan_path(paper_task(rigid_model.arm, tolerance=1e-40), model=rigid_model,
-                     monitor=Monitor(report=lines.append))
+                     monitor=Monitor(report=lines.append), search='fast')
     assert (plan.status, plan.solved) == (PlanStatus.CERTIFICATE_FAILED, False)
     assert plan.message.startswith('boundary error is ')
     assert plan.message.endswith(', but must be <= 1e-40')

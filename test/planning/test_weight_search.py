@@ -9,7 +9,7 @@ from typing import Any
 from factories import PlanFactory, TaskFactory
 from flex_planner.base.progress import Monitor, Progress
 from flex_planner.optimal_control.arm_model import ArmModel
-from flex_planner.planning.objectives import Objective
+from flex_planner.planning.objectives import Objective, Objectives
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_path import plan_path
 import numpy as np
@@ -113,10 +113,11 @@ def test_weight_is_added_to_those_of_the_task(rigid_model: ArmModel,
     {'max_torque_shares': [0.8, 0.8]}, {'max_joint_speeds': [2.0, 2.0],
                                         'max_torque_shares': [1.0, 0.6]}], ids=str)
 def test_motion_that_keeps_its_limits_stays_as_it_is(
-        rigid_model: ArmModel, paper_task: TaskFactory, plan_of: PlanFactory,
+        rigid_model: ArmModel, paper_task: TaskFactory,
         limits: dict[str, Any]) -> None:
     plan = within(rigid_model, paper_task(rigid_model.arm), **limits)
-    search, bare = search_of(plan), plan_of('rigid')
+    search = search_of(plan)
+    bare = plan_path(paper_task(rigid_model.arm), model=rigid_model, search='fast')
     assert plan.solved, plan.message
     assert (search.met, search.trials, search.margins) == (True, (), ())
     assert (plan.cost, plan.iterations) == (bare.cost, bare.iterations)
@@ -319,6 +320,19 @@ def test_search_reports_its_phases(rigid_model: ArmModel, paper_task: TaskFactor
     assert phases == ['cold start', 'weight of joint speeds', 'weights adapted']
     assert len(reports) == plan.iterations
     assert {each.payload for each in reports} == {0.0}
+
+
+def test_cheaper_kinds_are_looked_for_before_weights_are(rigid_model: ArmModel,
+                                                         paper_task: TaskFactory) -> None:
+    reports: list[Progress] = []
+    plan = plan_path(paper_task(rigid_model.arm), model=rigid_model,
+                     monitor=Monitor(report=reports.append),
+                     objectives=Objectives(max_joint_speeds=[BOUND, BOUND]))
+    phases = list(dict.fromkeys(each.phase for each in reports))
+    kinds = [phase for phase in phases if phase.startswith('kinds of motion, start ')]
+    assert kinds
+    assert phases == ['cold start', *kinds, 'weight of joint speeds', 'weights adapted']
+    assert search_of(plan).met
 
 
 @both_stops

@@ -18,7 +18,9 @@ SEEN, RINGING = 5e-6, 5e-4
 
 
 def within(model: ArmModel, task: Task, monitor: Monitor | None = None, **limits: Any) -> Plan:
-    return plan_path(task, model=model, objectives=Objectives(**limits), monitor=monitor)
+    """Plan within limits; the weights are what matters, not the kind of motion."""
+    return plan_path(task, model=model, objectives=Objectives(**limits), monitor=monitor,
+                     search='fast')
 
 
 def search_of(plan: Plan) -> ObjectiveSearch:

@@ -15,6 +15,11 @@ from flex_planner.planning.plan import PlanStatus
 Search = Callable[[Monitor], MaxPayload]
 
 
+def followed(task: Task, **options: Any) -> MaxPayload:
+    """Search along one kind of motion, where that is what matters, or the task has no others."""
+    return find_max_payload(task, search='fast', **options)
+
+
 def raised(task: Task, **options: Any) -> MaxPayload:
     return find_max_payload(task, method=PayloadMethod.INCREMENTAL, **options)
 
@@ -33,10 +38,17 @@ def stopped_after(calls: int, status: PlanStatus) -> Monitor:
     return monitor
 
 
-def assert_stopped(found: MaxPayload, status: PlanStatus) -> None:
-    assert (found.status, found.message) == (status, status.value)
-    assert (found.solved, found.payload, found.limiting_joint) == (False, 0.0, None)
-    assert found.plan is None or not found.plan.solved
+def assert_stopped(found: MaxPayload, status: PlanStatus, *, certified: bool = False) -> None:
+    """Check the outcome of a search that was stopped, with or without something certified."""
+    assert (found.status, found.solved) == (status, False)
+    if not certified:
+        assert (found.message, found.payload, found.limiting_joint) == (status.value, 0.0, None)
+        assert found.plan is None or not found.plan.solved
+        return
+    assert found.message == f'{status.value} ({found.payload:.6g} kg are certified)'
+    assert found.plan is not None
+    assert (found.plan.solved, found.plan.task.payload_mass) == (True, found.payload)
+    assert found.limiting_joint is not None
 
 
 def moments(search: Search) -> dict[tuple[str, bool], int]:
@@ -59,9 +71,12 @@ def moments(search: Search) -> dict[tuple[str, bool], int]:
     return found
 
 
-def assert_stopped_at(search: Search, expected: set[tuple[str, bool]]) -> None:
+def assert_stopped_at(search: Search, expected: dict[tuple[str, bool], bool]) -> None:
+    """Stop a search at moments, each with whether a motion can be certified when time is up."""
     calls = moments(search)
-    assert calls.keys() >= expected
-    for moment in expected:
-        for status in (PlanStatus.CANCELED, PlanStatus.TIMEOUT):
-            assert_stopped(search(stopped_after(calls[moment], status)), status)
+    assert calls.keys() >= expected.keys()
+    for moment, certified in expected.items():
+        canceled = search(stopped_after(calls[moment], PlanStatus.CANCELED))
+        assert_stopped(canceled, PlanStatus.CANCELED)
+        late = search(stopped_after(calls[moment], PlanStatus.TIMEOUT))
+        assert_stopped(late, PlanStatus.TIMEOUT, certified=certified)

@@ -43,9 +43,11 @@ def solve_by_scipy(problem: BoundaryValueProblem, guess: CollocationSolution,
         left, right = problem.left(first)[1], problem.right(last)[1]
         return (np.vstack([left, np.zeros_like(right)]), np.vstack([np.zeros_like(left), right]))
 
-    found = solve_bvp(rate, ends, guess.mesh, guess.nodes.T, bc_jac=rows, max_nodes=_MAX_NODES,
-                      tol=settings.error_tolerance, fun_jac=lambda t, z: np.moveaxis(
-                          problem.rate_jacobian(t, z.T)[1], 0, 2))
+    with np.errstate(over='ignore', invalid='ignore'):  # it diverges from some guesses
+        found = solve_bvp(rate, ends, guess.mesh, guess.nodes.T, bc_jac=rows,
+                          max_nodes=_MAX_NODES, tol=settings.error_tolerance,
+                          fun_jac=lambda t, z: np.moveaxis(
+                              problem.rate_jacobian(t, z.T)[1], 0, 2))
     return _result(found, problem.size)
 
 

@@ -170,8 +170,8 @@ def _linear_rows(mesh: Mesh, n_x: int, size: int) -> tuple[Any, Any]:
     rate = ca.horzcat(ca.DM(n_x, n_x // 2), value, ca.DM(n_x, size - n_x - n_x // 2))
     constant = ca.horzcat(ca.kron(P[:, :K], in_point), ca.kron(P[:, K:], value))
     growing = ca.kron(Q, rate)
-    return constant, ca.horzcat(growing, ca.DM(growing.size1(), constant.size2()
-                                                - growing.size2()))
+    others = constant.size2() - growing.size2()
+    return constant, ca.horzcat(growing, ca.DM(growing.size1(), others))
 
 
 def _diagonal(blocks: Any, count: int) -> Any:

@@ -12,8 +12,8 @@ class SearchEffort(Enum):
     How many starts a search over kinds of motion may take.
 
     ``FAST`` follows the kind that a straight start leads to. ``NORMAL`` explores the arm made
-    rigid from 16 starts where a limit is wanted, and from 8 to 16 for a plan. ``THOROUGH``
-    explores from 48.
+    rigid from 16 starts where a limit is wanted, and for a plan from 8 to 16, until the best kind
+    came three times. ``THOROUGH`` explores from 48 for both, whatever was met.
 
     """
 

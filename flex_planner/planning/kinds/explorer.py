@@ -26,7 +26,7 @@ import numpy as np
 # they need not be
 _STAGES, _LIMIT_INTERVALS, _INTERVALS = 4, 24, 16
 # relative change on a mesh twice as fine up to which a value stands, and the finest mesh
-_STANDS, _MOST_INTERVALS = 0.01, 192
+_STANDS, MOST_INTERVALS = 0.01, 192
 _ITERATIONS, _TOLERANCE, _FINE_TOLERANCE = 100, 1e-4, 1e-6
 # the price of what is free, in units of the largest possible cost by the mass of the links, or by
 # the duration; it goes with R, so that the motion does not depend on it
@@ -81,13 +81,16 @@ class Explorer:
         Receives iterations, and may stop the work.
     most_payload : float
         The largest payload that is of use, for example what can be held at the goal [kg].
+    most_intervals : int
+        Of a mesh, at least 2.
 
     """
 
     def __init__(self, problem: MotionProblem, free: Free, monitor: Monitor,
-                 most_payload: float = np.inf) -> None:
+                 most_payload: float = np.inf, most_intervals: int = MOST_INTERVALS) -> None:
         self._problem, self._free, self._monitor = problem, free, monitor
         self._most = min(_BELOW * most_payload, _heaviest(problem))
+        self._finest = min(most_intervals, MOST_INTERVALS)
         self._price = _price(problem, free)
         self._directs: dict[int, DirectProblem] = {}
 
@@ -101,8 +104,8 @@ class Explorer:
             If the monitor stopped it.
 
         """
-        problem, intervals = self._first(), (
-            _INTERVALS if self._free is Free.NOTHING else _LIMIT_INTERVALS)
+        problem, intervals = self._first(), min(self._finest, (
+            _INTERVALS if self._free is Free.NOTHING else _LIMIT_INTERVALS))
         duration = problem.task.duration
         found = self._direct(intervals).solve(
             problem.parameters, problem.start, problem.goal, duration, free=self._free,
@@ -122,7 +125,7 @@ class Explorer:
 
         """
         here, intervals = motion, 2 * motion.solution.intervals
-        while intervals <= _MOST_INTERVALS:
+        while intervals <= self._finest:
             task = here.problem.task
             found = self._direct(intervals).solve(
                 here.problem.parameters, here.problem.start, here.problem.goal, task.duration,
@@ -141,7 +144,7 @@ class Explorer:
         """Return the problem with first values of what is free."""
         problem = self._problem
         if self._free is Free.PAYLOAD:
-            first = _FIRST_PAYLOAD * _link_mass(problem)
+            first = _FIRST_PAYLOAD * link_mass(problem)
             return problem.with_changes(payload_mass=min(first, 0.9 * self._most))
         if self._free is Free.DURATION:
             return problem.with_changes(duration=_FIRST_DURATION * problem.task.duration)
@@ -178,14 +181,14 @@ def sample_angles(times: Array, states: Array, n: int) -> Array:
     return np.stack([np.interp(at, times, angle) for angle in states[:, :n].T], axis=1)
 
 
-def _link_mass(problem: MotionProblem) -> float:
+def link_mass(problem: MotionProblem) -> float:
     """Return the mass of all links [kg]."""
     return sum(link.mass for link in problem.model.arm.links)
 
 
 def _heaviest(problem: MotionProblem) -> float:
     """Return a payload beyond which nothing is explored [kg]."""
-    return 1e4 * _link_mass(problem)
+    return 1e4 * link_mass(problem)
 
 
 def _price(problem: MotionProblem, free: Free) -> float:
@@ -197,4 +200,4 @@ def _price(problem: MotionProblem, free: Free) -> float:
     largest = _PRICE * float(parameters.effort_weights @ stall**2) / 2
     if free is Free.DURATION:
         return largest
-    return largest * problem.task.duration / _link_mass(problem)
+    return largest * problem.task.duration / link_mass(problem)

@@ -14,6 +14,7 @@ from flex_planner.optimal_control.direct.unknowns import Free
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.planning.kinds.clusters import KindOfMotion
 from flex_planner.planning.kinds.effort import SearchEffort
+from flex_planner.planning.kinds.explorer import link_mass
 from flex_planner.planning.kinds.search import find_kinds, rigid_twin
 from flex_planner.planning.strategies.homotopies import (
     drop_weights,
@@ -25,8 +26,9 @@ from flex_planner.planning.strategies.strategy import Attempt
 
 # kinds that Newton's method is tried from
 _TRIED = 3
-# a task is out of sight if the heaviest payload found is less than this share of its own, and the
-# shortest duration more than its own by as much; of a flexible arm, whose rigid twin is explored
+# a task is out of sight if the heaviest payload found, links included, is less than this share of
+# its own, or the shortest duration more than its own by as much; of a flexible arm, whose rigid
+# twin is explored, too
 _NEAR, _NEAR_FLEXIBLE = 0.98, 0.9
 
 
@@ -36,7 +38,7 @@ def explore_kinds(problem: MotionProblem, solver: Solver) -> Attempt | None:
     if rigid_twin(bare) is None:
         return None
     starts = SearchEffort.NORMAL.starts
-    kinds = find_kinds(bare, Free.NOTHING, starts, solver.monitor)
+    kinds = find_kinds(bare, Free.NOTHING, starts, solver)
     attempt = _solve_first(problem, bare, kinds, solver)
     if attempt.decides:
         return attempt
@@ -62,7 +64,7 @@ class _Limits:
     @classmethod
     def find(cls, bare: MotionProblem, starts: int, solver: Solver) -> _Limits:
         """Explore both."""
-        heaviest, shortest = (find_kinds(bare, free, starts, solver.monitor)
+        heaviest, shortest = (find_kinds(bare, free, starts, solver)
                               for free in (Free.PAYLOAD, Free.DURATION))
         return cls(bare=bare, starts=starts, heaviest=heaviest, shortest=shortest)
 
@@ -74,7 +76,8 @@ class _Limits:
         late = bool(self.shortest) and near * self.shortest[0].value > task.duration
         if not self.heaviest:
             return late
-        return late or self.heaviest[0].value < near * task.payload_mass
+        links = link_mass(self.bare)  # the price of payload goes with their mass, so does the gap
+        return late or self.heaviest[0].value + links < near * (task.payload_mass + links)
 
     @property
     def sentence(self) -> str:

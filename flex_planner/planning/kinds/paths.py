@@ -82,7 +82,8 @@ def fixed_paths(start: Array, goal: Array, *, gravity: bool) -> Iterator[JointPa
         yield JointPath(start, goal, kinds[name](*full))
     if gravity:
         rest = (0.0,) * (start.size - 1)
-        yield JointPath(start, goal, bow(_SWING, *rest))
+        if rest:  # a single joint has swung so far already
+            yield JointPath(start, goal, bow(_SWING, *rest))
         yield JointPath(start, goal, wave(-_SWING, *rest))
 
 

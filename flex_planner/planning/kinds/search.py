@@ -8,6 +8,7 @@ from itertools import chain, islice
 
 from flex_planner.base.errors import InvalidTaskError
 from flex_planner.base.progress import Monitor
+from flex_planner.collocation import Solver
 from flex_planner.optimal_control.direct.unknowns import Free
 from flex_planner.optimal_control.holding import holding_limit
 from flex_planner.optimal_control.motion_problem import MotionProblem
@@ -25,7 +26,7 @@ _FEWEST, _OFTEN, _SAME = 8, 3, 0.01
 
 
 def find_kinds(problem: MotionProblem, free: Free, starts: int,
-               monitor: Monitor) -> list[KindOfMotion]:
+               solver: Solver) -> list[KindOfMotion]:
     """
     Return the kinds of motion of a task, taken as rigid, the best first.
 
@@ -37,8 +38,8 @@ def find_kinds(problem: MotionProblem, free: Free, starts: int,
         Payload or duration for the limit of a task; nothing for motions of least effort.
     starts : int
         How many starts to explore.
-    monitor : Monitor
-        Receives progress.
+    solver : Solver
+        Its monitor receives progress, and no mesh is larger than its settings allow.
 
     Returns
     -------
@@ -59,8 +60,8 @@ def find_kinds(problem: MotionProblem, free: Free, starts: int,
     most = np.inf
     if free is Free.PAYLOAD:
         most = holding_limit(problem.model, problem.task, problem.parameters)[0]
-    explorer = Explorer(rigid, free, monitor, most)
-    motions = list(_explore(explorer, rigid, free, starts, monitor))
+    explorer = Explorer(rigid, free, solver.monitor, most, solver.settings.max_intervals)
+    motions = list(_explore(explorer, rigid, free, starts, solver.monitor))
     better = is_better(free)
     kinds = _confirm(explorer, cluster(motions, better), better)
     return sorted(kinds, key=lambda kind: bool(find_limit_violations(

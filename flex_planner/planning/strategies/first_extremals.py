@@ -86,7 +86,7 @@ def _rigid_extremals(parameter: FreeParameter, problem: MotionProblem,
 
 
 def lift_extremal(parameter: FreeParameter, problem: MotionProblem, rigid: list[Extremal],
-                   solver: Solver) -> Extremal | None:
+                  solver: Solver) -> Extremal | None:
     """Return the flexible motion at the price of a rigid one that is near its limit, or None."""
     for extremal in reversed(rigid[-_LIFTS:]):
         if extremal.interrupted:

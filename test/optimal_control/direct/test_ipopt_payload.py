@@ -122,9 +122,9 @@ def test_cost_of_more_payload_is_its_price(motion: MotionProblem) -> None:
 
 def test_first_payload_does_not_matter(motion: MotionProblem) -> None:
     direct = free(motion)
-    payloads = [direct.solve(replace(motion.parameters, payload_mass=first), motion.start,
-                             motion.goal, 1.0, free=Free.PAYLOAD, price=PRICE).payload
-                for first in (0.0, 3.0, 9.0)]
+    payloads = [
+        direct.solve(replace(motion.parameters, payload_mass=first), motion.start, motion.goal,
+                     1.0, free=Free.PAYLOAD, price=PRICE).payload for first in (0.0, 3.0, 9.0)]
     # IPOPT's tolerance of 1e-8
     np.testing.assert_allclose(payloads, payloads[0], rtol=1e-6)
 

@@ -99,7 +99,7 @@ def test_absurd_payload_of_an_iterate_ends_the_continuation_and_raises_nothing(
 
     def solve(direct: DirectProblem, *data: Any, **options: Any) -> SimpleNamespace:
         asked.append(options['price'])
-        return SimpleNamespace(payload=payload)
+        return SimpleNamespace(payload=payload, duration=1.0)
 
     monkeypatch.setattr(DirectProblem, 'solve', solve)
     assert list(continue_by_ipopt(problem, 1.0, Solver(), lambda value: 0.0)) == []
