@@ -26,8 +26,9 @@ from flex_planner.planning.kinds.windings import say_turns
 from flex_planner.planning.strategies.initial_guesses import lift
 from flex_planner.planning.verdict import find_refusal
 
-# another kind is worth solving if it is cheaper by this share, and so many are
-_CHEAPER, _SOLVED = 0.01, 2
+# another kind is worth solving if it is cheaper by this share, and so many are: a motion is called
+# the cheapest beside the values of the others
+_CHEAPER, _SOLVED = 1e-4, 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -91,6 +92,8 @@ def find_cheaper(problem: MotionProblem, found: CollocationResult, solver: Solve
             break
         if result.converged:
             best = best.or_better(home, result, kind)
+            exact = replace(kind, value=as_kind(home, result.solution).value)
+            kinds[kinds.index(kind)] = exact
     others = [kind for kind in kinds
               if not are_alike(kind.motion.angles, best.kind.motion.angles)]
     same = sum(kind.met for kind in kinds if kind not in others)
