@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 from flex_planner.collocation import CollocationResult, CollocationSolution, INTERRUPTED, Solver
 from flex_planner.optimal_control.motion_problem import MotionProblem
-from flex_planner.planning.kinds.clusters import are_alike, cluster, KindOfMotion
+from flex_planner.planning.kinds.clusters import are_alike, cluster, KindOfMotion, MOST_KINDS
 from flex_planner.planning.kinds.effort import SearchEffort
 from flex_planner.planning.kinds.newton_explorer import (
     as_kind,
@@ -28,7 +28,7 @@ from flex_planner.planning.verdict import find_refusal
 
 # another kind is worth solving if it is cheaper by this share, and so many are: a motion is called
 # the cheapest beside the values of the others
-_CHEAPER, _SOLVED = 1e-4, 2
+_CHEAPER, _SOLVED = 1e-4, MOST_KINDS - 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -92,8 +92,7 @@ def find_cheaper(problem: MotionProblem, found: CollocationResult, solver: Solve
             break
         if result.converged:
             best = best.or_better(home, result, kind)
-            exact = replace(kind, value=as_kind(home, result.solution).value)
-            kinds[kinds.index(kind)] = exact
+            kinds[kinds.index(kind)] = _with_exact_value(kind, as_kind(home, result.solution))
     others = [kind for kind in kinds
               if not are_alike(kind.motion.angles, best.kind.motion.angles)]
     same = sum(kind.met for kind in kinds if kind not in others)
@@ -118,6 +117,13 @@ class _Best:
         if kept and (self.refused or other.value < self.kind.value):
             return _Best(problem=home, result=result, kind=other, refused=False)
         return self
+
+
+def _with_exact_value(kind: KindOfMotion, solved: KindOfMotion) -> KindOfMotion:
+    """Return a kind with the value of its exact motion, unless that is of another arm or kind."""
+    same_arm = solved.motion.problem.model.arm is kind.motion.problem.model.arm
+    alike = are_alike(kind.motion.angles, solved.motion.angles)
+    return replace(kind, value=solved.value) if same_arm and alike else kind
 
 
 def _with_turns(kind: KindOfMotion, problem: MotionProblem,
