@@ -2,7 +2,8 @@
 The paper's search for the maximum payload: Korayem et al. 2009, section 4.2 and fig. 2.
 
 The payload is raised by a step while the boundary-value problem can be solved; where it cannot,
-the step is halved, until it is as small as the accuracy.
+the step is halved, until it is as small as the accuracy. What failed is then tried again from
+there: Newton's method may have failed for want of a good start.
 
 """
 
@@ -86,28 +87,35 @@ def raise_payload(problem: MotionProblem, first: CollocationSolution, *, step: f
         If the monitor interrupted the search while a motion was re-simulated.
 
     """
-    payload, here, failed = problem.task.payload_mass, first, np.inf
+    payload, here, failed, confirmed = problem.task.payload_mass, first, np.inf, False
+    first_step = step
     while True:
-        while payload + step >= failed:  # known to be too much
-            if failed - payload <= accuracy:
-                return
+        while payload + step > failed - step / 2 and failed - payload > accuracy:
             step /= 2
-        trial = _try_payload(problem, here, payload + step, step, solver)
+        again = failed - payload <= accuracy
+        if again and confirmed:
+            return
+        # what failed from a lighter payload may do from one so near
+        tried = failed if again else payload + step
+        trial = _try_payload(problem, here, tried, tried - payload, solver, again=again)
         if trial is None:
-            failed = payload + step
+            failed, confirmed = tried, True
             continue
+        if again and not (trial.solved or trial.interrupted):
+            return
         yield trial
         if trial.interrupted:
             return
         if trial.solved:
             payload, here = trial.payload, trial.result.solution
+            failed, step = (np.inf, first_step) if again else (failed, step)
         else:
-            failed = trial.payload
+            failed, confirmed = trial.payload, bool(trial.refusal)
 
 
 def _try_payload(problem: MotionProblem, start: CollocationSolution, payload: float, step: float,
-                 solver: Solver) -> PayloadTrial | None:
-    """Try a payload from the motion of a lighter one, then from nothing; None if absurd."""
+                 solver: Solver, *, again: bool) -> PayloadTrial | None:
+    """Try a payload from a lighter one's motion, at first from nothing too; None if absurd."""
     solver.monitor.payload = payload
     try:
         heavier = problem.with_changes(payload_mass=payload)
@@ -115,7 +123,7 @@ def _try_payload(problem: MotionProblem, start: CollocationSolution, payload: fl
         return None
     result: CollocationResult | None = None
     coarse = solver.coarse()
-    for strategy in (warm_start(start), *QUICK):
+    for strategy in (warm_start(start), *(() if again else QUICK)):
         attempt = strategy.attempt(heavier, coarse)
         if attempt is not None:
             result = attempt.result

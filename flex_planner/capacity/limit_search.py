@@ -31,12 +31,14 @@ from flex_planner.planning.strategies.homotopies import (
     drop_weights,
     has_weights,
     raise_weights_from,
+    without_weights,
 )
 from flex_planner.planning.strategies.price_continuation import continue_in_price
 from flex_planner.planning.strategies.strategy import Attempt, Strategy
 
 # a search has finished a kind of motion if it comes to this share of its value
 _KEPT = 0.01
+_CONTINUED = 'continuation to the limit'
 # starts for each other way round to a point
 _OTHER_WAY = 3
 # time to certify what a search has when its own is over [s]
@@ -90,6 +92,11 @@ class LimitSearch:
         self.starts = 0
         self.extremals: list[Extremal] = []
         self.extrapolated = self.warm = False
+
+    @property
+    def weighted(self) -> bool:
+        """Return whether the task has weights besides those of effort."""
+        return has_weights(self._problem)
 
     @property
     def last(self) -> Extremal:
@@ -151,11 +158,24 @@ class LimitSearch:
         return found
 
     def certify_so_far(self) -> tuple[Extremal, Plan] | None:
-        """Return the motion nearest to the limit with a plan; None if there is none at once."""
-        short = in_grace(self._solver)
+        """
+        Return the motion nearest to the limit with a plan; None if there is none at once.
+
+        Where the weights of the task leave none, the plan is without them.
+
+        """
+        known = self._certify_at_once(self._problem)
+        if known is None and self.weighted:
+            known = self._certify_at_once(without_weights(self._problem))
+        return known
+
+    def _certify_at_once(self, problem: MotionProblem) -> tuple[Extremal, Plan] | None:
+        """Return the motion nearest to the limit with a plan of a problem like the task's."""
+        short = in_grace(self._solver, _GRACE / 2 if self.weighted else _GRACE)
         for extremal in (one for one in reversed(self.extremals) if one.result.converged):
             try:
-                plan = plan_near(self._at(extremal), extremal.result.solution, short)
+                near = self._parameter.with_value(problem, extremal.value)
+                plan = plan_near(near, extremal.result.solution, short)
             except FlexPlannerError:  # too heavy to hold
                 continue
             if plan.solved:
@@ -273,19 +293,25 @@ class LimitSearch:
         return found if found is not None and found.result.converged else None
 
 
-def in_grace(solver: Solver) -> Solver:
+def continue_strategy(start: CollocationSolution) -> Strategy:
+    """Return the strategy that starts from a motion with the weights of the task."""
+    return Strategy(_CONTINUED, lambda problem, solver: Attempt(
+        result=solver.solve(problem, start)), quick=True)
+
+
+def in_grace(solver: Solver, seconds: float = _GRACE) -> Solver:
     """Return a solver whose time is just enough to certify what a stopped search has."""
-    return solver.watched_by(Monitor(time_limit=_GRACE, canceled=solver.monitor.canceled))
+    return solver.watched_by(Monitor(time_limit=seconds, canceled=solver.monitor.canceled))
 
 
 def start_strategy(start: CollocationSolution, extremal: Extremal | None = None) -> Strategy:
-    """Return the strategy that starts from a motion; that of an extremal may be the solution."""
+    """Return the strategy that starts from a motion without weights, perhaps the solution."""
     def attempt(problem: MotionProblem, solver: Solver) -> Attempt:
         if extremal is not None and _is_solution(extremal, problem, solver):
             return Attempt(result=extremal.result)
         return Attempt(result=raise_weights_from(problem, start, solver))
 
-    return Strategy('continuation to the limit', attempt, quick=True)
+    return Strategy(_CONTINUED, attempt, quick=True)
 
 
 def plan_near(problem: MotionProblem, start: CollocationSolution, solver: Solver) -> Plan:

@@ -16,15 +16,16 @@ from flex_planner.base.errors import HoldingError, InvalidTaskError
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import number
 from flex_planner.capacity.extrapolation import Neighbours
-from flex_planner.capacity.payload_methods import search_directly, search_in_steps
+from flex_planner.capacity.payload_methods import search_directly
 from flex_planner.capacity.results import MaxPayload, PayloadMethod
+from flex_planner.capacity.step_search import search_in_steps
 from flex_planner.collocation import Solver
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
 from flex_planner.optimal_control.task import MAX_PAYLOAD, Task
 from flex_planner.planning.kinds.effort import SearchEffort
 from flex_planner.planning.plan import PlanStatus
-from flex_planner.planning.proofs import find_proof, Proof, prove_not_held
+from flex_planner.planning.proofs import bound_payload, find_proof, Proof, prove_not_held
 from flex_planner.planning.strategies.extremals import SearchStart
 import numpy as np
 
@@ -92,10 +93,11 @@ def find_max_payload(task: Task, *, model: ArmModel | None = None, solver: Solve
     try:
         problem = MotionProblem(model, task, task_parameters(task))
     except HoldingError as error:
-        return _impossible(task, method, prove_not_held(error, task.payload_mass))
+        problem = MotionProblem(model, task, task_parameters(task), holds=False)
+        return _impossible(problem, method, prove_not_held(error, task.payload_mass))
     proof = find_proof(problem)
     if proof is not None:
-        return _impossible(task, method, proof)
+        return _impossible(problem, method, proof)
     if method is PayloadMethod.DIRECT:
         found = search_directly(problem, solver, accuracy, effort, start_from)
     else:
@@ -122,7 +124,14 @@ def _check(task: Task) -> None:
                                'goal_velocities 0')
 
 
-def _impossible(task: Task, method: PayloadMethod, proof: Proof) -> MaxPayload:
-    """Return the outcome where no motion carries even the payload of the task."""
-    return MaxPayload(task=task, method=method, status=PlanStatus.INFEASIBLE,
-                      message=str(proof), proof=proof, proved_upper=task.payload_mass)
+def _impossible(problem: MotionProblem, method: PayloadMethod, proof: Proof) -> MaxPayload:
+    """
+    Return the outcome where no motion carries even the payload of the task.
+
+    More is another question: a payload may be a counterweight, or its fall may lift the arm.
+
+    """
+    bound = bound_payload(problem)
+    return MaxPayload(task=problem.task, method=method, status=PlanStatus.INFEASIBLE,
+                      message=str(proof), proved_upper=bound.payload,
+                      proof=bound.proof or proof)

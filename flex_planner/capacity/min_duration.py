@@ -16,7 +16,7 @@ from flex_planner.base.validation import number, vector
 from flex_planner.capacity.extrapolation import Neighbours, step_ratio
 from flex_planner.capacity.limit_search import LimitSearch
 from flex_planner.capacity.max_payload import find_max_payload
-from flex_planner.capacity.results import describe_kinds, MaxPayload, MinDuration
+from flex_planner.capacity.results import describe_kinds, MaxPayload, MinDuration, say_lost_weights
 from flex_planner.collocation import Solver
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
@@ -137,7 +137,8 @@ def _certified_so_far(search: LimitSearch, found: MinDuration) -> MinDuration:
     extremal, plan = known
     return replace(found, plan=plan, duration=extremal.value,
                    local_lower=max(0.0, extremal.value - extremal.gap),
-                   message=f'{found.message} ({extremal.value:.6g} s are certified)')
+                   message=f'{found.message}{say_lost_weights(found.task, plan)} '
+                           f'({extremal.value:.6g} s are certified)')
 
 
 def _result(task: Task, search: LimitSearch, status: PlanStatus, message: str) -> MinDuration:

@@ -120,8 +120,9 @@ class MaxPayload(LimitResult):
         Lower end of the bracket: the largest payload with a certified plan; 0 if there is
         none [kg].
     local_upper : float
-        Upper end: where this kind of motion ends, see `Extremal.gap`, or a payload without a
-        solution; ``inf`` if unknown. Motions of another kind may carry more [kg].
+        Upper end: where this kind of motion ends, see `Extremal.gap`, or by the incremental method
+        a payload with which no motion was found; ``inf`` if unknown. Motions of another kind may
+        carry more [kg].
     proved_upper : float
         What no motion of the task exceeds; ``inf`` if nothing is proved [kg].
     proof : Proof or None
@@ -130,7 +131,7 @@ class MaxPayload(LimitResult):
         Index of the joint whose motor is on its limit for the largest share of the time, see
         `Plan.saturation`, or that can hold no more at the goal.
     held : bool
-        Whether the limit is what the motors hold at the goal.
+        Whether the limit is what the motors hold at the goal: `local_upper`.
     front : PayloadFront
         Payloads and their cost; empty if not searched by the direct method.
     trials : tuple of PayloadTrial
@@ -147,6 +148,15 @@ class MaxPayload(LimitResult):
     held: bool = False
     front: PayloadFront = field(default_factory=PayloadFront)
     trials: tuple[PayloadTrial, ...] = ()
+
+    @property
+    def upper_means(self) -> str:
+        """Return what `local_upper` is, in words that it follows."""
+        if self.held:
+            return 'the goal cannot be held with'
+        if self.method is PayloadMethod.INCREMENTAL:
+            return 'no motion was found with'
+        return 'this kind of motion ends at'
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -179,3 +189,11 @@ def describe_kinds(found: LimitResult) -> str:
     count = len(found.kinds)
     kinds = 'the only kind of motion' if count == 1 else f'the best of {count} kinds of motion'
     return f', {kinds} found from {found.starts} starts'
+
+
+def say_lost_weights(task: Task, plan: Plan) -> str:
+    """Return the words for a plan without the weights of the task; none if it has them."""
+    lost = any(getattr(task, name).any() and not getattr(plan.task, name).any()
+               for name in ('position_weights', 'velocity_weights'))
+    return ('; with the weights of the task on positions and speeds no motion near the limit was '
+            'solved, so that the plan is without them') if lost else ''

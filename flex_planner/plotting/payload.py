@@ -56,7 +56,7 @@ def _result(found: MaxPayload) -> str:
     """Return the result in a line."""
     if not found.solved:
         return found.status.value
-    return (f'largest payload {found.payload:.6g} kg, this kind of motion ends at '
+    return (f'largest payload {found.payload:.6g} kg, {found.upper_means} '
             f'{found.local_upper:.6g} kg')
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 from flex_planner.collocation import CollocationResult, CollocationSolution, INTERRUPTED, Solver
 from flex_planner.optimal_control.motion_problem import MotionProblem
-from flex_planner.planning.kinds.clusters import are_alike, cluster, KindOfMotion
+from flex_planner.planning.kinds.clusters import are_alike, cluster, KindOfMotion, MOST_KINDS
 from flex_planner.planning.kinds.effort import SearchEffort
 from flex_planner.planning.kinds.newton_explorer import (
     as_kind,
@@ -26,8 +26,9 @@ from flex_planner.planning.kinds.windings import say_turns
 from flex_planner.planning.strategies.initial_guesses import lift
 from flex_planner.planning.verdict import find_refusal
 
-# another kind is worth solving if it is cheaper by this share, and so many are
-_CHEAPER, _SOLVED = 0.01, 2
+# another kind is worth solving if it is cheaper by this share, and so many are: a motion is called
+# the cheapest beside the values of the others
+_CHEAPER, _SOLVED = 1e-4, MOST_KINDS - 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -91,6 +92,7 @@ def find_cheaper(problem: MotionProblem, found: CollocationResult, solver: Solve
             break
         if result.converged:
             best = best.or_better(home, result, say_turns(problem, home))
+            kinds[kinds.index(kind)] = _with_exact_value(kind, as_kind(home, result.solution))
     return CheapestMotion(problem=best.problem, result=best.result, starts=starts + len(ways),
                           kinds=_list_kinds(best.kind, own, kinds))
 
@@ -122,6 +124,13 @@ class _Best:
         if kept and (self.refused or other.value < self.kind.value):
             return _Best(problem=home, result=result, kind=other, refused=False)
         return self
+
+
+def _with_exact_value(kind: KindOfMotion, solved: KindOfMotion) -> KindOfMotion:
+    """Return a kind with the value of its exact motion, unless that is of another arm or kind."""
+    same_arm = solved.motion.problem.model.arm is kind.motion.problem.model.arm
+    alike = are_alike(kind.motion.angles, solved.motion.angles)
+    return replace(kind, value=solved.value) if same_arm and alike else kind
 
 
 def _with_turns(kind: KindOfMotion, problem: MotionProblem,

@@ -162,12 +162,27 @@ class MotionFacts:
         return apart
 
     def strokes(self) -> tuple[Array, Array]:
-        """Return how far joints and links turn, shapes (n,), of rigid arms [rad]."""
+        """
+        Return how far joints and links turn at least, shapes (n,), of rigid arms [rad].
+
+        To a point they may go the other way round, see `other_windings`.
+
+        """
         turned = (self.problem.goal - self.problem.start)[:self.arm.n_joints]
-        return np.abs(turned), np.abs(np.cumsum(turned))
+        joints, links = np.abs(turned), np.abs(np.cumsum(turned))
+        if not self.problem.task.must_reach_point:
+            return joints, links
+        return _within_half_turn(joints), _within_half_turn(links)
 
     def _energies(self, state: Array, payload: float) -> tuple[float, float]:
         """Return kinetic and potential energy of a state with a payload [J]."""
         given = replace(self.problem.parameters, payload_mass=payload)
         _, kinetic, potential = self.problem.model.mass_and_energy(state[None], given.physical)
         return float(kinetic[0]), float(potential[0])
+
+
+def _within_half_turn(turned: Array) -> Array:
+    """Return angles >= 0, or what full turns leave of them: at most half a turn."""
+    rest = turned % (2 * np.pi)
+    nearest: Array = np.minimum(rest, 2 * np.pi - rest)
+    return nearest

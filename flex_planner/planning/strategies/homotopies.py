@@ -17,7 +17,7 @@ from flex_planner.collocation import (
     follow_homotopy,
     Solver,
 )
-from flex_planner.optimal_control.motion_problem import MotionProblem
+from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
 from flex_planner.planning.strategies.strategy import Attempt
 import numpy as np
 
@@ -54,6 +54,12 @@ def has_weights(problem: MotionProblem) -> bool:
 def drop_weights(problem: MotionProblem) -> MotionProblem:
     """Return the problem with nothing but effort to count."""
     return _weights_at(problem)[0](0.0)
+
+
+def without_weights(problem: MotionProblem) -> MotionProblem:
+    """Return the problem of a task that has nothing but effort to count, see `drop_weights`."""
+    task = replace(problem.task, position_weights=np.zeros(0), velocity_weights=np.zeros(0))
+    return MotionProblem(problem.model, task, task_parameters(task))
 
 
 def _weights_at(problem: MotionProblem) -> tuple[Callable[[float], MotionProblem], float]:

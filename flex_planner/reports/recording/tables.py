@@ -217,7 +217,8 @@ def _search(search: Any) -> ReportTable:
         ('method', 'payload as an unknown at a rising price' if search.method == search.DIRECT
          else 'payload raised step by step'),
         ('largest payload', f'{search.payload:.6g} kg'),
-        ('this kind of motion ends at', f'{search.payload_upper:.6g} kg'),
+        ('this kind of motion ends at' if search.method == search.DIRECT
+         else 'no motion was found with', f'{search.payload_upper:.6g} kg'),
         ('proved', getattr(search, 'proof', '') or '–'),
         ('accuracy asked for', f'{search.payload_accuracy:g} kg'),
         ('limiting joint', '–' if search.limiting_joint < 0 else
