@@ -87,19 +87,19 @@ def raise_payload(problem: MotionProblem, first: CollocationSolution, *, step: f
         If the monitor interrupted the search while a motion was re-simulated.
 
     """
-    payload, here, failed, confirmed = problem.task.payload_mass, first, np.inf, False
+    payload, here, failed, failed_from = problem.task.payload_mass, first, np.inf, np.inf
     first_step = step
     while True:
         while payload + step > failed - step / 2 and failed - payload > accuracy:
             step /= 2
         again = failed - payload <= accuracy
-        if again and confirmed:
+        if again and failed_from >= payload:
             return
         # what failed from a lighter payload may do from one so near
         tried = failed if again else payload + step
         trial = _try_payload(problem, here, tried, tried - payload, solver, again=again)
         if trial is None:
-            failed, confirmed = tried, True
+            failed, failed_from = tried, np.inf
             continue
         if again and not (trial.solved or trial.interrupted):
             return
@@ -110,7 +110,7 @@ def raise_payload(problem: MotionProblem, first: CollocationSolution, *, step: f
             payload, here = trial.payload, trial.result.solution
             failed, step = (np.inf, first_step) if again else (failed, step)
         else:
-            failed, confirmed = trial.payload, bool(trial.refusal)
+            failed, failed_from = trial.payload, np.inf if trial.refusal else payload
 
 
 def _try_payload(problem: MotionProblem, start: CollocationSolution, payload: float, step: float,
@@ -131,7 +131,7 @@ def _try_payload(problem: MotionProblem, start: CollocationSolution, payload: fl
                 break
     assert result is not None
     error = np.inf
-    if result.status not in INTERRUPTED:
+    if result.converged or not (again or result.status in INTERRUPTED):
         final, goal = simulate_to_goal(heavier, result.solution, solver.monitor, _RTOL)
         error = float(np.nan_to_num((final - goal) @ (final - goal) / 2, nan=np.inf))
     reached = result.converged and error <= problem.task.tolerance
