@@ -136,6 +136,8 @@ def test_large_bending_is_refused_unless_it_is_allowed(tmp_path: Path) -> None:
     allowed = run('plan', str(soft), *motion, *DRY, '--allow-large-bending')
     assert (allowed.code, allowed.rows['status']) == (0, 'solved and certified')
     assert f'{"warning":<26} link 1 bends by 50% of its length at ' in allowed.out
+
+
 def test_plan_is_told_with_what_a_controller_makes_of_it(planned: Outcome) -> None:
     assert planned.rows['published trajectory'] == (
         'carried out with 100, 100 N m/rad and 10, 10 N m s/rad at 1000 Hz, effort_hold end')
