@@ -67,7 +67,8 @@ def test_shortest_duration_is_enclosed(request: pytest.FixtureRequest, paper_tas
     found = find_min_duration(paper_task(model.arm), model=model)
     assert_encloses(found, SHORTEST[name])
     assert found.duration == pytest.approx(SHORTEST[name], abs=1e-4)
-    assert (found.starts, len(found.kinds), found.proved_lower) == (16, 1, 0.0)
+    assert (found.starts, len(found.kinds)) == (16, 1)
+    assert 0 < found.proved_lower < found.local_lower
     assert found.message == (
         f'{found.duration:.6g} s are enough, certified, the only kind of motion found from 16 '
         f'starts; this kind of motion ends at {found.local_lower:.6g} s')
