@@ -34,10 +34,10 @@ def table(folder: Path, ros: None) -> dict[str, str]:
 
 def test_table_shows_motion_certificate_and_files(table: dict[str, str]) -> None:
     assert list(table) == [
-        'arm', 'motion', 'planned in', 'on the topic after', 'cost J', 'joint 1', 'joint 2',
-        'certificate', 'collocation residual', 'boundary error (eq. 17)', 'Hamiltonian drift',
-        're-simulated tip error', 'residual vibration', 'simulated arm, at rest', 'picture',
-        'recording']
+        'arm', 'motion', 'planned in', 'warning', 'on the topic after', 'cost J', 'joint 1',
+        'joint 2', 'certificate', 'collocation residual', 'boundary error (eq. 17)',
+        'Hamiltonian drift', 're-simulated tip error', 'residual vibration',
+        'simulated arm, at rest', 'picture', 'recording']
     assert table['arm'] == 'Korayem 2009 two-link arm, EI = 50 N m^2'
     assert table['motion'] == '(0.5, 0.0) m to (0.5, 0.5) m in 1 s with 1 kg'
     assert float(table['cost J']) == pytest.approx(0.64717, abs=1e-4)

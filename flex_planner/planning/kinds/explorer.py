@@ -104,6 +104,7 @@ class Explorer:
             If the monitor stopped it.
 
         """
+        self._monitor.check()  # before a programme is derived
         problem, intervals = self._first(), min(self._finest, (
             _INTERVALS if self._free is Free.NOTHING else _LIMIT_INTERVALS))
         duration = problem.task.duration

@@ -23,7 +23,7 @@ from flex_planner.ros.messages.payload_searches import (
     search_without_result,
     SearchOptions,
 )
-from flex_planner.ros.messages.plans import report_from_plan, STATUS_CODES
+from flex_planner.ros.messages.plans import add_kinds, report_from_plan, STATUS_CODES
 from flex_planner.ros.settings.planner import MAX_ACCURACY, MIN_ACCURACY, PlannerSettings
 from flex_planner_interfaces.msg import PayloadSearch, PlanReport
 from flex_planner_interfaces.srv import FindMaxPayload
@@ -139,10 +139,10 @@ def test_message_tells_the_joint_that_holds_no_more(direct: MaxPayload) -> None:
     assert (message.limiting_joint, message.held) == (1, True)
 
 
-def test_failed_search_has_no_payload_though_a_motion_was_met(direct: MaxPayload) -> None:
+def test_failed_search_keeps_the_payload_that_it_had_but_has_no_cost(direct: MaxPayload) -> None:
     failed = replace(direct, status=PlanStatus.NOT_CONVERGED, limiting_joint=None)
     message, report = search_message(failed, OPTIONS), report_from_search(failed)
-    assert (message.payload, message.payload_upper) == (0.0, direct.local_upper)
+    assert (message.payload, message.payload_upper) == (direct.payload, direct.local_upper)
     assert message.limiting_joint == -1
     assert message.front_payloads.tolist() == direct.front.payloads.tolist()
     assert (report.error_code, report.cost) == (PlanReport.NOT_CONVERGED, math.inf)
@@ -152,7 +152,7 @@ def test_search_without_result_repeats_the_request() -> None:
     request = search_request(method=9, payload_accuracy=-1.0, payload_step=0.5)
     assert search_without_result(request) == PayloadSearch(
         method=9, payload_accuracy=-1.0, payload_step=0.5, payload_upper=math.inf,
-        limiting_joint=-1)
+        payload_local_upper=math.inf, payload_proved_upper=math.inf, limiting_joint=-1)
 
 
 def test_report_of_a_search_is_that_of_its_plan(direct: MaxPayload) -> None:
@@ -160,6 +160,7 @@ def test_report_of_a_search_is_that_of_its_plan(direct: MaxPayload) -> None:
     report, expected = report_from_search(direct), report_from_plan(direct.plan)
     assert report.strategy == f'{direct.method.value}; {direct.plan.strategy}'
     expected.strategy, expected.iterations = report.strategy, direct.iterations
+    add_kinds(expected, direct.kinds, direct.starts)
     assert report == expected
     assert (report.error_code, report.error_msg) == (PlanReport.NONE, '')
 

@@ -225,20 +225,21 @@ def test_report_of_a_failed_plan_is_infinite_and_says_why(rigid_arm: Arm, rigid_
     failed = plan_path(paper_task(rigid_arm), model=rigid_model,
                        solver=Solver(settings))
     report = report_from_plan(failed)
-    assert report.error_code == PlanReport.NOT_CONVERGED
-    assert report.error_msg.startswith('not converged, which does not show that the motion is ')
+    assert report.error_code == PlanReport.NOT_FOUND
+    assert report.error_msg.startswith('no motion found: cold start: an error of ')
     assert {getattr(report, name) for name in NUMBERS} == {math.inf}
     assert report.iterations == failed.iterations > 0
     assert report.mesh_intervals == 0
     assert not (report.peak_torques or report.peak_speeds or report.recording)
 
 
-def test_report_of_an_impossible_motion_names_the_limit(rigid_arm: Arm, rigid_model: ArmModel,
+def test_report_of_an_impossible_motion_gives_the_proof(rigid_arm: Arm, rigid_model: ArmModel,
                                                         paper_task: Any) -> None:
     report = report_from_plan(plan_path(paper_task(rigid_arm, payload_mass=200.0),
                                         model=rigid_model))
     assert report.error_code == PlanReport.INFEASIBLE
-    assert 'carries at most 5.855 kg' in report.error_msg
+    assert 'the motors give at most 14 W: moving 200 kg by 0.5 m takes' in report.error_msg
+    assert report.error_msg.endswith('(POWER)')
     assert report.cost == math.inf
 
 

@@ -103,7 +103,8 @@ def test_client_that_gives_up_is_recorded_as_canceled(
 
 
 def test_ticket_tells_how_far_a_plan_is(worker: RequestPlanner, settings: PlannerSettings) -> None:
-    state = RequestState(settings=replace(settings, record=False))
+    # a search for cheaper kinds would end on the mesh of another motion
+    state = RequestState(settings=replace(settings, record=False, search='fast'))
     assert state.progress.iteration == 0
     outcome = worker.plan(task(), state)
     assert state.progress.iteration == outcome.report.iterations > 0
@@ -180,11 +181,10 @@ def test_parameters_decide_where_the_request_does_not(worker: RequestPlanner,
     assert 10 * settings.payload_accuracy < found.payload_upper - found.payload <= 0.1
 
 
-def test_search_from_more_than_the_maximum_is_infeasible(worker: RequestPlanner,
+def test_search_from_more_than_the_maximum_finds_nothing(worker: RequestPlanner,
                                                          settings: PlannerSettings) -> None:
-    outcome = search(worker, settings, payload_mass=7.0)
-    check_failure(outcome, PlanReport.INFEASIBLE,
-                  'the arm carries at most 5.855 kg from start to goal in 1 s, and 7 kg were ask')
+    outcome = search(worker, replace(settings, search='fast'), payload_mass=7.0)
+    check_failure(outcome, PlanReport.NOT_FOUND, 'no motion with 7 kg in 1 s was found')
 
 
 @pytest.mark.parametrize(('fields', 'code', 'text'), [
