@@ -360,7 +360,7 @@ def test_tip_of_the_bent_arm_rests_at_its_points_with_the_largest_payload(
     limit, joint = holding_limit(crane_model, angles, task_parameters(angles))
     if method is PayloadMethod.DIRECT:
         assert (found.held, found.limiting_joint) == (True, joint)
-        assert found.upper == pytest.approx(limit, rel=1e-7)
+        assert found.local_upper == pytest.approx(limit, rel=1e-7)
 
 
 def test_goal_that_the_motor_cannot_hold_with_the_first_payload_is_proved_impossible() -> None:

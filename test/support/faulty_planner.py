@@ -9,15 +9,15 @@ from flex_planner.planning.plan import Plan
 from flex_planner.planning.sampling import SampledPlan
 from flex_planner.ros.planner import node, request_planner
 
-plan_path, motion_markers = request_planner.plan_path, node.motion_markers
+plan_kind, motion_markers = request_planner.plan_kind, node.motion_markers
 
 
-def faulty_plan(task: Task, **options: Any) -> Plan:
+def faulty_plan(task: Task, number: int, **options: Any) -> Plan:
     if task.payload_mass == 13:
         raise ZeroDivisionError('while planning')
     if task.payload_mass == 17:
         raise MemoryError
-    return plan_path(task, **options)
+    return plan_kind(task, number, **options)
 
 
 def faulty_markers(arm: Any, reference: SampledPlan, frame: str) -> Any:
@@ -27,6 +27,6 @@ def faulty_markers(arm: Any, reference: SampledPlan, frame: str) -> Any:
 
 
 if __name__ == '__main__':
-    request_planner.plan_path = faulty_plan
+    request_planner.plan_kind = faulty_plan
     node.motion_markers = faulty_markers
     node.main()

@@ -48,8 +48,10 @@ def explore_kinds(problem: MotionProblem, solver: Solver) -> Attempt | None:
     again = replace(again, kinds=(*kinds, *again.kinds), starts=2 * starts)
     if again.decides:
         return again
+    if again.kinds:  # motions of the rigid arm do the task: limits found beside them mean nothing
+        return replace(again, result=replace(again.result, message=_not_reached(again, attempt)))
     return replace(again, result=replace(again.result, message=limits.sentence),
-                   not_found=not kinds and not enough, hopeless=limits.hopeless)
+                   not_found=True, hopeless=limits.hopeless)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -93,6 +95,13 @@ class _Limits:
         found = f'{", ".join(parts)}{rigid}' if parts else 'nor near it'
         return (f'no motion with {task.payload_mass:g} kg in {task.duration:g} s was found from '
                 f'{self.starts} starts; {found}. This does not show that there is none')
+
+
+def _not_reached(again: Attempt, first: Attempt) -> str:
+    """Say that motions were found, and why none of them leads to one that is exact."""
+    last = first if len(first.kinds) == len(again.kinds) else again
+    return (f'{len(again.kinds)} kinds of motion were found from {again.starts} starts on the arm '
+            f'made rigid, but none leads to a solution: {last.result.message}')
 
 
 def _solve_first(problem: MotionProblem, bare: MotionProblem, kinds: list[KindOfMotion],

@@ -85,6 +85,18 @@ def test_kinds_that_lead_to_no_solution_do_not_speak_against_it(
     assert not (attempt.not_found or attempt.hopeless or attempt.decides)
 
 
+def test_limits_found_beside_motions_of_the_task_do_not_speak_against_it(
+        fake: Fake, rigid_model: ArmModel, paper_task: TaskFactory) -> None:
+    # the exploration of a limit may end on a worse kind than the motions that were found
+    fake(motion=(0.65, 0.7), payload=(0.5,), duration=(2.194,))
+    attempt = explored(rigid_model, paper_task, iterations=1)
+    assert attempt.result.message.startswith(
+        '2 kinds of motion were found from 32 starts on the arm made rigid, but none leads to a '
+        'solution: ')
+    assert 'no kind of motion was found' not in attempt.result.message
+    assert not (attempt.not_found or attempt.hopeless or attempt.decides)
+
+
 def test_heavier_motions_alone_are_motions_that_were_found(
         fake: Fake, rigid_model: ArmModel, paper_task: TaskFactory) -> None:
     fake(payload=(5.8,), duration=(0.64,))
