@@ -2,7 +2,7 @@
 Published torques do what reports certify, by a simulator that shares no code with the planner.
 
 Its equations of motion, mode shapes, static bending and controller are those of
-``bench/independent``; `python -m bench.independent` prints more of the same.
+``bench/independent``; `python -m bench.independent` compares forty plans.
 
 """
 
@@ -24,8 +24,8 @@ import pytest
 # clamped with gravity and the largest payload; motors on their limits and efforts not shifted, so
 # that torques alone miss by a centimetre; pinned, between points
 QUICK = (2, 3, 19)
-# 20 of each have a plan that is published, as long as the planner finds what it found
-HALVES, ENOUGH = (range(22), range(22, 44)), 18
+# 12 have a plan that is published, as long as the planner finds what it found
+MORE, ENOUGH = range(14), 10
 
 
 def check(case: Published) -> None:
@@ -51,9 +51,8 @@ def test_another_payload_is_noticed() -> None:
     assert after.open_tip_error > 1.5 * before.open_tip_error + FLOOR
 
 
-@pytest.mark.parametrize('seeds', HALVES)
-def test_forty_random_plans_do_what_is_certified(seeds: range) -> None:
-    found = [case for seed in seeds if (case := published(seed)) is not None]
+def test_random_plans_do_what_is_certified() -> None:
+    found = [case for seed in MORE if (case := published(seed)) is not None]
     for case in found:
         check(case)
     assert len(found) >= ENOUGH

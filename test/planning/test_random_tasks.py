@@ -101,9 +101,10 @@ def planned(arms: dict[str, Arm]) -> Callable[[Task], Plan | None]:
 
 def check_solved(plan: Plan) -> None:
     """Check a motion by means that did not find it."""
-    choice = f'; the cheapest of {len(plan.kinds)} kinds of motion found from {plan.starts} starts '
-    chosen = re.escape(choice) + r'\(J = .*\)' if len(plan.kinds) > 1 else ''
-    assert re.fullmatch(PlanStatus.SOLVED.value + chosen, plan.message)
+    choice = (f'; the cheapest of {len(plan.kinds)} kinds of motion found from {plan.starts} '
+              r'starts \(J = .*\)')
+    assert re.fullmatch(PlanStatus.SOLVED.value + (choice if len(plan.kinds) > 1 else ''),
+                        plan.message)
     assert plan.mesh_intervals > 0
     limits = CertificateLimits(boundary_error=plan.task.tolerance)
     assert limits.violations(plan.certificate) == []

@@ -34,8 +34,8 @@ NOT_FOUND = [
      'payload found in 1 s is 5.849 kg, the shortest duration found with 20 kg is 1.648 s (of the '
      'arm made rigid)'),
     # 0.3 s are proved impossible for the rigid arm
-    ('rigid', {'duration': 0.5}, 'no motion with 1 kg in 0.5 s was found from 16 starts; the shortest '
-     'duration found with 1 kg is 0.6434 s'),
+    ('rigid', {'duration': 0.5}, 'no motion with 1 kg in 0.5 s was found from 16 starts; the '
+     'shortest duration found with 1 kg is 0.6434 s'),
     ('ei5', TOO_SHORT, 'no motion with 1 kg in 0.3 s was found from 16 starts; the shortest '
      'duration found with 1 kg is 0.6434 s (of the arm made rigid)')]
 
