@@ -42,14 +42,16 @@ def explore_kinds(problem: MotionProblem, solver: Solver) -> Attempt | None:
     attempt = _solve_first(problem, bare, kinds, solver)
     if attempt.decides:
         return attempt
-    limits = _Limits.find(bare, starts, solver)
-    enough = [kind for kind in limits.heaviest if kind.value >= problem.task.payload_mass]
+    heaviest = find_kinds(bare, Free.PAYLOAD, starts, solver)
+    enough = [kind for kind in heaviest if kind.value >= problem.task.payload_mass]
     again = _solve_first(problem, bare, enough, solver)
     again = replace(again, kinds=(*kinds, *again.kinds), starts=2 * starts)
     if again.decides:
         return again
-    if again.kinds:  # motions of the rigid arm do the task: limits found beside them mean nothing
+    if again.kinds:  # motions of the rigid arm do the task: no limit speaks against it
         return replace(again, result=replace(again.result, message=_not_reached(again, attempt)))
+    limits = _Limits(bare=bare, starts=starts, heaviest=heaviest,
+                     shortest=find_kinds(bare, Free.DURATION, starts, solver))
     return replace(again, result=replace(again.result, message=limits.sentence),
                    not_found=True, hopeless=limits.hopeless)
 
@@ -62,13 +64,6 @@ class _Limits:
     starts: int
     heaviest: list[KindOfMotion]
     shortest: list[KindOfMotion]
-
-    @classmethod
-    def find(cls, bare: MotionProblem, starts: int, solver: Solver) -> _Limits:
-        """Explore both."""
-        heaviest, shortest = (find_kinds(bare, free, starts, solver)
-                              for free in (Free.PAYLOAD, Free.DURATION))
-        return cls(bare=bare, starts=starts, heaviest=heaviest, shortest=shortest)
 
     @property
     def hopeless(self) -> bool:
@@ -99,7 +94,7 @@ class _Limits:
 
 def _not_reached(again: Attempt, first: Attempt) -> str:
     """Say that motions were found, and why none of them leads to one that is exact."""
-    last = first if len(first.kinds) == len(again.kinds) else again
+    last = first if again.kinds == first.kinds else again
     return (f'{len(again.kinds)} kinds of motion were found from {again.starts} starts on the arm '
             f'made rigid, but none leads to a solution: {last.result.message}')
 
