@@ -11,6 +11,7 @@ from flex_planner.arms.arm import Arm, FAMILIES, Joint, Link, Motor, Node
 from flex_planner.base.errors import HoldingError
 from flex_planner.base.validation import Array
 from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectSettings
+from flex_planner.optimal_control.direct.unknowns import Free
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.proofs import (
@@ -208,10 +209,10 @@ def test_limits_of_the_paper_are_not_excluded(request: pytest.FixtureRequest, na
     (two_links(payload_inertia=0.05, duration=0.7), 28.0)], ids=['one', 'two', 'inertia'])
 def test_payloads_that_ipopt_finds_are_not_excluded(task: Task, close: float) -> None:
     problem = problem_of(task)
-    direct = DirectProblem(problem.model, DirectSettings(intervals=24, degree=4, tolerance=1e-7,
-                                                         free_payload=True))
+    direct = DirectProblem(problem.model, DirectSettings(intervals=24, degree=4, tolerance=1e-7))
     # a high price: nearly the largest payload, near the straight line that it starts from
-    found = direct.solve(problem.parameters, problem.start, problem.goal, task.duration, price=1e5)
+    found = direct.solve(problem.parameters, problem.start, problem.goal, task.duration,
+                         free=Free.PAYLOAD, price=1e5)
     assert found.converged
     # the factors are those that were found: bounds of two links are far
     assert found.payload < bound_payload(problem).payload < close * found.payload
