@@ -18,7 +18,7 @@ from flex_planner.collocation import CollocationSolution, Solver
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.planning.kinds.clusters import KindOfMotion
 from flex_planner.planning.kinds.effort import SearchEffort
-from flex_planner.planning.kinds.lift import solve_best_kind, walk_back
+from flex_planner.planning.kinds.lift import KEPT, solve_best_kind, walk_back
 from flex_planner.planning.kinds.search import find_kinds
 from flex_planner.planning.kinds.windings import other_windings, say_turns, turn_goal
 from flex_planner.planning.plan import Plan, PlanStatus
@@ -26,7 +26,7 @@ from flex_planner.planning.plan_problem import INTERRUPTED_STATUS, plan_problem
 from flex_planner.planning.strategies.catalogue import CATALOGUE, QUICK
 from flex_planner.planning.strategies.extremals import Extremal, SearchStart
 from flex_planner.planning.strategies.first_extremals import approach_limit, transfer_extremal
-from flex_planner.planning.strategies.free_parameters import FreeParameter, PAYLOAD
+from flex_planner.planning.strategies.free_parameters import FreeParameter
 from flex_planner.planning.strategies.homotopies import (
     drop_weights,
     has_weights,
@@ -36,8 +36,6 @@ from flex_planner.planning.strategies.homotopies import (
 from flex_planner.planning.strategies.price_continuation import continue_in_price
 from flex_planner.planning.strategies.strategy import Attempt, Strategy
 
-# a search has finished a kind of motion if it comes to this share of its value
-_KEPT = 0.01
 _CONTINUED = 'continuation to the limit'
 # starts for each other way round to a point
 _OTHER_WAY = 3
@@ -189,8 +187,8 @@ class LimitSearch:
         """Return the best kind if the search ended worse than it: it was not finished."""
         if not self.kinds or not self.extremals or self._problem.model.arm.n_modes:
             return None
-        best, worse = self.kinds[0], (1 - _KEPT) if self._parameter is PAYLOAD else (1 + _KEPT)
-        return best if self._parameter.improves(worse * best.value, self.last.value) else None
+        best = self.kinds[0]
+        return best if self._parameter.falls_short(self.last.value, best.value, KEPT) else None
 
     def _approach(self, start: SearchStart | None) -> None:
         """Collect extremals from the first start that leads to a motion."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from flex_planner.collocation import CollocationResult, CollocationSolution, INTERRUPTED, Solver
+from flex_planner.optimal_control.direct.unknowns import Free
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.planning.kinds.clusters import are_alike, cluster, KindOfMotion, MOST_KINDS
 from flex_planner.planning.kinds.effort import SearchEffort
@@ -21,7 +22,7 @@ from flex_planner.planning.kinds.newton_explorer import (
     newton_budget,
     OtherWay,
 )
-from flex_planner.planning.kinds.search import rigid_twin
+from flex_planner.planning.kinds.search import is_better, rigid_twin
 from flex_planner.planning.kinds.windings import say_turns
 from flex_planner.planning.strategies.initial_guesses import lift
 from flex_planner.planning.verdict import find_refusal
@@ -84,15 +85,16 @@ def find_cheaper(problem: MotionProblem, found: CollocationResult, solver: Solve
         hard=best.refused)
     ways = explore_other_ways(problem, solver)
     kinds = [_with_turns(kind, problem, ways) for kind in cluster(
-        [*motions, *(way.motion for way in ways)], lambda value, other: value < other)]
+        [*motions, *(way.motion for way in ways)], is_better(Free.NOTHING))]
     for kind in _worth_solving(kinds, own, best.refused):
         home = next((way.problem for way in ways if way.motion is kind.motion), problem)
         result = solver.solve(home, _guess(home, kind.motion.solution, solver))
         if result.status in INTERRUPTED:
             break
         if result.converged:
-            best = best.or_better(home, result, say_turns(problem, home))
-            kinds[kinds.index(kind)] = _with_exact_value(kind, as_kind(home, result.solution))
+            solved = as_kind(home, result.solution)
+            best = best.or_better(home, result, solved, say_turns(problem, home))
+            kinds[kinds.index(kind)] = _with_exact_value(kind, solved)
     return CheapestMotion(problem=best.problem, result=best.result, starts=starts + len(ways),
                           kinds=_list_kinds(best.kind, own, kinds))
 
@@ -116,14 +118,14 @@ class _Best:
     kind: KindOfMotion
     refused: bool
 
-    def or_better(self, home: MotionProblem, result: CollocationResult, turns: str) -> _Best:
+    def or_better(self, home: MotionProblem, result: CollocationResult, solved: KindOfMotion,
+                  turns: str) -> _Best:
         """Return another solution if the arm may do it and it is cheaper, or the only such."""
-        other = as_kind(home, result.solution)
-        other = replace(other, sentence=turns or other.sentence)
-        kept = find_refusal(home, result.solution) is None
-        if kept and (self.refused or other.value < self.kind.value):
-            return _Best(problem=home, result=result, kind=other, refused=False)
-        return self
+        better = self.refused or solved.value < self.kind.value
+        if not better or find_refusal(home, result.solution) is not None:
+            return self
+        kind = replace(solved, sentence=turns or solved.sentence)
+        return _Best(problem=home, result=result, kind=kind, refused=False)
 
 
 def _with_exact_value(kind: KindOfMotion, solved: KindOfMotion) -> KindOfMotion:

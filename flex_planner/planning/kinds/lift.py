@@ -14,12 +14,11 @@ from flex_planner.planning.strategies.first_extremals import lift_extremal, tran
 from flex_planner.planning.strategies.free_parameters import FreeParameter
 from flex_planner.planning.strategies.initial_guesses import lift
 from flex_planner.planning.strategies.ipopt_continuation import transcribe_at_price
-import numpy as np
 
 # kinds that are lifted to a flexible arm
 _LIFTED = 2
 # a motion is of its kind if its value is no worse than this share
-_KEPT = 0.01
+KEPT = 0.01
 # rigid motions that are lifted in turn: at these shares of the price
 _CHEAPER = (1 / 2, 1 / 8, 1 / 64)
 # by so much the price falls from one motion of a front to the one before; so many are enough
@@ -64,9 +63,7 @@ def _solve_rigid(parameter: FreeParameter, problem: MotionProblem, motion: Explo
     found = transfer_extremal(parameter, problem, start, solver)
     if found is None or found.interrupted:
         return found
-    worst = motion.value - _KEPT * motion.value * np.sign(
-        1 if parameter.improves(1.0, 0.0) else -1)
-    return None if parameter.improves(worst, found.value) else found
+    return None if parameter.falls_short(found.value, motion.value, KEPT) else found
 
 
 def _lift(parameter: FreeParameter, problem: MotionProblem, motion: ExploredMotion,

@@ -17,7 +17,12 @@ from flex_planner.planning.kinds.clusters import kind_of, KindOfMotion
 from flex_planner.planning.kinds.effort import SearchEffort
 from flex_planner.planning.kinds.explorer import ExploredMotion, Explorer, sample_angles
 from flex_planner.planning.kinds.paths import JointPath
-from flex_planner.planning.kinds.search import has_settled, rigid_twin, starting_paths
+from flex_planner.planning.kinds.search import (
+    has_settled,
+    is_better,
+    rigid_twin,
+    starting_paths,
+)
 from flex_planner.planning.kinds.windings import other_windings
 import numpy as np
 
@@ -122,7 +127,7 @@ def _explore(rigid: MotionProblem, paths: list[JointPath], motions: list[Explore
     began = monitor.iteration
     for path in paths:
         enough = budget is not None and (monitor.iteration - began >= budget or has_settled(
-            motions, starts, lambda value, other: value < other))
+            motions, starts, is_better(Free.NOTHING)))
         if enough or monitor.stop_reason():
             break
         starts += 1

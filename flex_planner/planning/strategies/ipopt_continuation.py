@@ -67,9 +67,9 @@ def continue_by_ipopt(problem: MotionProblem, price: float, solver: Solver,
     says so if the monitor interrupted the search.
 
     """
-    fewest = problem.fewest_intervals(_STAGES)
-    if np.isfinite(problem.goal_weights).any() or fewest > _MOST_FIRST:
-        return  # the transcription knows hard goals only, and takes minutes on fine meshes
+    fewest = _fewest_intervals(problem)
+    if fewest is None:
+        return
     duration, guess, value = problem.task.duration, None, problem.task.payload_mass
     intervals = max(_INTERVALS, fewest)
     mesh = np.linspace(0, duration, intervals + 1, dtype=np.float64)
@@ -111,8 +111,8 @@ def transcribe_at_price(parameter: FreeParameter, problem: MotionProblem, price:
         If its monitor interrupts it, the extremal says so.
 
     """
-    fewest = problem.fewest_intervals(_STAGES)
-    if np.isfinite(problem.goal_weights).any() or fewest > _MOST_FIRST:
+    fewest = _fewest_intervals(problem)
+    if fewest is None:
         return None
     try:
         near = parameter.with_value(problem, value)
@@ -140,8 +140,8 @@ def jump_in_price(parameter: FreeParameter, here: Extremal, target_gap: TargetGa
 
     """
     problem, guess = here.problem, here.result.solution
-    fewest = problem.fewest_intervals(_STAGES)
-    if np.isfinite(problem.goal_weights).any() or fewest > _MOST_FIRST:
+    fewest = _fewest_intervals(problem)
+    if fewest is None:
         return None
     wanted = target_gap(here.value)
     factor = _JUMP if not wanted else float(
@@ -151,6 +151,14 @@ def jump_in_price(parameter: FreeParameter, here: Extremal, target_gap: TargetGa
     if found is None or found.interrupted:
         return found
     return found if parameter.improves(found.value, here.value) else None
+
+
+def _fewest_intervals(problem: MotionProblem) -> int | None:
+    """Return the intervals of the coarsest mesh; None where IPOPT is no way to the motion."""
+    if np.isfinite(problem.goal_weights).any():
+        return None  # the transcription knows hard goals only
+    fewest = problem.fewest_intervals(_STAGES)
+    return fewest if fewest <= _MOST_FIRST else None  # and takes minutes on fine meshes
 
 
 def _factor(extremal: Extremal, largest: float, target_gap: TargetGap) -> float:
