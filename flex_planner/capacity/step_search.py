@@ -57,7 +57,7 @@ def search_in_steps(problem: MotionProblem, solver: Solver, step: float,
     found = MaxPayload(task=problem.task, method=PayloadMethod.INCREMENTAL, status=first.status,
                        message=first.message)
     if first.solution is None or not first.solved:
-        return found
+        return with_bound(found, problem)
     solver.monitor.phase = 'payload raised'
     climb = _Climb(payload=problem.task.payload_mass, motion=first.solution)
     try:
