@@ -83,8 +83,8 @@ def explore_from_plan(rigid: MotionProblem, own: KindOfMotion | None, budget: in
             not solver.monitor.stop_reason()):
         explorer = Explorer(rigid, Free.NOTHING, solver.monitor,
                             most_intervals=solver.settings.max_intervals)
-        met = [explorer.explore(path) for path in paths[:_BY_IPOPT]]
-        motions += [motion for motion in met if motion is not None]
+        motions += [motion for motion in explorer.explore(paths[:_BY_IPOPT])
+                    if motion is not None]
         starts += _BY_IPOPT
     return motions, starts
 

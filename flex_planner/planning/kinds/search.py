@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from dataclasses import replace
 from itertools import chain, islice
 
@@ -110,14 +111,15 @@ def _explore(explorer: Explorer, rigid: MotionProblem, free: Free, starts: int,
              monitor: Monitor) -> Iterator[ExploredMotion]:
     """Yield the motions met; for a limit from all starts, for a plan until it has settled."""
     met: list[ExploredMotion] = []
-    for i, path in enumerate(starting_paths(rigid, starts), 1):
-        monitor.phase = f'kinds of motion, start {i} of {starts}'
-        motion = explorer.explore(path)
-        if motion is not None:
-            met.append(motion)
-            yield motion
-        if free is Free.NOTHING and has_settled(met, i, is_better(free)):
-            return
+    monitor.phase = f'kinds of motion, start 1 of {starts}'
+    with closing(explorer.explore(list(starting_paths(rigid, starts)))) as motions:
+        for i, motion in enumerate(motions, 1):
+            if motion is not None:
+                met.append(motion)
+                yield motion
+            if free is Free.NOTHING and has_settled(met, i, is_better(free)):
+                return
+            monitor.phase = f'kinds of motion, start {min(i + 1, starts)} of {starts}'
 
 
 def _confirm(explorer: Explorer, kinds: list[KindOfMotion],
