@@ -80,6 +80,11 @@ class HelperProcess:
         self.ready = False
         _ALL.add(self)
 
+    @property
+    def process_id(self) -> int:
+        """Return its number."""
+        return self._process.pid
+
     def send(self, request: object) -> None:
         """Send a request; HelperLostError if it has ended."""
         try:

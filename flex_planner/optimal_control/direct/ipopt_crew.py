@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections import Counter, deque
 from collections.abc import Generator, Sequence
+from functools import cache
 import logging
 import time
 
@@ -73,8 +74,13 @@ def _borrow(count: int) -> list[HelperProcess]:
 
 
 def _warn(error: Exception) -> None:
+    _warn_once(str(error))
+
+
+@cache
+def _warn_once(reason: str) -> None:
     _LOG.warning('IPOPT runs in this process, where it cannot be stopped at once: no other one '
-                 'can do it (%s)', error)
+                 'can do it (%s)', reason)
 
 
 class _Crew:

@@ -7,7 +7,6 @@ import signal
 import time
 from types import FrameType
 
-import casadi  # noqa: F401
 from flex_planner.base.helper_process import ending_with_caller
 from flex_planner.base.progress import Monitor, Progress, StoppedError
 from flex_planner.optimal_control.direct.ipopt_start import Answer, solve_here, Start

@@ -7,8 +7,10 @@ It begins on paths with zero costates and takes some ten milliseconds a start.
 
 from __future__ import annotations
 
+from contextlib import closing, suppress
 from dataclasses import dataclass
 
+from flex_planner.base.progress import StoppedError
 from flex_planner.collocation import CollocationResult, CollocationSolution, Solver
 from flex_planner.optimal_control.direct.unknowns import Free
 from flex_planner.optimal_control.motion_problem import MotionProblem
@@ -79,13 +81,8 @@ def explore_from_plan(rigid: MotionProblem, own: KindOfMotion | None, budget: in
     motions, starts = _explore(rigid, paths[len(motions):], motions,
                                None if thorough else budget, solver)
     # of an arm that bends this would take longer than its plan
-    if own is not None and (hard or len(motions) < _FEW * starts) and (
-            not solver.monitor.stop_reason()):
-        explorer = Explorer(rigid, Free.NOTHING, solver.monitor,
-                            most_intervals=solver.settings.max_intervals)
-        motions += [motion for motion in explorer.explore(paths[:_BY_IPOPT])
-                    if motion is not None]
-        starts += _BY_IPOPT
+    if own is not None and (hard or len(motions) < _FEW * starts):
+        motions, starts = _explore_by_ipopt(rigid, paths[:_BY_IPOPT], motions, starts, solver)
     return motions, starts
 
 
@@ -136,6 +133,21 @@ def _explore(rigid: MotionProblem, paths: list[JointPath], motions: list[Explore
         if motion is not None:
             motions.append(motion)
     return motions, starts
+
+
+def _explore_by_ipopt(rigid: MotionProblem, paths: list[JointPath], motions: list[ExploredMotion],
+                      starts: int, solver: Solver) -> tuple[list[ExploredMotion], int]:
+    """Return motions known and met, as far as it comes in time."""
+    monitor, every = solver.monitor, list(motions)
+    explorer = Explorer(rigid, Free.NOTHING, monitor,
+                        most_intervals=solver.settings.max_intervals)
+    with closing(explorer.explore(paths)) as found, suppress(StoppedError):
+        for _ in paths:
+            starts += 1
+            monitor.phase = f'kinds of motion, start {starts}'
+            motion = next(found)
+            every += [] if motion is None else [motion]
+    return every, starts
 
 
 def _coarse(solver: Solver) -> Solver:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator, Sequence
 from typing import Any
 
 from counter_examples import level_task
@@ -100,10 +100,12 @@ class FakeExplorer:
     def __init__(self, problem: MotionProblem, *others: Any) -> None:
         self.problem, self.turn = problem, iter(self.values)
 
-    def explore(self, path: JointPath) -> ExploredMotion | None:
-        value = next(self.turn)
-        if value is None:
-            return None
+    def explore(self, paths: Sequence[JointPath],
+                ) -> Generator[ExploredMotion | None, None, None]:
+        for value, _ in zip(self.turn, paths, strict=False):
+            yield None if value is None else self.made_up(value)
+
+    def made_up(self, value: float) -> ExploredMotion:
         # motions of a value are alike
         straight = made_up(self.problem, value)
         bow = np.outer(np.sin(np.pi * np.linspace(0, 1, 17)), [0.0, value])
