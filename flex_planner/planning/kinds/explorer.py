@@ -22,7 +22,7 @@ from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectSetti
 from flex_planner.optimal_control.direct.result import DirectResult
 from flex_planner.optimal_control.direct.unknowns import Free
 from flex_planner.optimal_control.motion_problem import MotionProblem
-from flex_planner.planning.kinds.paths import JointPath
+from flex_planner.planning.kinds.paths import AnyPath
 import numpy as np
 
 # points of an interval; intervals of the first mesh, where torques are on their limits and where
@@ -97,7 +97,7 @@ class Explorer:
         self._price = _price(problem, free)
         self._directs: dict[int, DirectProblem] = {}
 
-    def explore(self, paths: Sequence[JointPath],
+    def explore(self, paths: Sequence[AnyPath],
                 ) -> Generator[ExploredMotion | None, None, None]:
         """
         Yield the motion that each path leads to, None if IPOPT does not converge, in their order.
@@ -180,7 +180,7 @@ class Explorer:
                                   found.times, found.states, problem.model.arm.n_joints))
 
 
-def _in_time(path: JointPath, duration: float, times: Array) -> tuple[Array, Array, Array]:
+def _in_time(path: AnyPath, duration: float, times: Array) -> tuple[Array, Array, Array]:
     """Return angles, speeds and accelerations on a path, (k, n) each, at times (k,)."""
     return path(times / duration, duration)
 
