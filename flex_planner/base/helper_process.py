@@ -204,7 +204,8 @@ def _flags() -> list[str]:
 def _program(module: str) -> str:
     """Return what the interpreter runs; it imports from where this one does."""
     here = str(Path(__file__).resolve().parents[2])
-    return _PROGRAM.format(path=[here, *filter(None, sys.path)], module=module)
+    path = [here, *(entry for entry in sys.path if entry and isinstance(entry, str))]
+    return _PROGRAM.format(path=path, module=module)
 
 
 # In the helper process

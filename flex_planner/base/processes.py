@@ -16,7 +16,7 @@ _LIBC = ctypes.CDLL(None)
 ONE_THREAD = dict.fromkeys(('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS'), '1')
 # tells how many other processes may compute for this one
 PROCESSES = 'FLEX_PLANNER_PROCESSES'
-# more are not started unasked: each takes 100 MB
+# more are not started unasked: each takes 60 MB
 _MOST = 4
 
 

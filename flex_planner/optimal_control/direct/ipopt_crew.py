@@ -134,10 +134,12 @@ class _Crew:
         """Give every helper that is ready a start."""
         for helper in list(self._helpers):
             if self._waiting and helper.ready and helper not in self._work:
-                self._work[helper] = self._waiting.popleft()
+                turn = self._waiting.popleft()
                 try:
-                    helper.send(self._starts[self._work[helper]])
-                except HelperLostError as error:
+                    helper.send(self._starts[turn])
+                    self._work[helper] = turn
+                except HelperLostError as error:  # it has ended while it had nothing to do
+                    self._waiting.appendleft(turn)
                     self._lose(helper, error)
 
     def _tell(self, turn: int) -> None:
@@ -165,16 +167,16 @@ class _Crew:
         self._helpers.remove(helper)
         helper.end()
         turn = self._work.pop(helper, None)
-        if turn is None:
-            if not self._helpers:
-                _warn(error)
-            return
-        self._lost[turn] += 1
-        if self._lost[turn] < _LOST:
-            self._waiting.appendleft(turn)
-            self._helpers += [] if self._helpers else _borrow(1)
-        else:
-            self._outcomes[turn] = Answer.failed(self._starts[turn], f'its process {error}')
+        if turn is not None:
+            self._lost[turn] += 1
+            if self._lost[turn] < _LOST:
+                self._waiting.appendleft(turn)
+            else:
+                self._outcomes[turn] = Answer.failed(self._starts[turn], f'its process {error}')
+        if not self._helpers and helper.ready:
+            self._helpers += _borrow(1)
+        elif not self._helpers:  # it has not even begun: others would not, either
+            _warn(error)
 
     def _solve_here(self, turn: int) -> Answer:
         """Solve a start in this process, unless it has ended another one."""

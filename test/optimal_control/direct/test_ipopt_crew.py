@@ -199,6 +199,18 @@ def test_start_that_ends_two_helpers_fails_with_the_reason(
     assert solved.converged
 
 
+def test_helpers_that_died_at_rest_are_replaced(problem: MotionProblem,
+                                                helpers: Callable[[int], None]) -> None:
+    helpers(2)
+    solve_from(problem, 9)
+    kept = module._POOL.borrow(9, 0)
+    assert len(kept) >= 2
+    for helper in kept:
+        os.kill(helper.process_id, signal.SIGKILL)
+        module._POOL.give_back(helper)
+    assert [result.converged for result in solve_from(problem, 2)] == [True, True]
+
+
 def kill_at_work(monkeypatch: pytest.MonkeyPatch, times: int) -> None:
     """End helpers as soon as they have been given a start."""
     left, original = [True] * times, HelperProcess.send
@@ -220,6 +232,7 @@ def test_where_no_other_process_can_be_had_this_one_does_it(
     monkeypatch.setattr('flex_planner.base.helper_process.get_executable',
                         lambda: str(tmp_path / executable))
     monkeypatch.setattr(module, '_POOL', HelperPool('nothing', kept=1))
+    module._warn_once.cache_clear()
     assert [result.converged for result in solve_from(problem, 2)] == [True, True]
     assert {record.levelno for record in caplog.records} == {logging.WARNING}
     assert len(caplog.records) == 1
