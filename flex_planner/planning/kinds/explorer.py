@@ -119,6 +119,30 @@ class Explorer:
             self._monitor.check()
             yield self._motion(one)
 
+    def adapt(self, motion: ExploredMotion) -> Generator[ExploredMotion, None, None]:
+        """
+        Yield the motions that one of the same arm with another payload leads to, confirmed.
+
+        Meshes differ in where IPOPT ends from so far.
+
+        Raises
+        ------
+        StoppedError
+            If the monitor stopped it.
+
+        """
+        problem = self._first()
+        for intervals in (_INTERVALS, _LIMIT_INTERVALS):
+            found = self._direct(min(self._finest, intervals)).solve(
+                problem.parameters, problem.start, problem.goal, problem.task.duration,
+                free=self._free, guess=motion.solution, price=self._price,
+                most_payload=self._most, monitor=self._monitor)
+            self._monitor.check()
+            coarse = self._motion(found)
+            confirmed = None if coarse is None else self.confirm(coarse)
+            if confirmed is not None:
+                yield confirmed
+
     def confirm(self, motion: ExploredMotion) -> ExploredMotion | None:
         """
         Return a motion on a mesh so fine that its value stands; None if there is none.

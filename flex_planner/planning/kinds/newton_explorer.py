@@ -20,6 +20,7 @@ from flex_planner.planning.kinds.effort import SearchEffort
 from flex_planner.planning.kinds.explorer import ExploredMotion, Explorer, sample_angles
 from flex_planner.planning.kinds.paths import JointPath
 from flex_planner.planning.kinds.search import (
+    explore_near_limit,
     has_settled,
     is_better,
     rigid_twin,
@@ -147,6 +148,10 @@ def _explore_by_ipopt(rigid: MotionProblem, paths: list[JointPath], motions: lis
             monitor.phase = f'kinds of motion, start {starts}'
             motion = next(found)
             every += [] if motion is None else [motion]
+        if len(every) == len(motions):
+            for motion in explore_near_limit(rigid, solver):
+                starts += 1
+                every.append(motion)
     return every, starts
 
 

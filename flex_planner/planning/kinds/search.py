@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import closing
 from dataclasses import replace
 from itertools import chain, islice
@@ -30,6 +30,8 @@ import numpy as np
 _CONFIRMED, _TRIED = 3, 8
 # an exploration for a plan ends once the best value came so often, after some starts
 _FEWEST, _OFTEN, _SAME = 8, 3, 0.01
+# starts of motions with a free payload, for one of least effort near the largest payload
+_NEAR_STARTS = 16
 # starts between which the best motion is looked up
 _ROUND = 4
 
@@ -77,6 +79,37 @@ def find_kinds(problem: MotionProblem, free: Free, starts: int,
         search.explore_from_the_best(rigid)
     return sorted(search.best_kinds(), key=lambda kind: bool(find_limit_violations(
         kind.motion.problem, kind.motion.solution)))
+
+
+def explore_near_limit(rigid: MotionProblem,
+                       solver: Solver) -> Generator[ExploredMotion, None, None]:
+    """
+    Yield motions of least effort that others of the same arm with more or less payload lead to.
+
+    Near the largest payload hardly a path leads to a motion of least effort, while motions with a
+    free payload are easy to find.
+
+    Parameters
+    ----------
+    rigid : MotionProblem
+        Of the rigid arm.
+    solver : Solver
+        Its monitor may stop it.
+
+    Raises
+    ------
+    StoppedError
+        If the monitor stopped it.
+
+    """
+    most, finest = holding_limit(rigid.model, rigid.task, rigid.parameters)[0], (
+        solver.settings.max_intervals)
+    heavy = Explorer(rigid, Free.PAYLOAD, solver.monitor, most, finest)
+    with closing(heavy.explore(list(starting_paths(rigid, _NEAR_STARTS)))) as motions:
+        met = [motion for motion in motions if motion is not None]
+    asked = Explorer(rigid, Free.NOTHING, solver.monitor, most_intervals=finest)
+    for kind in cluster(met, is_better(Free.PAYLOAD)):
+        yield from asked.adapt(kind.motion)
 
 
 def is_better(free: Free) -> Callable[[float, float], bool]:
