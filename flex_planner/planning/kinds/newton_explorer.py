@@ -32,7 +32,7 @@ import numpy as np
 _STAGES, _INTERVALS, _MOST_INTERVALS, _TOLERANCE, _ITERATIONS, _MESHES = 4, 16, 64, 1e-2, 30, 3
 # starts at most, and Newton iterations of some 0.8 ms each
 _STARTS, _BUDGET, _LEAST_BUDGET = 16, 500, 10
-# where Newton's method converges from less than this share of so many starts, IPOPT tries the first
+# where Newton's method converges from less than this share of so many starts, IPOPT goes on
 _FEW, _JUDGED, _BY_IPOPT = 0.5, 8, 4
 
 

@@ -22,8 +22,9 @@ import numpy as np
 
 # kinds that are confirmed on finer meshes, and how many are tried for that
 _CONFIRMED, _TRIED = 3, 8
-# an exploration for a plan ends once the best value came so often, after some starts
-_FEWEST, _OFTEN, _SAME = 8, 3, 0.01
+# an exploration for a plan ends once the best value came so often, after some starts; IPOPT, which
+# leaves bad paths for good ones, needs fewer of them
+_FEWEST, _FEWEST_BY_IPOPT, _OFTEN, _SAME = 8, 5, 3, 0.01
 
 
 def find_kinds(problem: MotionProblem, free: Free, starts: int,
@@ -97,9 +98,9 @@ def starting_paths(problem: MotionProblem, count: int) -> Iterator[JointPath]:
 
 
 def has_settled(motions: list[ExploredMotion], starts: int,
-                better: Callable[[float, float], bool]) -> bool:
+                better: Callable[[float, float], bool], fewest: int = _FEWEST) -> bool:
     """Return whether the best value came often, after some starts."""
-    if starts < _FEWEST or not motions:
+    if starts < fewest or not motions:
         return False
     best = motions[0].value
     for motion in motions:
@@ -117,7 +118,8 @@ def _explore(explorer: Explorer, rigid: MotionProblem, free: Free, starts: int,
             if motion is not None:
                 met.append(motion)
                 yield motion
-            if free is Free.NOTHING and has_settled(met, i, is_better(free)):
+            if free is Free.NOTHING and has_settled(
+                    met, i, is_better(free), _FEWEST_BY_IPOPT):
                 return
             monitor.phase = f'kinds of motion, start {min(i + 1, starts)} of {starts}'
 
