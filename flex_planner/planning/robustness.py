@@ -146,8 +146,8 @@ def _execution_warnings(certificate: ExecutionCertificate, reach: float) -> list
     return [PlanWarning(kind=WarningKind.ARRIVES_ELSEWHERE, value=worst, sentence=(
         f'torques that are held for {1e3 * certificate.controller.period:.3g} ms leave the tip '
         f'{_millimetres(certificate.tip_error)} from its goal and '
-        f'{_millimetres(certificate.residual_vibration)} of vibration, where the plan leaves none: '
-        'a faster controller or a calmer motion leaves less'))]
+        f'{_millimetres(certificate.residual_vibration)} of vibration, where the plan leaves '
+        'none: a faster controller or a calmer motion leaves less'))]
 
 
 def _millimetres(length: float) -> str:
