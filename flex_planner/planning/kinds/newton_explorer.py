@@ -33,8 +33,8 @@ import numpy as np
 _STAGES, _INTERVALS, _MOST_INTERVALS, _TOLERANCE, _ITERATIONS, _MESHES = 4, 16, 64, 1e-2, 30, 3
 # starts at most, and Newton iterations of some 0.8 ms each
 _STARTS, _BUDGET, _LEAST_BUDGET = 16, 500, 10
-# where Newton's method converges from less than this share of the starts, IPOPT tries the first
-_FEW, _BY_IPOPT = 0.5, 4
+# where Newton's method converges from less than this share of so many starts, IPOPT goes on
+_FEW, _JUDGED, _BY_IPOPT = 0.5, 8, 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -79,10 +79,11 @@ def explore_from_plan(rigid: MotionProblem, own: KindOfMotion | None, budget: in
     thorough = effort is SearchEffort.THOROUGH
     paths = list(starting_paths(rigid, effort.starts if thorough else _STARTS))
     motions = [] if own is None else [own.motion]
-    motions, starts = _explore(rigid, paths[len(motions):], motions,
-                               None if thorough else budget, solver)
     # of an arm that bends this would take longer than its plan
-    if own is not None and (hard or len(motions) < _FEW * starts):
+    by_ipopt = own is not None
+    motions, starts = _explore(rigid, paths[len(motions):], motions,
+                               None if thorough else budget, solver, patient=not by_ipopt)
+    if by_ipopt and (hard or _seldom_converges(motions, starts)):
         motions, starts = _explore_by_ipopt(rigid, paths[:_BY_IPOPT], motions, starts, solver)
     return motions, starts
 
@@ -119,13 +120,21 @@ def as_kind(problem: MotionProblem, solution: CollocationSolution) -> KindOfMoti
 
 
 def _explore(rigid: MotionProblem, paths: list[JointPath], motions: list[ExploredMotion],
-             budget: int | None, solver: Solver) -> tuple[list[ExploredMotion], int]:
-    """Return motions known and met, until they have settled or the budget is used, if any."""
+             budget: int | None, solver: Solver, *, patient: bool,
+             ) -> tuple[list[ExploredMotion], int]:
+    """
+    Return motions known and met, until they have settled or the budget is used, if any.
+
+    Without patience it also ends where Newton's method seldom converges.
+
+    """
     coarse, monitor, starts = _coarse(solver), solver.monitor, len(motions)
     began = monitor.iteration
     for path in paths:
-        enough = budget is not None and (monitor.iteration - began >= budget or has_settled(
-            motions, starts, is_better(Free.NOTHING)))
+        enough = budget is not None and (
+            monitor.iteration - began >= budget
+            or has_settled(motions, starts, is_better(Free.NOTHING))
+            or not patient and starts >= _JUDGED and _seldom_converges(motions, starts))
         if enough or monitor.stop_reason():
             break
         starts += 1
@@ -134,6 +143,11 @@ def _explore(rigid: MotionProblem, paths: list[JointPath], motions: list[Explore
         if motion is not None:
             motions.append(motion)
     return motions, starts
+
+
+def _seldom_converges(motions: list[ExploredMotion], starts: int) -> bool:
+    """Return whether Newton's method finds a motion from few of its starts."""
+    return len(motions) < _FEW * starts
 
 
 def _explore_by_ipopt(rigid: MotionProblem, paths: list[JointPath], motions: list[ExploredMotion],

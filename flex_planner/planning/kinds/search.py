@@ -28,8 +28,9 @@ import numpy as np
 
 # kinds that are confirmed on finer meshes, and how many are tried for that
 _CONFIRMED, _TRIED = 3, 8
-# an exploration for a plan ends once the best value came so often, after some starts
-_FEWEST, _OFTEN, _SAME = 8, 3, 0.01
+# an exploration for a plan ends once the best value came so often, after some starts; IPOPT, which
+# leaves bad paths for good ones, needs fewer of them
+_FEWEST, _FEWEST_BY_IPOPT, _OFTEN, _SAME = 8, 5, 3, 0.01
 # starts of motions with a free payload, for one of least effort near the largest payload
 _NEAR_STARTS = 16
 # starts between which the best motion is looked up
@@ -144,9 +145,9 @@ def _fixed_paths(problem: MotionProblem) -> Iterator[JointPath]:
 
 
 def has_settled(motions: list[ExploredMotion], starts: int,
-                better: Callable[[float, float], bool]) -> bool:
+                better: Callable[[float, float], bool], fewest: int = _FEWEST) -> bool:
     """Return whether the best value came often, after some starts."""
-    if starts < _FEWEST or not motions:
+    if starts < fewest or not motions:
         return False
     best = motions[0].value
     for motion in motions:
@@ -182,7 +183,8 @@ class _Search:
     def explore_until_settled(self, rigid: MotionProblem) -> None:
         """Explore until the best motion came often, or all starts are used."""
         self._explore(starting_paths(rigid, self._most),
-                      lambda: has_settled(self._met, self._starts, self._better))
+                      lambda: has_settled(self._met, self._starts, self._better,
+                                          _FEWEST_BY_IPOPT))
 
     def explore_from_the_best(self, rigid: MotionProblem) -> None:
         """

@@ -134,6 +134,14 @@ def test_what_was_explored_for_the_plan_is_not_explored_again() -> None:
     assert all(phase.endswith(' of 16') for phase in exploring)
 
 
+def test_ipopt_goes_on_where_newtons_method_seldom_converges() -> None:
+    plan, thorough = (plan_path(level_task('S1', 20.0), search=search)
+                      for search in ('normal', 'thorough'))
+    assert plan.solved, plan.message
+    assert plan.starts == 8 + 4
+    assert plan.cost == pytest.approx(thorough.cost, rel=1e-4)
+
+
 # Never dearer
 
 

@@ -55,6 +55,13 @@ def test_search_has_settled_once_the_best_value_came_three_times_in_eight_starts
     assert has_settled(motions, starts, LESS) is settled
 
 
+def test_ipopt_needs_fewer_starts(problem: MotionProblem, fake: Fake) -> None:
+    monitor = Monitor()
+    fake(2.0, 1.0, 1.0, 1.0, 3.0, 0.5)
+    find_kinds(problem, Free.NOTHING, 6, Solver(monitor=monitor))
+    assert starts_of(monitor) == '5 of 6'
+
+
 def test_best_payload_is_the_largest(problem: MotionProblem) -> None:
     motions = [made_up(problem, value) for value in (1.0, 1.0, 1.0, 2.0)]
     assert has_settled(motions, 8, LESS)
