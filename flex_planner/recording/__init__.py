@@ -10,11 +10,16 @@ depends on the clock or the machine.
 
 from __future__ import annotations
 
+from flex_planner.recording.decoding import check_encoding, Decoder
 from flex_planner.recording.definitions import definition_folder, MessageTypes
-from flex_planner.recording.metadata import FileSummary, RecordingMetadata, TopicSummary
+from flex_planner.recording.metadata import (
+    FileSummary,
+    ForeignChannel,
+    RecordingMetadata,
+    TopicSummary,
+)
 from flex_planner.recording.playback import from_time
 from flex_planner.recording.reader import (
-    check_definition,
     read_attachments,
     read_metadata,
     read_recording,
@@ -23,8 +28,10 @@ from flex_planner.recording.reader import (
     SerializedMessage,
 )
 from flex_planner.recording.recovery import recover_recording
+from flex_planner.recording.stand_ins import StandIns
 from flex_planner.recording.topics import (
     DEFAULT,
+    Definition,
     Durability,
     LATCHED,
     QosProfile,
@@ -36,8 +43,11 @@ from flex_planner.recording.writer import Recording
 __all__ = [
     'DEFAULT',
     'LATCHED',
+    'Decoder',
+    'Definition',
     'Durability',
     'FileSummary',
+    'ForeignChannel',
     'MessageTypes',
     'QosProfile',
     'RecordedMessage',
@@ -45,9 +55,10 @@ __all__ = [
     'RecordingMetadata',
     'Reliability',
     'SerializedMessage',
+    'StandIns',
     'Topic',
     'TopicSummary',
-    'check_definition',
+    'check_encoding',
     'definition_folder',
     'from_time',
     'read_attachments',

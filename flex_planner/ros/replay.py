@@ -23,8 +23,9 @@ from flex_planner.recording import (
     Reliability,
     TopicSummary,
 )
-from flex_planner.ros.runtime.parameters import declare, parameter_field
+from flex_planner.ros.runtime.parameters import declare
 from flex_planner.ros.runtime.running import CannotGoOnError, run_node
+from flex_planner.ros.settings.fields import parameter_field
 import rclpy
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 import sys
 
-from flex_planner.base.errors import RecordingError
-from flex_planner.base.progress import Monitor
+from flex_planner.base.errors import FlexPlannerError, RecordingError
+from flex_planner.base.progress import Monitor, StoppedError
 from flex_planner.base.validation import number
 from flex_planner.cli.options import Commands
 from flex_planner.cli.progress_line import run_with_progress
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.recording import (
     definition_folder,
+    ForeignChannel,
     MessageTypes,
     read_metadata,
     recover_recording,
@@ -103,14 +105,27 @@ def _replay(options: argparse.Namespace) -> int:
 def _report(options: argparse.Namespace) -> int:
     """Make a page of a recording; check its plan if that is wanted."""
     request = RecordedRequest.read(options.recording)
-    check = _check(request) if options.check else None
     output = options.output or Path(
         f'{options.recording.resolve().name.removesuffix(".mcap")}.html')
-    write_report(output, request, check)
+    with _contradictions(request):
+        check = _check(request) if options.check else None
+        write_report(output, request, check)
     rows = [(finding.name, str(finding)) for finding in check.findings] if check else []
     print(table([('recording', str(request.path)), ('outcome', verdict(request, check)), *rows,
+                 *(('not read', str(channel)) for channel in request.left_out),
                  ('report', str(output))]))
     return 0 if check is None or check.passed else 1
+
+
+@contextmanager
+def _contradictions(request: RecordedRequest) -> Iterator[None]:
+    """Turn what values raise that do not go together into RecordingError."""
+    try:
+        yield
+    except (FlexPlannerError, StoppedError, OSError):
+        raise
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        raise RecordingError(f'{request.path} contradicts itself: {error}') from error
 
 
 def _check(request: RecordedRequest) -> MotionCheck:
@@ -128,7 +143,9 @@ def _check(request: RecordedRequest) -> MotionCheck:
 def _recover(options: argparse.Namespace) -> int:
     """Save the complete part of a recording."""
     types = MessageTypes.load([definition_folder('flex_planner_interfaces')])
-    path = recover_recording(options.recording, types)
+    left_out: list[ForeignChannel] = []
+    path = recover_recording(options.recording, types, left_out.append)
     print(table([('recovered', f'{read_metadata(path).message_count} messages'),
+                 *(('left out', str(channel)) for channel in left_out),
                  ('recording', str(path))]))
     return 0

@@ -14,18 +14,16 @@ from flex_planner.planning.plan import Plan
 from flex_planner.planning.sampling import SampledPlan
 from flex_planner.recording import (
     DEFAULT,
-    definition_folder,
     LATCHED,
-    MessageTypes,
     Recording,
     Topic,
 )
+from flex_planner.ros.messages.classes import MotionTask, PayloadSearch, TYPES
 from flex_planner.ros.messages.plans import reference_state
 from flex_planner.ros.planner.outcome import Outcome
 from flex_planner.ros.planner.request_state import RequestState
-from flex_planner.ros.runtime.parameters import as_mapping
+from flex_planner.ros.settings.fields import as_mapping
 from flex_planner.ros.settings.planner import PlannerSettings
-from flex_planner_interfaces.msg import MotionTask, PayloadSearch
 import yaml
 
 
@@ -47,7 +45,6 @@ class OutcomeRecorder:
 
     def __init__(self, arm: Arm, namespace: str) -> None:
         self._arm = arm
-        self._types = MessageTypes.load([definition_folder('flex_planner_interfaces')])
         self._numbers = itertools.count(1)
         interfaces = 'flex_planner_interfaces/msg/'
         self._task = Topic(f'{namespace}/motion_task', f'{interfaces}MotionTask')
@@ -85,7 +82,7 @@ class OutcomeRecorder:
         ready = stamp + report.planning_time.sec * 10**9 + report.planning_time.nanosec
         path = settings.output_folder() / self._name(stamp, outcome.search)
         report.recording = str(path)
-        with Recording.create(path.parent, path.name, self._types,
+        with Recording.create(path.parent, path.name, TYPES,
                               custom_data={'flex_planner': VERSION},
                               max_bytes=settings.max_recording_size or None) as recording:
             recording.attach('scenario.yaml', self._scenario(settings).encode(),

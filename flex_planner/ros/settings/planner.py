@@ -22,7 +22,7 @@ from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.optimal_control.task import MAX_PAYLOAD
 from flex_planner.planning.kinds.effort import SearchEffort
 from flex_planner.planning.sampling import MAX_PERIOD, SamplingSettings
-from flex_planner.ros.runtime.parameters import parameter_field
+from flex_planner.ros.settings.fields import parameter_field
 import numpy as np
 
 # of the largest payload [kg]
