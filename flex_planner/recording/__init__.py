@@ -28,6 +28,7 @@ from flex_planner.recording.reader import (
     SerializedMessage,
 )
 from flex_planner.recording.recovery import recover_recording
+from flex_planner.recording.retention import find_recordings, remove_oldest
 from flex_planner.recording.stand_ins import StandIns
 from flex_planner.recording.topics import (
     DEFAULT,
@@ -60,10 +61,12 @@ __all__ = [
     'TopicSummary',
     'check_encoding',
     'definition_folder',
+    'find_recordings',
     'from_time',
     'read_attachments',
     'read_metadata',
     'read_recording',
     'read_serialized',
     'recover_recording',
+    'remove_oldest',
 ]
