@@ -104,7 +104,7 @@ class QosProfile:
         )
 
 
-def parse_yaml(text: str) -> object:
+def parse_yaml(text: str | bytes) -> object:
     """Return what YAML of any writer says, None where it is no YAML."""
     try:
         return yaml.safe_load(text)

@@ -18,13 +18,13 @@ from flex_planner.recording import (
     definition_folder,
     ForeignChannel,
     MessageTypes,
+    parse_yaml,
     read_attachments,
     read_metadata,
     read_recording,
     StandIns,
 )
 import numpy as np
-import yaml
 
 _PACKAGE = 'flex_planner_interfaces'
 _TYPES = f'{_PACKAGE}/msg/'
@@ -248,12 +248,9 @@ def _scenario(path: Path | str) -> Mapping[str, Any]:
     attached = read_attachments(path).get('scenario.yaml')
     if attached is None:
         raise RecordingError(f'{path} is not the recording of a request: it has no scenario.yaml')
-    try:
-        scenario = yaml.safe_load(attached)
-    except yaml.YAMLError as error:
-        raise RecordingError(f'{path} has a scenario.yaml that is not YAML: {error}') from error
+    scenario = parse_yaml(attached)
     if not isinstance(scenario, Mapping):
-        raise RecordingError(f'{path} has a scenario.yaml without arm and parameters')
+        raise RecordingError(f'{path} has a scenario.yaml that is no YAML with arm and parameters')
     return scenario
 
 
