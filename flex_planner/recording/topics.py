@@ -95,7 +95,7 @@ class QosProfile:
         if not isinstance(profiles, list) or not profiles or not isinstance(profiles[0], dict):
             return DEFAULT
         first: dict[str, Any] = profiles[0]
-        depth = first.get('depth')
+        depth: Any = first.get('depth')
         known = type(depth) is int and 0 < depth <= LARGEST_DEPTH
         return cls(
             reliability=_policy(first.get('reliability'), DEFAULT.reliability),

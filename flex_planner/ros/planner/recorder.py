@@ -32,7 +32,6 @@ from flex_planner.ros.settings.fields import as_mapping
 from flex_planner.ros.settings.planner import PlannerSettings
 import yaml
 
-
 # the groups sort by the time of the request
 NAME: Final = re.compile(r'(?:plan_path|find_max_payload)_(\d{8}T\d{6}_\d{9})_(\d{4,})')
 

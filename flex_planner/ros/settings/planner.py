@@ -27,7 +27,8 @@ import numpy as np
 
 # of the largest payload [kg]
 MIN_ACCURACY, MAX_ACCURACY = 1e-6, 1e3
-# of a file of a recording, and of all recordings [bytes]: a slip in the unit must not make a file of every message
+# of a file of a recording, and of all recordings [bytes]: a slip in the unit must not make a file
+# of every message, nor remove all
 MIN_RECORDING_SIZE, MAX_RECORDING_SIZE = 2**16, 2**40
 
 
