@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from flex_planner.recording.decoding import check_encoding, Decoder
 from flex_planner.recording.definitions import definition_folder, MessageTypes
+from flex_planner.recording.folders import shown_path
 from flex_planner.recording.metadata import (
     FileSummary,
     ForeignChannel,
@@ -71,4 +72,5 @@ __all__ = [
     'read_serialized',
     'recover_recording',
     'remove_oldest',
+    'shown_path',
 ]

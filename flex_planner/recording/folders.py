@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 from pathlib import Path, PurePosixPath
 import re
 from typing import Final
@@ -54,6 +55,11 @@ def recording_files(path: Path | str, *, complete: bool = True) -> list[Path]:
     for name in sorted(found.difference(order)):
         _LOG.warning('%s is left out: %s does not list it', path / name, 'metadata.yaml')
     return [path / name for name in order]
+
+
+def shown_path(path: Path | str) -> str:
+    """Return a path as text that UTF-8 can hold, what is not of it replaced."""
+    return os.fsencode(path).decode(errors='replace')
 
 
 def _in_order(names: set[str]) -> list[str]:

@@ -22,7 +22,7 @@ from flex_planner.base.errors import InvalidValueError, RecordingError
 from flex_planner.recording.channels import ChannelTable
 from flex_planner.recording.decoding import check_encoding, Decoder
 from flex_planner.recording.definitions import MessageTypes
-from flex_planner.recording.folders import recording_files
+from flex_planner.recording.folders import recording_files, shown_path
 from flex_planner.recording.mcap_records import DAMAGE, read_blocks
 from flex_planner.recording.metadata import ForeignChannel
 from flex_planner.recording.reader import LOG, SerializedMessage, UnreadMessages
@@ -72,7 +72,7 @@ def recover_recording(path: Path | str, types: MessageTypes,
         others = ''.join(f'; {channel}' for channel in found.unread.channels())
         raise RecordingError(f'{path} holds no complete message or attachment{others}')
     with Recording.create(target.parent, target.name, types,
-                          custom_data={'recovered_from': _decodable(path.name)}) as recording:
+                          custom_data={'recovered_from': shown_path(path.name)}) as recording:
         for record in found.attachments:
             found.attach(recording, record)
         for message in sorted(found.messages, key=lambda message: message.log_time_ns):
@@ -155,12 +155,7 @@ def _target(path: Path) -> Path:
 
 def _printable(name: str) -> str:
     """Return a name with what a recording's cannot have replaced."""
-    return UNPRINTABLE.sub('_', _decodable(name))
-
-
-def _decodable(name: str) -> str:
-    """Return a file's name with what is not UTF-8 replaced."""
-    return os.fsencode(name).decode(errors='replace')
+    return UNPRINTABLE.sub('_', shown_path(name))
 
 
 def _undamaged_records(file: Path) -> Iterator[McapRecord]:

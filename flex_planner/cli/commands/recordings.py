@@ -20,6 +20,7 @@ from flex_planner.recording import (
     MessageTypes,
     read_metadata,
     recover_recording,
+    shown_path,
 )
 from flex_planner.reports.motion import table
 from flex_planner.reports.recording import (
@@ -92,6 +93,9 @@ def _replay(options: argparse.Namespace) -> int:
     longest = read_metadata(options.recording).duration_ns * 1e-9
     start = number('--start', options.start, at_least=0, at_most=longest, unit='s')
     delay = number('--delay', options.delay, at_least=0.01, at_most=60, unit='s')
+    if shown_path(options.recording) != str(options.recording):
+        raise RecordingError(f'{options.recording} cannot be replayed: its name is not UTF-8, '
+                             'which ROS needs: rename it')
     try:
         from flex_planner.ros.replay import replay, ReplaySettings
     except ImportError as error:
@@ -111,9 +115,9 @@ def _report(options: argparse.Namespace) -> int:
         check = _check(request) if options.check else None
         write_report(output, request, check)
     rows = [(finding.name, str(finding)) for finding in check.findings] if check else []
-    print(table([('recording', str(request.path)), ('outcome', verdict(request, check)), *rows,
+    print(table([('recording', shown_path(request.path)), ('outcome', verdict(request, check)), *rows,
                  *(('not read', str(channel)) for channel in request.left_out),
-                 ('report', str(output))]))
+                 ('report', shown_path(output))]))
     return 0 if check is None or check.passed else 1
 
 
@@ -147,5 +151,5 @@ def _recover(options: argparse.Namespace) -> int:
     path = recover_recording(options.recording, types, left_out.append)
     print(table([('recovered', f'{read_metadata(path).message_count} messages'),
                  *(('left out', str(channel)) for channel in left_out),
-                 ('recording', str(path))]))
+                 ('recording', shown_path(path))]))
     return 0

@@ -152,3 +152,13 @@ def test_schemas_of_our_types_may_be_missing(plan: Path, tmp_path: Path) -> None
                 if isinstance(record, Schema) else record)
 
     assert RecordedRequest.read(rewrite(plan, tmp_path / 'a.mcap', {}, change)).solved
+
+
+def test_name_that_is_not_utf8_is_shown_as_far_as_it_is(
+        plan: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = rewrite(plan, tmp_path / 'b\udcfcd.mcap')
+    assert main(['report', str(file), '--output', str(tmp_path / 'a.html')]) == 0
+    assert 'b\ufffdd.mcap, report of' in (tmp_path / 'a.html').read_text(encoding='utf-8')
+    assert main(['recover', str(file)]) == 0
+    assert capsys.readouterr().out.rstrip().endswith('/b_d_recovered')
+    assert main(['replay', str(file)]) == 1
