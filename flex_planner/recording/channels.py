@@ -36,7 +36,9 @@ class RecordedChannel:
     def of(cls, channel: Channel, schema: Schema | None) -> RecordedChannel:
         """Return the channel that two records describe."""
         if channel.message_encoding != 'cdr':
-            encoding = channel.message_encoding or 'of an unknown encoding'
+            encoding = channel.message_encoding
+            if not encoding or not encoding.isprintable():
+                encoding = 'of an unknown encoding'
             return cls(name=channel.topic, reason=f"its messages are {encoding}, not ROS 2's cdr")
         if schema is None:
             return cls(name=channel.topic, reason='the type of its messages is not recorded')

@@ -202,7 +202,7 @@ class MessageTypes:
                 'ros2idl': get_types_from_idl}.get(definition.encoding)
         if read is None:
             raise RecordingError(f'the definition of its type {name} is '
-                                 f'{definition.encoding or "of an unknown encoding"}')
+                                 f'of the unknown encoding {definition.encoding!r}')
         store = Typestore()
         try:
             store.register(read(definition.text.decode().replace('\r', '')))

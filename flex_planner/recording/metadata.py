@@ -77,7 +77,8 @@ class ForeignChannel:
     def __str__(self) -> str:
         """Return the channel in words."""
         count = self.message_count
-        return f'{self.name} ({count} message{"" if count == 1 else "s"}): {self.reason}'
+        name = self.name if self.name.isprintable() else repr(self.name)
+        return f'{name} ({count} message{"" if count == 1 else "s"}): {self.reason}'
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

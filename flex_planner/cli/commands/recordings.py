@@ -94,7 +94,7 @@ def _replay(options: argparse.Namespace) -> int:
     start = number('--start', options.start, at_least=0, at_most=longest, unit='s')
     delay = number('--delay', options.delay, at_least=0.01, at_most=60, unit='s')
     if shown_path(options.recording) != str(options.recording):
-        raise RecordingError(f'{options.recording} cannot be replayed: its name is not UTF-8, '
+        raise RecordingError(f'{shown_path(options.recording)} cannot be replayed: its name is not UTF-8, '
                              'which ROS needs: rename it')
     try:
         from flex_planner.ros.replay import replay, ReplaySettings
@@ -115,8 +115,8 @@ def _report(options: argparse.Namespace) -> int:
         check = _check(request) if options.check else None
         write_report(output, request, check)
     rows = [(finding.name, str(finding)) for finding in check.findings] if check else []
-    print(table([('recording', shown_path(request.path)), ('outcome', verdict(request, check)), *rows,
-                 *(('not read', str(channel)) for channel in request.left_out),
+    print(table([('recording', shown_path(request.path)), ('outcome', verdict(request, check)),
+                 *rows, *(('not read', str(channel)) for channel in request.left_out),
                  ('report', shown_path(output))]))
     return 0 if check is None or check.passed else 1
 
