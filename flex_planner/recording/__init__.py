@@ -11,7 +11,8 @@ depends on the clock or the machine.
 from __future__ import annotations
 
 from flex_planner.recording.decoding import check_encoding, Decoder
-from flex_planner.recording.definitions import definition_folder, MessageTypes
+from flex_planner.recording.definition_files import definition_folder
+from flex_planner.recording.definitions import MessageTypes
 from flex_planner.recording.folders import shown_path
 from flex_planner.recording.metadata import (
     FileSummary,

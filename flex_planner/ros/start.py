@@ -5,6 +5,8 @@ from __future__ import annotations
 from importlib import import_module
 import sys
 
+from flex_planner.base.errors import FlexPlannerError
+
 
 def planner() -> None:
     """Run the planner node."""
@@ -28,5 +30,8 @@ def _start(name: str, module: str) -> None:
     except ImportError as error:
         print(f'{name}: this node needs ROS 2 with the messages of flex_planner_interfaces: '
               f'{error}', file=sys.stderr)
+        sys.exit(1)
+    except FlexPlannerError as error:  # no message definitions
+        print(f'{name}: {error}', file=sys.stderr)
         sys.exit(1)
     main()

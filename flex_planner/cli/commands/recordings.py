@@ -94,8 +94,8 @@ def _replay(options: argparse.Namespace) -> int:
     start = number('--start', options.start, at_least=0, at_most=longest, unit='s')
     delay = number('--delay', options.delay, at_least=0.01, at_most=60, unit='s')
     if shown_path(options.recording) != str(options.recording):
-        raise RecordingError(f'{shown_path(options.recording)} cannot be replayed: its name is not UTF-8, '
-                             'which ROS needs: rename it')
+        raise RecordingError(f'{shown_path(options.recording)} cannot be replayed: its name is '
+                             'not UTF-8, which ROS needs: rename it')
     try:
         from flex_planner.ros.replay import replay, ReplaySettings
     except ImportError as error:
