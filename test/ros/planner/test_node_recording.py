@@ -9,6 +9,7 @@ from pathlib import Path
 import shutil
 from typing import Any, NamedTuple
 
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from factories import PlanFactory
 from flex_planner.arms.arm import Arm
 from flex_planner.planning.plan import Plan
@@ -246,6 +247,7 @@ def test_every_recording_has_its_own_folder(planner: Planner) -> None:
 @contextmanager
 def no_folder(planner: Planner) -> Iterator[None]:
     """Put a file in the place of the folder of the recordings."""
+    planner.recordings.mkdir(exist_ok=True)
     aside = planner.recordings.rename(planner.recordings.with_name('aside'))
     planner.recordings.write_text('no folder')
     try:
@@ -256,9 +258,13 @@ def no_folder(planner: Planner) -> Iterator[None]:
 
 
 def test_plan_that_cannot_be_recorded_is_published_with_a_warning(planner: Planner) -> None:
+    told: list[Any] = planner.listen(DiagnosticArray, '/diagnostics', 10)
     with no_folder(planner):
-        answer = planner.plan(publish=True, payload_mass=0.9)
         wrong = planner.report(duration=-1.0)
+        answer = planner.plan(publish=True, payload_mass=0.9)
+        planner.wait('the warning on /diagnostics', lambda: any(
+            status.level == DiagnosticStatus.WARN and 'could not be recorded' in status.message
+            for message in told for status in message.status))
     report = answer.report
     assert (report.error_code, report.error_msg, report.recording) == (PlanReport.NONE, '', '')
     assert report.warning_kinds[-1] == wrong.warning_kinds[-1] == 'NOT_RECORDED'
