@@ -149,14 +149,15 @@ def _kinds(request: RecordedRequest) -> list[ReportTable]:
     return [ReportTable(
         title=f'Kinds of motion, from {report.kind_starts} starts',
         columns=(unit, 'how it moves', 'met'),
-        rows=tuple((f'{value:.6g}', words, str(count)) for value, words, count in rows))]
+        rows=tuple((f'{value:.6g}', str(words), str(count)) for value, words, count in rows))]
 
 
 def _warnings(report: Any) -> list[ReportTable]:
     """Return what is to be known of the plan; none where there is nothing."""
-    kinds = report.warning_kinds
-    rows = tuple((WarningKind[kind].value if kind in WarningKind.__members__ else kind, sentence)
-                 for kind, sentence in _side_by_side(kinds, report.warnings))
+    kinds = getattr(report, 'warning_kinds', ())  # older reports do not have them
+    told = _side_by_side(kinds, getattr(report, 'warnings', ()))
+    rows = tuple((WarningKind[kind].value if kind in WarningKind.__members__ else str(kind),
+                  str(sentence)) for kind, sentence in told)
     return [ReportTable(title='Warnings', rows=rows)] if rows else []
 
 
@@ -248,7 +249,7 @@ def _objectives(report: Any) -> ReportTable:
     tried = _side_by_side(report.tried_objectives, report.tried_weights, report.tried_shares)
     return ReportTable(title='Weights tried for the objectives',
                        columns=('objective', 'weight', 'share of the limit'),
-                       rows=tuple((name, f'{weight:.5g}', f'{share:.4f}')
+                       rows=tuple((str(name), f'{weight:.5g}', f'{share:.4f}')
                                   for name, weight, share in tried))
 
 

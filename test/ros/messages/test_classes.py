@@ -83,3 +83,16 @@ def test_recording_is_the_same_with_and_without_ros(tmp_path: Path) -> None:
         path.name for path in sorted(again.iterdir())]
     for file in recorded.iterdir():
         assert file.read_bytes() == (again / file.name).read_bytes()
+
+
+def test_messages_of_another_version_are_not_used_and_that_is_said() -> None:
+    code = ('import flex_planner_interfaces.msg as installed\n'
+            'class PlanReport:\n'
+            '    get_fields_and_field_types = staticmethod(dict)\n'
+            'installed.PlanReport = PlanReport\n'
+            'from flex_planner.ros.messages import classes\n'
+            'print(classes.WHY_NOT_ROS, len(classes.PlanReport().warnings))')
+    run = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, timeout=100,
+                         env=os.environ, check=True)
+    assert run.stdout == ('the installed flex_planner_interfaces are of another version of '
+                          'flex_planner: build them again 0\n')
