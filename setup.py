@@ -3,6 +3,8 @@ from glob import glob
 from setuptools import find_packages, setup
 
 package_name = 'flex_planner'
+DATA_FOLDERS = {'flex_planner.config': 'config',
+                'flex_planner.recording.flex_planner_interfaces': 'flex_planner_interfaces'}
 
 setup(
     name=package_name,
@@ -12,8 +14,13 @@ setup(
     maintainer_email='maintainers@flexplanner.example',
     license='Apache-2.0',
     python_requires='>=3.10',
-    packages=find_packages(include=['flex_planner', 'flex_planner.*']),
+    # what is read without ROS lies inside the package, too: not every installation has a share
+    packages=[*find_packages(include=['flex_planner', 'flex_planner.*']), *DATA_FOLDERS],
+    package_dir=DATA_FOLDERS,
     package_data={'flex_planner': ['py.typed'],
+                  'flex_planner.config': ['arms/*.yaml', 'studies/*.yaml'],
+                  'flex_planner.recording.flex_planner_interfaces': [
+                      'msg/*.msg', 'srv/*.srv', 'action/*.action'],
                   'flex_planner.reports.recording': ['page.html', 'plots.js']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
@@ -41,9 +48,9 @@ setup(
     zip_safe=False,
     entry_points={
         'console_scripts': [
-            'planner = flex_planner.ros.planner.node:main',
-            'arm_simulator = flex_planner.ros.arm_simulator:main',
-            'replay = flex_planner.ros.replay:main',
+            'planner = flex_planner.ros.start:planner',
+            'arm_simulator = flex_planner.ros.start:arm_simulator',
+            'replay = flex_planner.ros.start:replay',
             'flex-planner = flex_planner.cli:main',
         ],
     },

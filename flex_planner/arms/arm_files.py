@@ -25,12 +25,13 @@ class ArmFileError(FlexPlannerError):
 
 
 def config_folders() -> list[Path]:
-    """Return the folders that may hold presets: source tree, ROS shares, Python prefix."""
+    """Return the folders that may hold presets: source tree, package, ROS shares, prefix."""
     prefixes = [Path(entry) for entry in os.environ.get('AMENT_PREFIX_PATH', '').split(':')
                 if entry]
     shares = [prefix / 'share' / 'flex_planner' / 'config'
               for prefix in (*prefixes, Path(sys.prefix))]
-    return [Path(__file__).parents[2] / 'config', *shares]
+    here = Path(__file__)
+    return [here.parents[2] / 'config', here.parents[1] / 'config', *shares]
 
 
 def find_arm_file(name: str) -> Path:

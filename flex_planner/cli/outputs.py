@@ -119,14 +119,13 @@ def check_folder(folder: Path) -> None:
 
 
 def _recorder(request: Request, folder: Path) -> RequestRecorder | None:
-    """Return the recorder, or None, with a message, where ROS 2 is missing."""
+    """Return the recorder, or None, with a message, where message definitions are missing."""
     try:
         from flex_planner.cli.recorder import RequestRecorder
 
         return RequestRecorder(request, folder / 'recordings')
-    except (ImportError, RecordingError) as error:
-        print(f'flex-planner: no recording is written, because that needs ROS 2: {error}',
-              file=sys.stderr)
+    except RecordingError as error:
+        print(f'flex-planner: no recording is written: {error}', file=sys.stderr)
         return None
 
 

@@ -1,4 +1,4 @@
-"""Recordings like those of the planner node, of requests from the command line; needs ROS 2."""
+"""Recordings like those of the planner node, of requests from the command line, without ROS."""
 
 from __future__ import annotations
 
@@ -12,6 +12,13 @@ from flex_planner.cli.request import Request
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.sampling import SampledPlan
+from flex_planner.ros.messages.classes import (
+    FlexibleTrajectory,
+    MotionTask,
+    PayloadSearch,
+    PlanReport,
+    Point,
+)
 from flex_planner.ros.messages.payload_searches import (
     report_from_search,
     search_message,
@@ -27,13 +34,6 @@ from flex_planner.ros.planner.outcome import Outcome
 from flex_planner.ros.planner.recorder import OutcomeRecorder
 from flex_planner.ros.planner.request_state import RequestState
 from flex_planner.ros.settings.planner import PlannerSettings
-from flex_planner_interfaces.msg import (
-    FlexibleTrajectory,
-    MotionTask,
-    PayloadSearch,
-    PlanReport,
-)
-from geometry_msgs.msg import Point
 
 _NODE = '/flex_planner'  # so that the topics are those of the node
 

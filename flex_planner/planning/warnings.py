@@ -53,6 +53,7 @@ class WarningKind(Enum):
     SENSITIVE_TO_PAYLOAD = 'sensitive to the payload'
     OPEN_LOOP_UNSTABLE = 'unstable under the planned torque alone'
     FEEDBACK_UNSTABLE = 'unstable under the feedback'
+    NOT_RECORDED = 'not recorded'
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

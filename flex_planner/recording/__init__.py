@@ -10,11 +10,18 @@ depends on the clock or the machine.
 
 from __future__ import annotations
 
-from flex_planner.recording.definitions import definition_folder, MessageTypes
-from flex_planner.recording.metadata import FileSummary, RecordingMetadata, TopicSummary
+from flex_planner.recording.decoding import check_encoding, Decoder
+from flex_planner.recording.definition_files import definition_folder
+from flex_planner.recording.definitions import MessageTypes
+from flex_planner.recording.folders import shown_path
+from flex_planner.recording.metadata import (
+    FileSummary,
+    ForeignChannel,
+    RecordingMetadata,
+    TopicSummary,
+)
 from flex_planner.recording.playback import from_time
 from flex_planner.recording.reader import (
-    check_definition,
     read_attachments,
     read_metadata,
     read_recording,
@@ -23,10 +30,14 @@ from flex_planner.recording.reader import (
     SerializedMessage,
 )
 from flex_planner.recording.recovery import recover_recording
+from flex_planner.recording.retention import find_recordings, remove_oldest
+from flex_planner.recording.stand_ins import StandIns
 from flex_planner.recording.topics import (
     DEFAULT,
+    Definition,
     Durability,
     LATCHED,
+    parse_yaml,
     QosProfile,
     Reliability,
     Topic,
@@ -36,8 +47,11 @@ from flex_planner.recording.writer import Recording
 __all__ = [
     'DEFAULT',
     'LATCHED',
+    'Decoder',
+    'Definition',
     'Durability',
     'FileSummary',
+    'ForeignChannel',
     'MessageTypes',
     'QosProfile',
     'RecordedMessage',
@@ -45,14 +59,19 @@ __all__ = [
     'RecordingMetadata',
     'Reliability',
     'SerializedMessage',
+    'StandIns',
     'Topic',
     'TopicSummary',
-    'check_definition',
+    'check_encoding',
     'definition_folder',
+    'find_recordings',
     'from_time',
+    'parse_yaml',
     'read_attachments',
     'read_metadata',
     'read_recording',
     'read_serialized',
     'recover_recording',
+    'remove_oldest',
+    'shown_path',
 ]

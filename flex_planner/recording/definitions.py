@@ -9,52 +9,32 @@ is produced here because rclpy's ``serialize_message`` leaves the padding uninit
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-import os
 from pathlib import Path
 import struct
-import sys
 from typing import Any, cast, Final
 
 from flex_planner.base.errors import RecordingError
 from flex_planner.recording.conversion import convert_message
+from flex_planner.recording.definition_files import read_texts
+from flex_planner.recording.topics import Definition
 from rosbags.interfaces import Nodetype
 from rosbags.interfaces.typing import FieldDesc, Typesdict
 from rosbags.serde import SerdeError
-from rosbags.typesys import get_types_from_msg, get_typestore, Stores, TypesysError
+from rosbags.typesys import (
+    get_types_from_idl,
+    get_types_from_msg,
+    get_typestore,
+    Stores,
+    TypesysError,
+)
 from rosbags.typesys.store import Typestore
 
 SEPARATOR: Final = 80 * '='
-
-
-def definition_folder(package: str, environment: Mapping[str, str] | None = None) -> Path:
-    """
-    Find the folder that holds a package's ``msg/`` folder, without importing ROS.
-
-    The prefixes in AMENT_PREFIX_PATH come first, then Python's own prefix (wheels), then the
-    folder that a source checkout has beside ``flex_planner``.
-
-    Parameters
-    ----------
-    package : str
-        Name of the interface package.
-    environment : mapping, optional
-        Environment variables; default ``os.environ``.
-
-    Raises
-    ------
-    RecordingError
-        If none of these places has it.
-
-    """
-    variables = os.environ if environment is None else environment
-    prefixes = [p for p in variables.get('AMENT_PREFIX_PATH', '').split(os.pathsep) if p]
-    places = [Path(prefix) / 'share' / package for prefix in [*prefixes, sys.prefix]]
-    places.append(Path(__file__).resolve().parents[2] / package)
-    for place in places:
-        if (place / 'msg').is_dir():
-            return place
-    raise RecordingError(f'no message definitions of {package} in '
-                         f'{", ".join(map(str, places))}: source the workspace that has them')
+SPARE_BYTES: Final = 16  # as rclpy leaves behind a small message
+LONGEST_REASON: Final = 200  # characters
+# What rosbags raises at bytes that are not a message of the type.
+DAMAGED_MESSAGE: Final = (SerdeError, struct.error, ValueError, LookupError, MemoryError,
+                          OverflowError)
 
 
 class MessageTypes:
@@ -96,10 +76,9 @@ class MessageTypes:
         store = get_typestore(Stores.ROS2_JAZZY)
         texts: dict[str, str] = {}
         for folder in definition_folders:
-            texts.update(_read_texts(Path(folder)))
+            texts.update(read_texts(Path(folder)))
         _register(store, texts)
-        for name, (constants, fields) in store.fielddefs.items():
-            store.fielddefs[name] = (constants, [(f, _without_char(d)) for f, d in fields])
+        _unify_char(store)
         types = cls(store, texts)
         for name in texts:
             list(types._dependencies(name))
@@ -118,6 +97,11 @@ class MessageTypes:
         """Return the RIHS01 hash of a type (REP-2016)."""
         self._require(type_name)
         return self._store.hash_rihs01(type_name)
+
+    def definition(self, type_name: str) -> Definition:
+        """Return what a recording carries of a type."""
+        return Definition(type_name, 'ros2msg', self.schema(type_name).encode(),
+                          self.type_hash(type_name))
 
     def schema(self, type_name: str) -> str:
         """Return the definition of a type and of all types within it, encoding ``ros2msg``."""
@@ -141,12 +125,12 @@ class MessageTypes:
         converted = convert_message(self._store, type_name, message, path)
         return bytes(self._store.serialize_cdr(converted, type_name, little_endian=True))
 
-    def decode(self, type_name: str, data: bytes) -> Any:
+    def decode(self, type_name: str, data: bytes, *, exact: bool = False) -> Any:
         """
         Return the message that CDR bytes stand for.
 
-        Spare bytes at the end are tolerated: rclpy leaves them behind an empty sequence, and
-        ``ros2 bag record`` keeps them.
+        Spare bytes at the end are tolerated: rclpy leaves them behind empty sequences, and
+        ``ros2 bag record`` keeps them. They may not be most of the bytes, if `exact`.
 
         Raises
         ------
@@ -161,9 +145,65 @@ class MessageTypes:
         little = definition.deserialize_cdr_le
         decoder = little if data[1] else definition.deserialize_cdr_be
         try:
-            return decoder(data[4:], 0, definition.cls, self._store)[0]
-        except (SerdeError, struct.error, ValueError) as error:
+            message, end = decoder(data[4:], 0, definition.cls, self._store)
+        except DAMAGED_MESSAGE as error:
             raise RecordingError(f'{len(data)} bytes are not a {type_name}: {error}') from error
+        if exact and len(data) - 4 - end > max(end, SPARE_BYTES):
+            raise RecordingError(f'{len(data)} bytes are not a {type_name}, which takes {end}')
+        return message
+
+    def parse(self, definition: Definition) -> MessageTypes:
+        """
+        Return the types of a definition that a recording carries.
+
+        Types that its text uses and does not define are those known here.
+
+        Raises
+        ------
+        RecordingError
+            If the text is no such definition.
+
+        """
+        name = definition.type_name
+        read = {'ros2msg': lambda text: get_types_from_msg(text, name),
+                'ros2idl': get_types_from_idl}.get(definition.encoding)
+        if read is None:
+            raise RecordingError(f'the definition of its type {name} is '
+                                 f'of the unknown encoding {definition.encoding!r}')
+        store = Typestore()
+        try:
+            store.register(read(definition.text.decode().replace('\r', '')))
+            types = MessageTypes(store, {})
+            types._complete(self)
+            types.type_hash(name)
+            store.get_msgdef(name)
+        except Exception as error:  # parser and compiler of rosbags raise anything at any text
+            reason = ' '.join(str(error).split())[:LONGEST_REASON] or type(error).__name__
+            raise RecordingError(f'the recorded definition of its type {name} cannot be used: '
+                                 f'{reason}') from error
+        return types
+
+    def fields(self, type_name: str) -> dict[str, FieldDesc]:
+        """Return the description of each field of a type."""
+        self._require(type_name)
+        return dict(self._store.fielddefs[type_name][1])
+
+    def constants(self, type_name: str) -> dict[str, Any]:
+        """Return the constants of a type."""
+        self._require(type_name)
+        return {name: value for name, _, value in self._store.fielddefs[type_name][0]}
+
+    def _complete(self, others: MessageTypes) -> None:
+        """Add the types within these types that only others know."""
+        _unify_char(self._store)
+        left = list(self._store.fielddefs)
+        while left:
+            for _, description in self._store.fielddefs[left.pop()][1]:
+                nested = nested_type(description)
+                if nested is not None and nested not in self and nested in others:
+                    self._store.fielddefs[nested] = others._store.fielddefs[nested]
+                    self._store.types[nested] = others._store.types[nested]
+                    left.append(nested)
 
     def _require(self, type_name: str) -> None:
         """Raise if a type is unknown."""
@@ -181,22 +221,10 @@ class MessageTypes:
         """Yield the types within a type, depth first; some of them more than once."""
         self._require(type_name)
         for _, description in self._store.fielddefs[type_name][1]:
-            nested = _nested_type(description)
+            nested = nested_type(description)
             if nested is not None:
                 yield nested
                 yield from self._dependencies(nested)
-
-
-def _read_texts(folder: Path) -> dict[str, str]:
-    """Return the text of every .msg file of a package by the name of its type."""
-    files = sorted((folder / 'msg').glob('*.msg'))
-    if not files:
-        raise RecordingError(f'no .msg files in {folder / "msg"}')
-    try:
-        texts = {file.stem: file.read_text(encoding='utf-8') for file in files}
-    except (OSError, UnicodeDecodeError) as error:
-        raise RecordingError(f'cannot read the definitions in {folder}: {error}') from error
-    return {f'{folder.name}/msg/{stem}': f'{text.rstrip()}\n' for stem, text in texts.items()}
 
 
 def _register(store: Typestore, texts: Mapping[str, str]) -> None:
@@ -210,7 +238,13 @@ def _register(store: Typestore, texts: Mapping[str, str]) -> None:
             raise RecordingError(f'cannot use the definition of {name}: {error}') from error
 
 
-def _nested_type(description: FieldDesc) -> str | None:
+def _unify_char(store: Typestore) -> None:
+    """Make uint8 of char: in ROS 2 they are one type, also in the hash."""
+    for name, (constants, fields) in store.fielddefs.items():
+        store.fielddefs[name] = (constants, [(f, _without_char(d)) for f, d in fields])
+
+
+def nested_type(description: FieldDesc) -> str | None:
     """Return the message type of a field, if it is one or a sequence of one."""
     kind, detail = description
     if kind in (Nodetype.ARRAY, Nodetype.SEQUENCE):
@@ -219,7 +253,7 @@ def _nested_type(description: FieldDesc) -> str | None:
 
 
 def _without_char(description: FieldDesc) -> FieldDesc:
-    """Return a description with uint8 for char: in ROS 2 they are one type, also in the hash."""
+    """Return a description with uint8 for char."""
     kind, detail = description
     if kind == Nodetype.BASE and detail[0] == 'char':
         return cast(FieldDesc, (kind, ('uint8', 0)))

@@ -1,8 +1,8 @@
 """
 One file of a recording.
 
-Every channel carries CDR with a ros2msg schema: a single channel of another kind would make
-``ros2 bag play`` refuse the file. Everything that is not a message is an attachment.
+Every channel carries CDR with the definition of its type: a single channel of another kind would
+make ``ros2 bag play`` refuse the file. Everything that is not a message is an attachment.
 
 """
 
@@ -12,9 +12,8 @@ from collections.abc import Mapping
 from typing import BinaryIO, Final
 
 from flex_planner.base.version import VERSION
-from flex_planner.recording.definitions import MessageTypes
 from flex_planner.recording.metadata import FileSummary, RecordingMetadata, TopicSummary
-from flex_planner.recording.topics import Topic
+from flex_planner.recording.topics import Definition, Topic
 from mcap.writer import CompressionType, LIBRARY_IDENTIFIER, Writer
 
 CHUNK_SIZE: Final = 2**16  # bytes before compression; a killed process loses the last chunk
@@ -24,15 +23,16 @@ _MESSAGE_HEADER: Final = 31  # bytes
 class _Channel:
     """A topic with its number in the file and the messages so far."""
 
-    def __init__(self, topic: Topic, number: int, type_hash: str) -> None:
+    def __init__(self, topic: Topic, number: int, definition: Definition) -> None:
         self.topic = topic
         self.number = number
-        self.type_hash = type_hash
+        self.definition = definition
         self.count = 0
 
     def summary(self) -> TopicSummary:
         """Return the topic's entry in the metadata."""
-        return TopicSummary(topic=self.topic, type_hash=self.type_hash, message_count=self.count)
+        return TopicSummary(topic=self.topic, definition=self.definition,
+                            message_count=self.count)
 
 
 class RecordingFile:
@@ -45,17 +45,14 @@ class RecordingFile:
         Where the bytes go.
     name : str
         Name of the file.
-    types : MessageTypes
-        Definitions of the messages.
 
     """
 
-    def __init__(self, stream: BinaryIO, name: str, types: MessageTypes) -> None:
+    def __init__(self, stream: BinaryIO, name: str) -> None:
         self._stream = stream
         self._name = name
-        self._types = types
         self._channels: dict[str, _Channel] = {}
-        self._schemas: dict[str, int] = {}
+        self._schemas: dict[Definition, int] = {}
         self._times: tuple[int, int] | None = None
         self._pending = 0
         self._writer = Writer(stream, chunk_size=CHUNK_SIZE, compression=CompressionType.ZSTD,
@@ -69,9 +66,9 @@ class RecordingFile:
             return 0
         return self._written + self._pending + _MESSAGE_HEADER + len(data)
 
-    def write(self, topic: Topic, data: bytes, time: int) -> None:
-        """Add a message."""
-        channel = self._channels.get(topic.name) or self._add_channel(topic)
+    def write(self, topic: Topic, definition: Definition, data: bytes, time: int) -> None:
+        """Add a message of a topic, whose definition is the same every time."""
+        channel = self._channels.get(topic.name) or self._add_channel(topic, definition)
         self._writer.add_message(channel.number, time, data, publish_time=time)
         channel.count += 1
         self._times = (time if self._times is None else self._times[0], time)
@@ -94,17 +91,17 @@ class RecordingFile:
         self._writer.finish()  # type: ignore[no-untyped-call]
         return metadata
 
-    def _add_channel(self, topic: Topic) -> _Channel:
+    def _add_channel(self, topic: Topic, definition: Definition) -> _Channel:
         """Add a topic to the file, with the schema of its type."""
-        schema = self._schemas.get(topic.type_name)
+        schema = self._schemas.get(definition)
         if schema is None:
-            text = self._types.schema(topic.type_name)
-            schema = self._writer.register_schema(topic.type_name, 'ros2msg', text.encode())
-            self._schemas[topic.type_name] = schema
-        type_hash = self._types.type_hash(topic.type_name)
-        metadata = {'offered_qos_profiles': topic.qos.to_yaml(), 'topic_type_hash': type_hash}
+            schema = self._writer.register_schema(definition.type_name, definition.encoding,
+                                                  definition.text)
+            self._schemas[definition] = schema
+        metadata = {'offered_qos_profiles': topic.qos.to_yaml(),
+                    'topic_type_hash': definition.type_hash}
         number = self._writer.register_channel(topic.name, 'cdr', schema, metadata)
-        self._channels[topic.name] = _Channel(topic, number, type_hash)
+        self._channels[topic.name] = _Channel(topic, number, definition)
         return self._channels[topic.name]
 
     def _hand_over(self) -> None:

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import Final
 
 from flex_planner.base.errors import InvalidValueError
-from flex_planner.recording.topics import Topic
+from flex_planner.recording.topics import Definition, Topic
 import yaml
 
 METADATA_VERSION: Final = 9
@@ -24,16 +24,21 @@ class TopicSummary:
     ----------
     topic : Topic
         Name, type and quality of service.
-    type_hash : str
-        RIHS01 hash of the type's definition (REP-2016).
+    definition : Definition
+        Of the type.
     message_count : int
         Number of messages.
 
     """
 
     topic: Topic
-    type_hash: str
+    definition: Definition
     message_count: int
+
+    @property
+    def type_hash(self) -> str:
+        """Return the RIHS01 hash of the type's definition, empty if unknown."""
+        return self.definition.type_hash
 
     def to_dict(self) -> dict[str, object]:
         """Return the entry of ``topics_with_message_count``."""
@@ -47,6 +52,33 @@ class TopicSummary:
             },
             'message_count': self.message_count,
         }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ForeignChannel:
+    """
+    A channel of a recording that holds no messages of ROS 2.
+
+    Parameters
+    ----------
+    name : str
+        Of its topic.
+    reason : str
+        What it holds, or why it cannot be read.
+    message_count : int
+        Number of messages.
+
+    """
+
+    name: str
+    reason: str
+    message_count: int
+
+    def __str__(self) -> str:
+        """Return the channel in words."""
+        count = self.message_count
+        name = self.name if self.name.isprintable() else repr(self.name)
+        return f'{name} ({count} message{"" if count == 1 else "s"}): {self.reason}'
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,12 +120,15 @@ class RecordingMetadata:
         Topics in the order of their first message.
     custom_data : mapping of str to str
         Free text of the writer, e.g. the version of the planner.
+    foreign : tuple of ForeignChannel
+        What the files hold besides; not written.
 
     """
 
     files: tuple[FileSummary, ...]
     topics: tuple[TopicSummary, ...]
     custom_data: Mapping[str, str]
+    foreign: tuple[ForeignChannel, ...] = ()
 
     def __post_init__(self) -> None:
         """Check and copy the custom data."""
@@ -146,13 +181,20 @@ class RecordingMetadata:
     def join(cls, parts: Iterable[RecordingMetadata]) -> RecordingMetadata:
         """Return the metadata of a recording from those of its files, at least one."""
         parts = tuple(parts)
-        topics: dict[str, TopicSummary] = {}
+        topics: dict[tuple[str, str], TopicSummary] = {}
         for entry in (entry for part in parts for entry in part.topics):
-            before = topics.get(entry.topic.name)
+            key = entry.topic.name, entry.topic.type_name
+            before = topics.get(key)
             count = entry.message_count + (before.message_count if before else 0)
-            topics[entry.topic.name] = replace(before or entry, message_count=count)
+            topics[key] = replace(before or entry, message_count=count)
+        foreign: dict[tuple[str, str], ForeignChannel] = {}
+        for other in (other for part in parts for other in part.foreign):
+            seen = foreign.get((other.name, other.reason))
+            count = other.message_count + (seen.message_count if seen else 0)
+            foreign[other.name, other.reason] = replace(other, message_count=count)
         return cls(files=tuple(file for part in parts for file in part.files),
-                   topics=tuple(topics.values()), custom_data=parts[0].custom_data)
+                   topics=tuple(topics.values()), custom_data=parts[0].custom_data,
+                   foreign=tuple(foreign.values()))
 
 
 def _extent(start_ns: int, end_ns: int, message_count: int) -> dict[str, object]:
@@ -167,13 +209,13 @@ def _extent(start_ns: int, end_ns: int, message_count: int) -> dict[str, object]
 def check_custom_data(custom_data: Mapping[str, str]) -> Mapping[str, str]:
     """Return a read-only copy of custom data, which rosbag2 reads as strings only."""
     for key, value in custom_data.items():
-        if not _is_text(key) or not _is_text(value):
+        if not is_text(key) or not is_text(value):
             raise InvalidValueError(f'custom_data[{key!r}]', value,
                                     'a string with a string as its key')
     return MappingProxyType(dict(custom_data))
 
 
-def _is_text(value: object) -> bool:
+def is_text(value: object) -> bool:
     """Return whether a value is a string that UTF-8 can hold."""
     return isinstance(value, str) and value == value.encode(errors='ignore').decode()
 

@@ -11,12 +11,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 import re
-from typing import Any, Final, TypeVar
+from typing import Any, Final, NamedTuple, TypeVar
 
 from flex_planner.base.errors import InvalidValueError
 import yaml
 
 TOPIC_NAME: Final = re.compile(r'(/[A-Za-z_][A-Za-z0-9_]*)+')
+LARGEST_DEPTH: Final = 2**31 - 1  # middlewares count with 32 bits
 TYPE_NAME: Final = re.compile(r'[a-z][a-z0-9_]*/(msg|srv|action)/[A-Z][A-Za-z0-9_]*')
 
 _Policy = TypeVar('_Policy', bound=Enum)
@@ -86,19 +87,31 @@ class QosProfile:
         Return the first profile of ``offered_qos_profiles``, or the default one.
 
         A policy that a bag does not know (rosbag2 finds most of them by discovery, which tells
-        neither the history nor the depth) becomes the default too.
+        neither the history nor the depth) becomes the default too, and so does all of a text
+        that is none of rosbag2's: the messages are good without it.
 
         """
-        profiles = yaml.safe_load(text)
+        profiles = parse_yaml(text)
         if not isinstance(profiles, list) or not profiles or not isinstance(profiles[0], dict):
             return DEFAULT
         first: dict[str, Any] = profiles[0]
-        depth = first.get('depth')
+        depth: Any = first.get('depth')
+        known = type(depth) is int and 0 < depth <= LARGEST_DEPTH
         return cls(
             reliability=_policy(first.get('reliability'), DEFAULT.reliability),
             durability=_policy(first.get('durability'), DEFAULT.durability),
-            depth=depth if isinstance(depth, int) and depth > 0 else DEFAULT.depth,
+            depth=depth if known else DEFAULT.depth,
         )
+
+
+def parse_yaml(text: str | bytes) -> object:
+    """Return what YAML of any writer says, None where it is no YAML."""
+    try:
+        return yaml.safe_load(text)
+    # PyYAML's constructors raise all of these: at !!int x, !!timestamp x, 2020-99-99, [[[[...
+    except (yaml.YAMLError, ValueError, LookupError, AttributeError, TypeError, RecursionError,
+            OverflowError):
+        return None
 
 
 def _infinite() -> dict[str, int]:
@@ -109,7 +122,7 @@ def _infinite() -> dict[str, int]:
 def _policy(value: object, default: _Policy) -> _Policy:
     """Return the policy of that name, or number up to metadata version 8, else the default."""
     members = list(type(default))
-    if isinstance(value, int) and 1 <= value <= len(members):
+    if type(value) is int and 1 <= value <= len(members):
         return members[value - 1]
     return next((member for member in members if member.value == value), default)
 
@@ -144,3 +157,26 @@ class Topic:
             raise InvalidValueError('topic name', self.name, "absolute, e.g. '/planner/plan'")
         if not TYPE_NAME.fullmatch(self.type_name):
             raise InvalidValueError('message type', self.type_name, "like 'package/msg/Name'")
+
+
+class Definition(NamedTuple):
+    """
+    The definition of a message type as a recording carries it.
+
+    Attributes
+    ----------
+    type_name : str
+        Such as ``'trajectory_msgs/msg/JointTrajectory'``.
+    encoding : str
+        Of the text, e.g. ``'ros2msg'``.
+    text : bytes
+        The definition with those of all types within it; empty if unknown.
+    type_hash : str
+        RIHS01 hash (REP-2016); empty if unknown.
+
+    """
+
+    type_name: str
+    encoding: str = ''
+    text: bytes = b''
+    type_hash: str = ''

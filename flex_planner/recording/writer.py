@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, ExitStack
 from operator import index
 from pathlib import Path
-import re
 from typing import Final
 
 from flex_planner.base.errors import InvalidValueError, RecordingError
@@ -14,9 +13,8 @@ from flex_planner.recording.definitions import MessageTypes
 from flex_planner.recording.mcap_file import RecordingFile
 from flex_planner.recording.metadata import check_custom_data, RecordingMetadata
 from flex_planner.recording.staging import os_errors, output_file, staged_folder
-from flex_planner.recording.topics import Topic
+from flex_planner.recording.topics import Definition, Topic
 
-NAME: Final = re.compile(r'[A-Za-z0-9_][A-Za-z0-9_.-]*')  # cannot lead elsewhere or hide
 LARGEST_TIME: Final = 2**63 - 1  # [ns], rosbag2 counts with a signed 64-bit integer
 
 
@@ -48,7 +46,7 @@ class Recording:
         self._types = types
         self._custom_data = custom_data
         self._max_bytes = max_bytes
-        self._topics: dict[str, Topic] = {}
+        self._topics: dict[str, tuple[Topic, Definition]] = {}
         self._attachments: set[str] = set()
         self._last: int | None = None
         self._parts: list[RecordingMetadata] = []
@@ -77,7 +75,8 @@ class Recording:
         folder : path
             Folder of recordings; made if missing.
         name : str
-            Name of the recording: letters, digits, ``_``, ``-`` and ``.``.
+            Name of the recording: a printable file name that does not begin with ``.`` or
+            ``-``.
         types : MessageTypes
             Definitions of the messages.
         custom_data : mapping of str to str, optional
@@ -96,9 +95,9 @@ class Recording:
             write.
 
         """
-        if not NAME.fullmatch(name):
-            raise InvalidValueError('name', name, 'letters, digits and _, and after the first '
-                                    'character - and .')
+        if not may_be_named(name):
+            raise InvalidValueError('name', name, 'a printable file name that does not begin with '
+                                    '. or -')
         if max_bytes is not None and max_bytes < 1:
             raise InvalidValueError('max_bytes', max_bytes, 'at least 1')
         path = Path(folder) / name
@@ -133,17 +132,42 @@ class Recording:
             If the type is unknown or the system refuses to write.
 
         """
-        time = self._check_time(log_time_ns)
-        known = self._topics.get(topic.name, topic)
-        if known != topic:
-            raise InvalidValueError('topic', topic, f'the same as before, {known}')
+        self._check_time(log_time_ns)
+        self._check_topic(topic)
         data = self._types.encode(topic.type_name, message)
+        self.copy(topic, self._definition(topic), data, log_time_ns)
+
+    def copy(self, topic: Topic, definition: Definition, data: bytes, log_time_ns: int) -> None:
+        """
+        Add a message of another recording as it lies in that.
+
+        Parameters
+        ----------
+        topic, definition : Topic, Definition
+            Of the message; the same every time.
+        data : bytes
+            In CDR.
+        log_time_ns : int
+            See `write`.
+
+        Raises
+        ------
+        InvalidValueError, RecordingError
+            See `write`.
+
+        """
+        time = self._check_time(log_time_ns)
+        self._check_topic(topic)
+        known = self._topics.get(topic.name, (topic, definition))
+        if known[1] != definition:
+            raise InvalidValueError(f'definition of {topic.name}', definition.type_name,
+                                    'the same as before')
         with self._writing():
             if self._max_bytes and self._file.size_with(data) > self._max_bytes:
                 self._end_file()
                 self._file = self._begin_file()
-            self._file.write(topic, data, time)
-        self._topics[topic.name], self._last = topic, time
+            self._file.write(topic, definition, data, time)
+        self._topics[topic.name], self._last = known, time
 
     def attach(self, name: str, data: bytes, *, media_type: str, time_ns: int = 0) -> None:
         """
@@ -182,12 +206,25 @@ class Recording:
             raise InvalidValueError('log_time_ns', time, f'>= {self._last}, the last one')
         return time
 
+    def _check_topic(self, topic: Topic) -> None:
+        """Raise if a topic was written otherwise before."""
+        before = self._topics.get(topic.name)
+        if before is not None and before[0] != topic:
+            raise InvalidValueError('topic', topic, f'the same as before, {before[0]}')
+
     def _begin_file(self) -> RecordingFile:
         """Open the next file."""
         name = f'{self.path.name}_{len(self._parts)}.mcap'
         stream = self._open_file.enter_context(output_file(self._stage / name, self.path))
         with os_errors(self.path):
-            return RecordingFile(stream, name, self._types)
+            return RecordingFile(stream, name)
+
+    def _definition(self, topic: Topic) -> Definition:
+        """Return the definition of a topic's type, which takes long to put together."""
+        known = self._topics.get(topic.name)
+        if known is not None and known[0].type_name == topic.type_name:
+            return known[1]
+        return self._types.definition(topic.type_name)
 
     def _end_file(self) -> None:
         """Write metadata and index of the open file and close it."""
@@ -210,6 +247,12 @@ class Recording:
         with os_errors(self.path):
             yield
         self._writable = True
+
+
+def may_be_named(name: str) -> bool:
+    """Return whether a recording may have a name: it cannot lead elsewhere or hide."""
+    return (bool(name) and name.isprintable() and '/' not in name and name[0] not in '.-'
+            and name == name.strip())
 
 
 def _integer_time(field: str, value: int) -> int:

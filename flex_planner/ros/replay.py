@@ -12,7 +12,9 @@ from typing import Any
 
 from flex_planner.base.errors import FlexPlannerError, InvalidValueError, RecordingError
 from flex_planner.recording import (
-    check_definition,
+    check_encoding,
+    Decoder,
+    Definition,
     definition_folder,
     Durability,
     from_time,
@@ -21,10 +23,12 @@ from flex_planner.recording import (
     read_metadata,
     read_serialized,
     Reliability,
+    SerializedMessage,
     TopicSummary,
 )
-from flex_planner.ros.runtime.parameters import declare, parameter_field
+from flex_planner.ros.runtime.parameters import declare
 from flex_planner.ros.runtime.running import CannotGoOnError, run_node
+from flex_planner.ros.settings.fields import parameter_field
 import rclpy
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
@@ -58,8 +62,9 @@ class Replay(Node):  # type: ignore[misc]
     """
     Publishes the messages of a recording, then ends.
 
-    Topics whose types are not installed, or differ, are left out, which is logged. Where the
-    recording cannot be read any further, the node ends with code 1.
+    The topics are those of the recording, as they were remapped then. Those whose types are not
+    installed, or differ, are left out, which is logged, and so is what else cannot be sent. Where
+    the recording cannot be read any further, the node ends with code 1.
 
     Parameters
     ----------
@@ -82,47 +87,90 @@ class Replay(Node):  # type: ignore[misc]
         if self._first_ns > metadata.end_ns:
             raise InvalidValueError('start', self._settings.start, 'at most the duration of the '
                                     f'recording, {metadata.duration_ns * 1e-9:g} s')
+        self._types = MessageTypes.load([definition_folder('flex_planner_interfaces')])
+        self._decoder = Decoder(self._types)
+        self._kinds: dict[str, str] = {}
+        for channel in metadata.foreign:
+            self.get_logger().warning(f'left out: {channel}')
         self._outlets = self._publish_topics(metadata.topics)
         self.get_logger().info(
             f'replaying {self._path}: {len(self._outlets)} topics, '
             f'{(metadata.end_ns - self._first_ns) * 1e-9 / self._settings.rate:.3g} s')
         self._begin = time.monotonic() + self._settings.delay
         self._sent, self._messages = 0, self._passes()
-        self._due, self._send = next(self._messages)
+        self._due, self._send = self._first()
         self._timer = self.create_timer(self._settings.delay, self._on_timer,
                                         clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _publish_topics(self, topics: tuple[TopicSummary, ...]) -> dict[str, Publisher]:
         """Return a publisher for each topic whose type is installed as it was recorded."""
-        types = MessageTypes.load([definition_folder('flex_planner_interfaces')])
         outlets: dict[str, Publisher] = {}
         for entry in topics:
             topic = entry.topic
             try:
-                if topic.type_name in types:
-                    check_definition(self._path, topic, entry.type_hash, types)
+                if topic.name in outlets:
+                    raise RecordingError(f'it has the type {topic.type_name} as well')
                 kind = message_class(topic.type_name)
-            except (ImportError, AttributeError, RecordingError) as error:
+                self._check_definition(entry.definition, kind)
+                outlets[topic.name] = self.create_publisher(kind, topic.name, _profile(topic.qos))
+                self._kinds[topic.name] = topic.type_name
+            except Exception as error:  # also whatever the middleware has against a topic
                 self.get_logger().warning(f'{topic.name} is left out: {error}')
-                continue
-            outlets[topic.name] = self.create_publisher(kind, topic.name, _profile(topic.qos))
         if not outlets:
             raise RecordingError(f'{self._path} holds no messages that could be published')
         return outlets
 
+    def _check_definition(self, definition: Definition, kind: Any) -> None:
+        """Raise RecordingError unless a type is installed as it was recorded."""
+        name = definition.type_name
+        try:
+            types = self._decoder.types_of(definition)
+        except RecordingError:
+            if name in self._types:
+                raise
+            return  # a definition that cannot be read, of a type that is not known here either
+        own = name in self._types and types is not self._types
+        if own or list(types.fields(name)) != list(kind.get_fields_and_field_types()):
+            raise RecordingError(f'{name} was recorded with another definition than the one that '
+                                 'is installed')
+
+    def _first(self) -> tuple[float, partial[None]]:
+        """Return the first message."""
+        first = next(self._messages, None)
+        if first is None:
+            raise RecordingError(f'{self._path} holds no messages that could be published')
+        return first
+
     def _passes(self) -> Iterator[tuple[float, partial[None]]]:
         """Yield the time of each message from the beginning [s], and a call that sends it."""
-        began = 0.0
-        while True:
-            due = began
+        began, sent = 0.0, True
+        while sent:
+            due, sent = began, False
             messages = read_serialized(self._path, self._outlets.keys())
             for entry in from_time(messages, self._first_ns):
+                if not self._can_be_sent(entry):
+                    continue
                 after = (entry.log_time_ns - self._first_ns) * 1e-9
-                due = began + after / self._settings.rate
+                due, sent = began + after / self._settings.rate, True
                 yield due, partial(self._outlets[entry.topic.name].publish, entry.data)
             if not self._settings.loop:
                 return
             began = due + self._settings.delay
+
+    def _can_be_sent(self, message: SerializedMessage) -> bool:
+        """Return whether bytes are a message of their topic: no subscriber must get others."""
+        topic = message.topic
+        if self._kinds[topic.name] != topic.type_name:
+            return False
+        try:
+            check_encoding(message.data)
+            if topic.type_name in self._types:
+                self._decoder.decode(message.definition, message.data)
+        except RecordingError as error:
+            self.get_logger().warning(f'a message of {topic.name} is left out: {error}',
+                                      once=True)
+            return False
+        return True
 
     def _on_timer(self) -> None:
         """Send what is due, then wait for the next message."""
@@ -156,7 +204,9 @@ class Replay(Node):  # type: ignore[misc]
 
 def message_class(type_name: str) -> Any:
     """Return rclpy's class of a type, e.g. of ``sensor_msgs/msg/JointState``."""
-    package, _, name = type_name.split('/')
+    package, kind, name = type_name.split('/')
+    if kind != 'msg':
+        raise RecordingError(f'{type_name} is a part of a service or action')
     return getattr(import_module(f'{package}.msg'), name)
 
 

@@ -171,6 +171,9 @@ def test_a_file_that_is_lost_is_missed(split: Path, types: MessageTypes) -> None
     with pytest.raises(RecordingError, match=f'lacks {files[-1].name}, which its metadata.yaml'):
         list(read_recording(split, types))
     files[0].unlink()
+    with pytest.raises(RecordingError, match=r'lacks plan_0\.mcap'):
+        read_metadata(split)
+    (split / 'metadata.yaml').unlink()
     with pytest.raises(RecordingError, match=r'the parts <name>_0\.mcap, <name>_1\.mcap'):
         read_metadata(split)
 

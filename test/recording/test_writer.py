@@ -117,7 +117,7 @@ def test_recording_without_messages_is_readable(tmp_path: Path, types: MessageTy
 # Refusals
 
 
-@pytest.mark.parametrize('name', ['', '.', '..', '.hidden', 'a/b', '/abs', '-rf', 'a b', 'a\n'])
+@pytest.mark.parametrize('name', ['', '.', '..', '.hidden', 'a/b', '/abs', '-rf', ' a', 'a\n'])
 def test_name_that_could_lead_elsewhere_is_refused(
     tmp_path: Path, types: MessageTypes, name: str
 ) -> None:

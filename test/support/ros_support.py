@@ -7,7 +7,7 @@ Importing this module sets the environment of the tests and of every node that t
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 import importlib
 import itertools
 import os
@@ -196,14 +196,15 @@ class Planner(Client):
     module = 'flex_planner.ros.planner.node'
 
     def __init__(self, folder: Path, arm: str, name: str = 'flex_planner', *,
-                 parameter_file: Path | None = None, **parameters: object) -> None:
+                 parameter_file: Path | None = None,
+                 remappings: Mapping[str, str] | None = None, **parameters: object) -> None:
         super().__init__()
         self.name, self._log = f'/{name}', folder / f'{name}.log'
         self._log.parent.mkdir(parents=True, exist_ok=True)
         self.recordings = folder / 'recordings'
         given = {'arm': arm, 'recording_folder': self.recordings, **parameters}
-        self.process = NodeProcess(self.module, given, {'__node': name}, self._log,
-                                   parameter_file)
+        self.process = NodeProcess(self.module, given, {'__node': name, **(remappings or {})},
+                                   self._log, parameter_file)
 
     def log(self) -> str:
         """Return what the node has said."""

@@ -13,7 +13,7 @@ from ament_index_python.packages import get_package_share_directory
 from catkin_pkg.package import parse_package
 import flex_planner
 from flex_planner.arms.arm_files import load_arm
-from flex_planner.ros.runtime.parameters import as_mapping
+from flex_planner.ros.settings.fields import as_mapping
 from flex_planner.ros.settings.planner import PlannerSettings
 from flex_planner.ros.settings.simulator import SimulatorSettings
 from packaging.requirements import Requirement

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 import sys
 
-from flex_planner.base.errors import RecordingError
-from flex_planner.base.progress import Monitor
+from flex_planner.base.errors import FlexPlannerError, RecordingError
+from flex_planner.base.progress import Monitor, StoppedError
 from flex_planner.base.validation import number
 from flex_planner.cli.options import Commands
 from flex_planner.cli.progress_line import run_with_progress
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.recording import (
     definition_folder,
+    ForeignChannel,
     MessageTypes,
     read_metadata,
     recover_recording,
+    shown_path,
 )
 from flex_planner.reports.motion import table
 from flex_planner.reports.recording import (
@@ -90,6 +93,9 @@ def _replay(options: argparse.Namespace) -> int:
     longest = read_metadata(options.recording).duration_ns * 1e-9
     start = number('--start', options.start, at_least=0, at_most=longest, unit='s')
     delay = number('--delay', options.delay, at_least=0.01, at_most=60, unit='s')
+    if shown_path(options.recording) != str(options.recording):
+        raise RecordingError(f'{shown_path(options.recording)} cannot be replayed: its name is '
+                             'not UTF-8, which ROS needs: rename it')
     try:
         from flex_planner.ros.replay import replay, ReplaySettings
     except ImportError as error:
@@ -103,14 +109,27 @@ def _replay(options: argparse.Namespace) -> int:
 def _report(options: argparse.Namespace) -> int:
     """Make a page of a recording; check its plan if that is wanted."""
     request = RecordedRequest.read(options.recording)
-    check = _check(request) if options.check else None
     output = options.output or Path(
         f'{options.recording.resolve().name.removesuffix(".mcap")}.html')
-    write_report(output, request, check)
+    with _contradictions(request):
+        check = _check(request) if options.check else None
+        write_report(output, request, check)
     rows = [(finding.name, str(finding)) for finding in check.findings] if check else []
-    print(table([('recording', str(request.path)), ('outcome', verdict(request, check)), *rows,
-                 ('report', str(output))]))
+    print(table([('recording', shown_path(request.path)), ('outcome', verdict(request, check)),
+                 *rows, *(('not read', str(channel)) for channel in request.left_out),
+                 ('report', shown_path(output))]))
     return 0 if check is None or check.passed else 1
+
+
+@contextmanager
+def _contradictions(request: RecordedRequest) -> Iterator[None]:
+    """Turn what values raise that do not go together into RecordingError."""
+    try:
+        yield
+    except (FlexPlannerError, StoppedError, OSError):
+        raise
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        raise RecordingError(f'{request.path} contradicts itself: {error}') from error
 
 
 def _check(request: RecordedRequest) -> MotionCheck:
@@ -128,7 +147,9 @@ def _check(request: RecordedRequest) -> MotionCheck:
 def _recover(options: argparse.Namespace) -> int:
     """Save the complete part of a recording."""
     types = MessageTypes.load([definition_folder('flex_planner_interfaces')])
-    path = recover_recording(options.recording, types)
+    left_out: list[ForeignChannel] = []
+    path = recover_recording(options.recording, types, left_out.append)
     print(table([('recovered', f'{read_metadata(path).message_count} messages'),
-                 ('recording', str(path))]))
+                 *(('left out', str(channel)) for channel in left_out),
+                 ('recording', shown_path(path))]))
     return 0

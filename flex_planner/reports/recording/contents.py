@@ -13,16 +13,21 @@ from flex_planner.base.validation import Array
 from flex_planner.control.joint_reference import JointReference
 from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.recording import (
+    Decoder,
+    Definition,
     definition_folder,
+    ForeignChannel,
     MessageTypes,
+    parse_yaml,
     read_attachments,
     read_metadata,
     read_recording,
+    StandIns,
 )
 import numpy as np
-import yaml
 
-_TYPES = 'flex_planner_interfaces/msg/'
+_PACKAGE = 'flex_planner_interfaces'
+_TYPES = f'{_PACKAGE}/msg/'
 _WANTED = ('MotionTask', 'PlanReport', 'PayloadSearch', 'FlexibleTrajectory')
 
 
@@ -92,6 +97,34 @@ class RecordedMotion:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Messages:
+    """The messages of a request by the names of their types, and what else there is."""
+
+    messages: Mapping[str, Any]
+    left_out: tuple[ForeignChannel, ...]
+
+    @classmethod
+    def read(cls, path: Path | str) -> _Messages:
+        """Read them; a message of an older planner is completed by defaults."""
+        types = MessageTypes.load([definition_folder(_PACKAGE)])
+        metadata, decoder, stand_ins = read_metadata(path), Decoder(types), StandIns(types)
+        definitions: dict[str, Definition] = {
+            entry.topic.name: entry.definition for entry in metadata.topics
+            if entry.topic.type_name in {f'{_TYPES}{name}' for name in _WANTED}}
+        left_out, messages = list(metadata.foreign), {}
+        for entry in read_recording(path, types, definitions, left_out.append):
+            own = decoder.types_of(definitions[entry.topic.name])
+            name = entry.topic.type_name
+            messages[name.removeprefix(_TYPES)] = entry.message if own is types else (
+                stand_ins.complete(entry.message, own, name))
+        if 'MotionTask' not in messages or 'PlanReport' not in messages:
+            others = ''.join(f'; {channel} ' for channel in left_out).rstrip()
+            raise RecordingError(f'{path} is not the recording of a request: it has no MotionTask '
+                                 f'with a PlanReport{others}')
+        return cls(messages=messages, left_out=tuple(left_out))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RecordedRequest:
     """
     A request with its outcome, as it was recorded.
@@ -112,6 +145,8 @@ class RecordedRequest:
         As the arm's controller knows them.
     motion : RecordedMotion or None
         None where there is no plan.
+    left_out : tuple of ForeignChannel
+        What the recording holds besides, or what of it cannot be read.
 
     """
 
@@ -123,6 +158,7 @@ class RecordedRequest:
     search: Any | None
     joint_names: tuple[str, ...]
     motion: RecordedMotion | None
+    left_out: tuple[ForeignChannel, ...] = ()
 
     @classmethod
     def read(cls, path: Path | str) -> RecordedRequest:
@@ -135,25 +171,32 @@ class RecordedRequest:
             If it cannot be read, or is not what the planner records.
 
         """
-        types = MessageTypes.load([definition_folder('flex_planner_interfaces')])
+        found = _Messages.read(path)
+        trajectory = found.messages.get('FlexibleTrajectory')
         scenario = _scenario(path)
-        found = {entry.topic.type_name.removeprefix(_TYPES): entry.message
-                 for entry in read_recording(path, types, _topics(path))}
-        if 'MotionTask' not in found or 'PlanReport' not in found:
-            raise RecordingError(f'{path} is not the recording of a request: it has no MotionTask '
-                                 'with a PlanReport')
-        trajectory = found.get('FlexibleTrajectory')
         try:
             arm = arm_from_scenario(scenario['arm'])
             settings = dict(scenario['parameters'])
             motion = RecordedMotion.of(trajectory) if trajectory else None
             if motion is not None:
                 _check_sizes(arm, motion)
-            return cls(path=Path(path), arm=arm, settings=settings, task=found['MotionTask'],
-                       report=found['PlanReport'], search=found.get('PayloadSearch'),
-                       joint_names=tuple(settings['joint_names']), motion=motion)
-        except (FlexPlannerError, LookupError, TypeError, ValueError) as error:
+            request = cls(
+                path=Path(path), arm=arm, settings=settings, task=found.messages['MotionTask'],
+                report=found.messages['PlanReport'], search=found.messages.get('PayloadSearch'),
+                motion=motion, joint_names=_joint_names(settings, arm), left_out=found.left_out)
+            request._check()
+            return request
+        except (FlexPlannerError, AttributeError, LookupError, OverflowError, TypeError,
+                ValueError) as error:
             raise RecordingError(f'{path} contradicts itself: {error}') from error
+
+    def _check(self) -> None:
+        """Raise one of many exceptions unless what is derived from the messages can be."""
+        tolerance = self.tolerance
+        if self.motion is not None and not tolerance >= 0:
+            raise ValueError(f'the tolerance is {tolerance}')
+        if self.motion is not None:
+            self.parameters  # noqa: B018 - refuses what is out of bounds
 
     @property
     def solved(self) -> bool:
@@ -205,20 +248,18 @@ def _scenario(path: Path | str) -> Mapping[str, Any]:
     attached = read_attachments(path).get('scenario.yaml')
     if attached is None:
         raise RecordingError(f'{path} is not the recording of a request: it has no scenario.yaml')
-    try:
-        scenario = yaml.safe_load(attached)
-    except yaml.YAMLError as error:
-        raise RecordingError(f'{path} has a scenario.yaml that is not YAML: {error}') from error
+    scenario = parse_yaml(attached)
     if not isinstance(scenario, Mapping):
-        raise RecordingError(f'{path} has a scenario.yaml without arm and parameters')
+        raise RecordingError(f'{path} has a scenario.yaml that is no YAML with arm and parameters')
     return scenario
 
 
-def _topics(path: Path | str) -> list[str]:
-    """Return the names of the topics with the request and its outcome."""
-    wanted = {f'{_TYPES}{name}' for name in _WANTED}
-    return [entry.topic.name for entry in read_metadata(path).topics
-            if entry.topic.type_name in wanted]
+def _joint_names(settings: Mapping[str, Any], arm: Arm) -> tuple[str, ...]:
+    """Return the names of the joints, made up where they are not those of the arm."""
+    names = settings.get('joint_names')
+    if isinstance(names, list) and len(names) == arm.n_joints:
+        return tuple(map(str, names))
+    return tuple(f'joint{i}' for i in range(1, arm.n_joints + 1))
 
 
 def _rows(points: Sequence[Any], field: str) -> Array:

@@ -59,4 +59,4 @@ def recorded_robustness(request: RecordedRequest) -> Robustness | None:
 
 def _is_told(request: RecordedRequest) -> bool:
     """Return whether the recording knows of a controller, as older ones do not."""
-    return bool(getattr(request.report, 'controller_rate', 0.0))
+    return bool(request.report.controller_rate)

@@ -20,6 +20,7 @@ from typing import Any
 from flex_planner.base.errors import RecordingError
 from flex_planner.base.validation import Array
 from flex_planner.base.version import VERSION
+from flex_planner.recording import shown_path
 from flex_planner.reports.recording.contents import RecordedRequest
 from flex_planner.reports.recording.findings import MotionCheck
 from flex_planner.reports.recording.frequencies import NaturalFrequencies
@@ -40,7 +41,7 @@ def report_page(request: RecordedRequest, check: MotionCheck | None = None) -> s
     kind = 'find_max_payload' if request.search is not None else 'plan_path'
     return template.substitute(
         title=escape(f'{kind}: {request.arm.name}'), kind='' if passed else 'failed',
-        file=escape(f'{request.path.name}, report of flex_planner {VERSION}'),
+        file=escape(f'{shown_path(request.path.name)}, report of flex_planner {VERSION}'),
         verdict=escape(verdict(request, check)), hidden='' if drawn else 'hidden',
         data=_json(_content(tables(request, check, frequencies), drawn)),
         script=(_FOLDER / 'plots.js').read_text(encoding='utf-8'))

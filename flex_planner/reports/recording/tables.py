@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
+from itertools import zip_longest
 from typing import Any
 
 from flex_planner.arms.arm import Arm, Joint
@@ -72,7 +73,7 @@ def tables(request: RecordedRequest, check: MotionCheck | None = None,
         found += [_search(request.search), *_trials(request.search)]
     if len(request.report.tried_weights):
         found.append(_objectives(request.report))
-    return [*found, *_arm(request.arm), _settings(request)]
+    return [*found, *_arm(request.arm), _settings(request), *_left_out(request)]
 
 
 def check_table(check: MotionCheck) -> ReportTable:
@@ -99,7 +100,7 @@ def _task(request: RecordedRequest) -> ReportTable:
             ('weights W1', numbers(task.position_weights)),
             ('weights W2', numbers(task.velocity_weights)),
             ('tolerance, eq. (17)', f'{request.tolerance:g}')]
-    if getattr(task, 'allow_large_bending', False):  # older recordings do not have it
+    if task.allow_large_bending:
         rows.append(('large bending', 'allowed'))
     for name in ('start_velocities', 'start_modal_displacements'):
         if np.any(getattr(task, name)):
@@ -127,7 +128,7 @@ def _outcome(request: RecordedRequest) -> ReportTable:
         rows.append(('error', report.error_msg))
     rows += [('planned in', f'{seconds:.3f} s'), ('strategy', report.strategy or '–'),
              ('iterations', str(report.iterations)), ('intervals', str(report.mesh_intervals))]
-    if getattr(report, 'map_cell', ''):  # older recordings do not have it
+    if report.map_cell:
         rows.append(('started from', report.map_cell))
     if request.motion is not None:
         rows += [('payload', f'{request.motion.payload_mass:.6g} kg'),
@@ -140,22 +141,23 @@ def _outcome(request: RecordedRequest) -> ReportTable:
 def _kinds(request: RecordedRequest) -> list[ReportTable]:
     """Return the kinds of motion that were met; older recordings have none."""
     report = request.report
-    values = getattr(report, 'kind_values', ())
+    values = report.kind_values
     if not len(values):
         return []
-    rows = zip(values, report.kind_sentences, report.kind_counts, strict=True)
+    rows = _side_by_side(values, report.kind_sentences, report.kind_counts)
     unit = 'J' if request.search is None else 'payload [kg]'
     return [ReportTable(
         title=f'Kinds of motion, from {report.kind_starts} starts',
         columns=(unit, 'how it moves', 'met'),
-        rows=tuple((f'{value:.6g}', words, str(count)) for value, words, count in rows))]
+        rows=tuple((f'{value:.6g}', str(words), str(count)) for value, words, count in rows))]
 
 
 def _warnings(report: Any) -> list[ReportTable]:
     """Return what is to be known of the plan; none where there is nothing."""
-    kinds = getattr(report, 'warning_kinds', ())  # older recordings do not have them
-    rows = tuple((WarningKind[kind].value if kind in WarningKind.__members__ else kind, sentence)
-                 for kind, sentence in zip(kinds, getattr(report, 'warnings', ()), strict=True))
+    kinds = getattr(report, 'warning_kinds', ())  # older reports do not have them
+    told = _side_by_side(kinds, getattr(report, 'warnings', ()))
+    rows = tuple((WarningKind[kind].value if kind in WarningKind.__members__ else str(kind),
+                  str(sentence)) for kind, sentence in told)
     return [ReportTable(title='Warnings', rows=rows)] if rows else []
 
 
@@ -189,10 +191,10 @@ def _execution(request: RecordedRequest) -> list[ReportTable]:
 def _joints(request: RecordedRequest) -> ReportTable:
     """Return the peak torques and speeds of the motors."""
     report, n = request.report, request.arm.n_joints
-    shares = report.peak_speed_shares if len(report.peak_speed_shares) else np.full(n, np.nan)
-    saturation = report.saturation if len(report.saturation) else np.full(n, np.nan)
-    rows = zip(request.joint_names, report.peak_torques, report.peak_torque_shares,
-               report.peak_speeds, shares, saturation, strict=True)
+    columns = [values if len(values) == n else np.full(n, np.nan) for values in (
+        report.peak_torques, report.peak_torque_shares, report.peak_speeds,
+        report.peak_speed_shares, report.saturation)]
+    rows = zip(request.joint_names, *columns, strict=True)
     return ReportTable(
         title='Motors', columns=('', 'peak torque', 'of its limit', 'peak speed',
                                  'of no-load speed', 'time on its limit'),
@@ -219,7 +221,7 @@ def _search(search: Any) -> ReportTable:
         ('largest payload', f'{search.payload:.6g} kg'),
         ('this kind of motion ends at' if search.method == search.DIRECT
          else 'no motion was found with', f'{search.payload_upper:.6g} kg'),
-        ('proved', getattr(search, 'proof', '') or '–'),
+        ('proved', search.proof or '–'),
         ('accuracy asked for', f'{search.payload_accuracy:g} kg'),
         ('limiting joint', '–' if search.limiting_joint < 0 else
          f'{search.limiting_joint + 1}{", which can hold no more" if search.held else ""}')))
@@ -229,13 +231,13 @@ def _trials(search: Any) -> list[ReportTable]:
     """Return the payloads that the search solved or tried."""
     found = []
     if len(search.front_payloads):
-        front = zip(search.front_payloads, search.front_efforts, search.front_prices, strict=True)
+        front = _side_by_side(search.front_payloads, search.front_efforts, search.front_prices)
         found.append(ReportTable(title='Effort and price of each payload',
                                  columns=('payload [kg]', 'J [N²m²s]', 'dJ/dm [N²m²s/kg]'),
                                  rows=tuple(_cells(row) for row in front)))
     if len(search.tried_payloads):
-        tried = zip(search.tried_payloads, search.tried_solved, search.tried_errors, strict=True)
-        rows = ((f'{payload:.6g}', 'yes' if solved else 'no', f'{error:.2g}')
+        tried = _side_by_side(search.tried_payloads, search.tried_solved, search.tried_errors)
+        rows = ((f'{payload:.6g}', 'yes' if solved == 1 else 'no', f'{error:.2g}')
                 for payload, solved, error in tried)
         found.append(ReportTable(title='Payloads tried', rows=tuple(rows),
                                  columns=('payload [kg]', 'carried', 'boundary error')))
@@ -244,10 +246,10 @@ def _trials(search: Any) -> list[ReportTable]:
 
 def _objectives(report: Any) -> ReportTable:
     """Return the weights tried for the objectives."""
-    tried = zip(report.tried_objectives, report.tried_weights, report.tried_shares, strict=True)
+    tried = _side_by_side(report.tried_objectives, report.tried_weights, report.tried_shares)
     return ReportTable(title='Weights tried for the objectives',
                        columns=('objective', 'weight', 'share of the limit'),
-                       rows=tuple((name, f'{weight:.5g}', f'{share:.4f}')
+                       rows=tuple((str(name), f'{weight:.5g}', f'{share:.4f}')
                                   for name, weight, share in tried))
 
 
@@ -277,12 +279,25 @@ def _angles(joint: Joint) -> str:
     return ' to '.join(f'{angle:.4g}' for angle in np.degrees(limits))
 
 
+def _left_out(request: RecordedRequest) -> list[ReportTable]:
+    """Return what the recording holds besides, if there is anything."""
+    rows = tuple((channel.name, str(channel.message_count), channel.reason)
+                 for channel in request.left_out)
+    return [ReportTable(title='Not read', columns=('topic', 'messages', ''), rows=rows)
+            ] if rows else []
+
+
 def _settings(request: RecordedRequest) -> ReportTable:
     """Return the planner's parameters."""
     return ReportTable(title='Parameters of the planner', rows=tuple(
         (name, ', '.join(map(str, value)) if isinstance(value, Sequence)
          and not isinstance(value, str) else str(value))
         for name, value in request.settings.items()))
+
+
+def _side_by_side(*columns: Sequence[Any]) -> Iterable[tuple[Any, ...]]:
+    """Return rows; where a column is shorter, as older planners have it, there is no number."""
+    return zip_longest(*columns, fillvalue=np.nan)
 
 
 def _percent(share: float) -> str:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.validation import number
 from flex_planner.capacity.results import MaxPayload, PayloadMethod
 from flex_planner.optimal_control.task import MAX_PAYLOAD
+from flex_planner.ros.messages.classes import PayloadSearch, PlanReport
 from flex_planner.ros.messages.plans import (
     add_kinds,
     add_warnings,
@@ -16,8 +18,9 @@ from flex_planner.ros.messages.plans import (
     STATUS_CODES,
 )
 from flex_planner.ros.settings.planner import MAX_ACCURACY, MIN_ACCURACY, PlannerSettings
-from flex_planner_interfaces.msg import PayloadSearch, PlanReport
-from flex_planner_interfaces.srv import FindMaxPayload
+
+if TYPE_CHECKING:
+    from flex_planner_interfaces.srv import FindMaxPayload
 
 METHODS = {PayloadSearch.DIRECT: PayloadMethod.DIRECT,
            PayloadSearch.INCREMENTAL: PayloadMethod.INCREMENTAL}

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from builtin_interfaces.msg import Duration
 from flex_planner.arms.arm import Arm
 from flex_planner.base.errors import (
     FlexPlannerError,
@@ -26,17 +25,19 @@ from flex_planner.planning.plan import peaks, Plan, PlanStatus, Samples
 from flex_planner.planning.robustness import robustness_warnings
 from flex_planner.planning.sampling import SampledPlan
 from flex_planner.planning.warnings import PlanWarning
-from flex_planner.ros.settings.planner import PlannerSettings
-from flex_planner_interfaces.msg import (
+from flex_planner.ros.messages.classes import (
+    Duration,
     FlexiblePoint,
     FlexibleTrajectory,
+    JointState,
+    JointTrajectory,
+    JointTrajectoryPoint,
     MotionTask,
     PlanReport,
+    Point,
 )
-from geometry_msgs.msg import Point
+from flex_planner.ros.settings.planner import PlannerSettings
 import numpy as np
-from sensor_msgs.msg import JointState
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 ERROR_CODES: tuple[tuple[type[FlexPlannerError], int], ...] = (
     (InvalidSizeError, PlanReport.INVALID_SIZE),

@@ -8,6 +8,7 @@ from pathlib import Path
 import time
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from flex_planner.planning.warnings import WarningKind
 from flex_planner.ros.planner.request_queue import RequestQueue
 from flex_planner.ros.planner.streamer import Streamer
 from flex_planner_interfaces.msg import PlanReport
@@ -32,6 +33,8 @@ class Record:
         How many.
     error_code, error_msg
         Of the last that was not canceled; 0 and empty if it was solved.
+    not_recorded : str
+        Why the last has no recording; empty if it has, or needs none.
 
     """
 
@@ -40,10 +43,13 @@ class Record:
     canceled: int = 0
     error_code: int = 0
     error_msg: str = ''
+    not_recorded: str = ''
     started: float = field(default_factory=time.monotonic)
 
     def add(self, report: PlanReport) -> None:
         """Count a request."""
+        told = dict(zip(report.warning_kinds, report.warnings, strict=False))
+        self.not_recorded = told.get(WarningKind.NOT_RECORDED.name, '')
         if report.error_code == PlanReport.CANCELED:
             self.canceled += 1
             return
@@ -58,9 +64,9 @@ class Diagnostics:
     """
     Publishes the status of the planner and of its stream once a second.
 
-    planner: OK; WARN if the last request failed; ERROR if it failed for a reason inside the node,
-    which are RECORDING_FAILED and UNKNOWN. reference states: ERROR while the process that streams
-    them is gone, else OK.
+    planner: OK; WARN if the last request failed or could not be recorded; ERROR if it failed for
+    a reason inside the node, which are RECORDING_FAILED and UNKNOWN. reference states: ERROR while
+    the process that streams them is gone, else OK.
 
     Parameters
     ----------
@@ -105,16 +111,16 @@ class Diagnostics:
             hardware_id=self._arm)
 
     def _level(self) -> bytes:
-        code = self._record.error_code
+        code, warned = self._record.error_code, self._record.not_recorded
         level: bytes = (DiagnosticStatus.ERROR if code in _BROKEN
-                        else DiagnosticStatus.WARN if code else DiagnosticStatus.OK)
+                        else DiagnosticStatus.WARN if code or warned else DiagnosticStatus.OK)
         return level
 
     def _message(self) -> str:
         state, record = self._state(), self._record
         if record.error_code:
             return f'{state}; the last request failed: {record.error_msg}'
-        return state
+        return f'{state}; {record.not_recorded}' if record.not_recorded else state
 
     def _state(self) -> str:
         active = self._queue.active

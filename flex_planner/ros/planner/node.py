@@ -5,9 +5,11 @@ from __future__ import annotations
 import sys
 from typing import Any
 
+from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.processes import helper_processes
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.planning.robustness import prepare_robustness
+from flex_planner.ros.messages.classes import WHY_NOT_ROS
 from flex_planner.ros.messages.markers import motion_markers
 from flex_planner.ros.messages.plans import duration_seconds
 from flex_planner.ros.planner.diagnostics import Diagnostics, Record
@@ -67,6 +69,8 @@ class PlannerNode(Node):  # type: ignore[misc]
     """
 
     def __init__(self) -> None:
+        if WHY_NOT_ROS:
+            raise FlexPlannerError(WHY_NOT_ROS)
         super().__init__('flex_planner')
         helper_processes()  # what the environment says is refused at once
         arm = declare_arm(self)
@@ -81,7 +85,7 @@ class PlannerNode(Node):  # type: ignore[misc]
             self.get_logger().info(f'requests may start from {len(starts)} motions of '
                                    f'{self._settings.map_store}')
         self._planner = RequestPlanner(
-            ArmModel(arm), OutcomeRecorder(arm, self.get_fully_qualified_name()), starts)
+            ArmModel(arm), OutcomeRecorder(arm, self.resolve_topic_name), starts)
         prepare_robustness(arm)
         self._queue = RequestQueue(self._settings.queue_length)
         self._joints = self.create_publisher(JointTrajectory, '~/joint_trajectory', LATCHED)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from flex_planner.base.progress import StopReason
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.sampling import SampledPlan
+from flex_planner.ros.messages.classes import FlexibleTrajectory, PayloadSearch, PlanReport
 from flex_planner.ros.messages.plans import duration_message, failure_report
 from flex_planner.ros.planner.request_state import RequestState
-from flex_planner_interfaces.msg import FlexibleTrajectory, PayloadSearch, PlanReport
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from datetime import datetime, timezone
 import itertools
+import logging
 from pathlib import Path
+import re
+from typing import Final
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import plain_arm
@@ -14,19 +18,24 @@ from flex_planner.planning.plan import Plan
 from flex_planner.planning.sampling import SampledPlan
 from flex_planner.recording import (
     DEFAULT,
-    definition_folder,
+    find_recordings,
     LATCHED,
-    MessageTypes,
     Recording,
+    remove_oldest,
     Topic,
 )
+from flex_planner.ros.messages.classes import MotionTask, PayloadSearch, TYPES
 from flex_planner.ros.messages.plans import reference_state
 from flex_planner.ros.planner.outcome import Outcome
 from flex_planner.ros.planner.request_state import RequestState
-from flex_planner.ros.runtime.parameters import as_mapping
+from flex_planner.ros.settings.fields import as_mapping
 from flex_planner.ros.settings.planner import PlannerSettings
-from flex_planner_interfaces.msg import MotionTask, PayloadSearch
 import yaml
+
+# the groups sort by the time of the request
+NAME: Final = re.compile(r'(?:plan_path|find_max_payload)_(\d{8}T\d{6}_\d{9})_(\d{4,})')
+
+_LOG = logging.getLogger(__name__)
 
 
 class OutcomeRecorder:
@@ -40,24 +49,28 @@ class OutcomeRecorder:
     ----------
     arm : Arm
         Described in an attachment.
-    namespace : str
-        Full name of the node, which the topics start with.
+    names : str or callable
+        Full name of the node, which the topics start with; or what returns the name of a topic,
+        as it may be remapped, given that in the node.
 
     """
 
-    def __init__(self, arm: Arm, namespace: str) -> None:
+    def __init__(self, arm: Arm, names: str | Callable[[str], str]) -> None:
         self._arm = arm
-        self._types = MessageTypes.load([definition_folder('flex_planner_interfaces')])
+
+        def name(topic: str) -> str:
+            return f'{names}/{topic}' if isinstance(names, str) else names(f'~/{topic}')
+
         self._numbers = itertools.count(1)
         interfaces = 'flex_planner_interfaces/msg/'
-        self._task = Topic(f'{namespace}/motion_task', f'{interfaces}MotionTask')
-        self._report = Topic(f'{namespace}/plan_report', f'{interfaces}PlanReport')
-        self._search = Topic(f'{namespace}/payload_search', f'{interfaces}PayloadSearch')
-        self._joints = Topic(f'{namespace}/joint_trajectory',
+        self._task = Topic(name('motion_task'), f'{interfaces}MotionTask')
+        self._report = Topic(name('plan_report'), f'{interfaces}PlanReport')
+        self._search = Topic(name('payload_search'), f'{interfaces}PayloadSearch')
+        self._joints = Topic(name('joint_trajectory'),
                              'trajectory_msgs/msg/JointTrajectory', LATCHED)
-        self._flexible = Topic(f'{namespace}/flexible_trajectory',
+        self._flexible = Topic(name('flexible_trajectory'),
                                f'{interfaces}FlexibleTrajectory', LATCHED)
-        self._states = Topic(f'{namespace}/reference_states', 'sensor_msgs/msg/JointState',
+        self._states = Topic(name('reference_states'), 'sensor_msgs/msg/JointState',
                              DEFAULT)
 
     def write(self, task: MotionTask, state: RequestState, outcome: Outcome) -> Path:
@@ -85,7 +98,7 @@ class OutcomeRecorder:
         ready = stamp + report.planning_time.sec * 10**9 + report.planning_time.nanosec
         path = settings.output_folder() / self._name(stamp, outcome.search)
         report.recording = str(path)
-        with Recording.create(path.parent, path.name, self._types,
+        with Recording.create(path.parent, path.name, TYPES,
                               custom_data={'flex_planner': VERSION},
                               max_bytes=settings.max_recording_size or None) as recording:
             recording.attach('scenario.yaml', self._scenario(settings).encode(),
@@ -98,6 +111,7 @@ class OutcomeRecorder:
                 recording.write(self._joints, outcome.trajectory.joint_trajectory, ready)
                 recording.write(self._flexible, outcome.trajectory, ready)
                 self._write_states(recording, state, outcome.plan, outcome.reference, ready)
+        _remove_old(settings, path)
         return path
 
     def _write_states(self, recording: Recording, state: RequestState, plan: Plan,
@@ -123,3 +137,21 @@ class OutcomeRecorder:
         text: str = yaml.safe_dump({'arm': plain_arm(self._arm),
                                     'parameters': dict(as_mapping(settings))}, sort_keys=False)
         return text
+
+
+def _remove_old(settings: PlannerSettings, newest: Path) -> None:
+    """Remove recordings beyond the bounds of the parameters, which is logged."""
+    most, most_bytes = settings.max_recordings, settings.max_total_recording_size
+    if not most and not most_bytes:
+        return
+    try:
+        removed = remove_oldest(find_recordings(newest.parent, NAME), newest, most=most,
+                                most_bytes=most_bytes)
+    except OSError as error:
+        _LOG.warning('an old recording cannot be removed: %s', error)
+        return
+    bounds = [text for bound, text in ((most, f'max_recordings is {most}'), (
+        most_bytes, f'max_total_recording_size is {most_bytes} bytes')) if bound]
+    for recording in removed:
+        _LOG.info('removed the recording %s of %d bytes: %s', recording.path, recording.size,
+                  ', '.join(bounds))

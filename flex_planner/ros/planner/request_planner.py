@@ -9,7 +9,7 @@ from pathlib import Path
 import shutil
 
 from flex_planner.base.errors import FlexPlannerError, InvalidTaskError
-from flex_planner.base.progress import Monitor, StoppedError
+from flex_planner.base.progress import Monitor, StoppedError, StopReason
 from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.task import Task
@@ -18,6 +18,7 @@ from flex_planner.planning.plan_path import plan_kind
 from flex_planner.planning.robustness import assess_robustness
 from flex_planner.planning.sampling import judge_execution, sample_plan
 from flex_planner.planning.strategies.initial_guesses import WARM_START
+from flex_planner.planning.warnings import WarningKind
 from flex_planner.ros.messages.payload_searches import (
     report_from_search,
     search_message,
@@ -145,6 +146,8 @@ class RequestPlanner:
                   state: RequestState, search: PayloadSearch | None = None) -> Outcome:
         """Do the work of a request and record its outcome, with `search` where it failed."""
         try:
+            if state.withdrawn:  # while it waited: only to be recorded
+                raise StoppedError(StopReason.CANCELED)
             state.report(replace(state.progress, phase='start'))
             task = task_from_message(message, self._model.arm, state.settings)
             monitor = Monitor(time_limit=planning_time_limit(message, state.settings),
@@ -162,7 +165,7 @@ class RequestPlanner:
         return self._record(message, state, outcome)
 
     def _record(self, message: MotionTask, state: RequestState, outcome: Outcome) -> Outcome:
-        """Record an outcome; a plan that cannot be recorded is a failure with a trajectory."""
+        """Record an outcome; one that cannot be recorded has a warning, or is a failure."""
         # a node that ends has no time to record what it gave up
         given_up = outcome.report.error_code == PlanReport.CANCELED and state.stopping()
         if not state.settings.record or given_up:
@@ -173,16 +176,24 @@ class RequestPlanner:
         except Exception as error:
             expected = isinstance(error, FlexPlannerError)
             _LOG.error('recording failed: %s', error, exc_info=not expected)
-            outcome.report.recording = ''
-            if outcome.report.error_code != PlanReport.NONE:
-                return outcome
-            outcome.report.error_code = PlanReport.RECORDING_FAILED
-            outcome.report.error_msg = f'the plan could not be recorded: {error}'
+            _say_not_recorded(outcome.report, error, state)
             return outcome
         finally:
             self._report_in_work = None
         outcome.report.recording = str(path)
         return outcome
+
+
+def _say_not_recorded(report: PlanReport, error: Exception, state: RequestState) -> None:
+    """Add to a report that there is no recording, which may make it a failure."""
+    report.recording = ''
+    required = state.settings.recording_required or state.stopping()
+    if required and report.error_code == PlanReport.NONE:
+        report.error_code = PlanReport.RECORDING_FAILED
+        report.error_msg = f'the plan could not be recorded: {error}'
+        return
+    report.warning_kinds = [*report.warning_kinds, WarningKind.NOT_RECORDED.name]
+    report.warnings = [*report.warnings, f'the request could not be recorded: {error}']
 
 
 def _outcome(report: PlanReport, plan: Plan | None, settings: PlannerSettings,

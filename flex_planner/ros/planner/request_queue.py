@@ -101,10 +101,11 @@ class RequestQueue:
         """
         Cancel a request and conclude it at once.
 
-        A solver that works on it stops at its next iteration.
+        A solver that works on it stops at its next iteration. One that waits gives its place to
+        others; its work is still called, which sees that it is canceled, and records that.
 
         """
-        pending.state.withdrawn = True
+        pending.state.withdraw()
         if pending.job is not None:
             self._worker.withdraw(pending.job)
         pending.conclude(canceled_outcome(pending.state))

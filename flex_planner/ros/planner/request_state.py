@@ -37,6 +37,8 @@ class RequestState:
         The latest.
     withdrawn : bool
         Whether the client has canceled it.
+    ended_ns : int or None
+        When that was, by the monotonic clock [ns].
 
     """
 
@@ -46,11 +48,17 @@ class RequestState:
     stamp_ns: int = field(default_factory=time.time_ns)
     progress: Progress = _WAITING
     withdrawn: bool = False
+    ended_ns: int | None = None
 
     @property
     def elapsed_ns(self) -> int:
-        """Time since it was accepted [ns]."""
-        return time.monotonic_ns() - self.accepted_ns
+        """Time since it was accepted, until it was canceled if it was [ns]."""
+        now = time.monotonic_ns() if self.ended_ns is None else self.ended_ns
+        return now - self.accepted_ns
+
+    def withdraw(self) -> None:
+        """Let it be canceled by its client from now on."""
+        self.ended_ns, self.withdrawn = time.monotonic_ns(), True
 
     def is_canceled(self) -> bool:
         """Return whether to stop working on it."""

@@ -11,6 +11,8 @@ from flex_planner.base.processes import return_memory
 
 Job = Callable[[], None]
 
+_MOST_WITHDRAWN = 1000  # whoever sends and cancels without end must not fill the memory
+
 _LOG = logging.getLogger(__name__)
 
 
@@ -28,6 +30,7 @@ class Worker:
     def __init__(self, queue_length: int) -> None:
         self._queue_length = queue_length
         self._jobs: deque[Job] = deque()
+        self._withdrawn: deque[Job] = deque()
         self._changed = threading.Condition()
         self._stopping = False
         # a daemon: should a job not listen, the process still ends
@@ -54,11 +57,22 @@ class Worker:
         return True
 
     def withdraw(self, job: Job) -> bool:
-        """Drop a job that still waits; return False if it does not."""
+        """
+        Let a job that still waits give its place to others; return False if it does not.
+
+        It runs before all others, to note its end.
+
+        """
         with self._changed:
             if job not in self._jobs:
                 return False
             self._jobs.remove(job)
+            if len(self._withdrawn) < _MOST_WITHDRAWN:
+                self._withdrawn.append(job)
+                self._changed.notify()
+                return True
+        _LOG.warning('more than %d requests are canceled and not recorded yet: one will not be',
+                     _MOST_WITHDRAWN)
         return True
 
     def stop(self, timeout: float) -> bool:
@@ -72,8 +86,10 @@ class Worker:
     def _next(self) -> Job | None:
         """Wait for a job; None when the worker stops."""
         with self._changed:
-            self._changed.wait_for(lambda: self._stopping or self._jobs)
-            return None if self._stopping else self._jobs.popleft()
+            self._changed.wait_for(lambda: self._stopping or self._withdrawn or self._jobs)
+            if self._stopping:
+                return None
+            return (self._withdrawn or self._jobs).popleft()
 
     def _run(self) -> None:
         while (job := self._next()) is not None:

@@ -1,14 +1,14 @@
-"""Node parameters declared from a dataclass: description, range and flag in one place."""
+"""Node parameters declared from a dataclass, see `flex_planner.ros.settings.fields`."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import fields, replace
 from typing import Any, TypeVar
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import load_arm
 from flex_planner.base.errors import FlexPlannerError, InvalidValueError
+from flex_planner.ros.settings.fields import Description
 from rcl_interfaces.msg import (
     FloatingPointRange,
     IntegerRange,
@@ -21,39 +21,6 @@ from rclpy.parameter import Parameter
 Settings = TypeVar('Settings')
 
 _DEFAULT_ARM = 'korayem_ei50'
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Description:
-    """Purpose and range of a parameter."""
-
-    text: str
-    lowest: float | None = None
-    highest: float | None = None
-    read_only: bool = False
-
-    def descriptor(self, value: object) -> ParameterDescriptor:
-        """Return the descriptor of a parameter with such a value."""
-        descriptor = ParameterDescriptor(description=self.text, read_only=self.read_only)
-        if self.lowest is None or self.highest is None:
-            return descriptor
-        if isinstance(value, int):
-            descriptor.integer_range = [IntegerRange(
-                from_value=int(self.lowest), to_value=int(self.highest), step=0)]
-        else:
-            descriptor.floating_point_range = [FloatingPointRange(
-                from_value=float(self.lowest), to_value=float(self.highest), step=0.0)]
-        return descriptor
-
-
-def parameter_field(default: Any, text: str, *, lowest: float | None = None,
-                    highest: float | None = None, read_only: bool = False) -> Any:
-    """Return a dataclass field that is a parameter."""
-    description = Description(text=text, lowest=lowest, highest=highest, read_only=read_only)
-    metadata = {'description': description}
-    if isinstance(default, list):
-        return field(default_factory=lambda: list(default), metadata=metadata)
-    return field(default=default, metadata=metadata)
 
 
 def declare(node: Node, settings: Settings) -> Settings:
@@ -83,7 +50,7 @@ def declare(node: Node, settings: Settings) -> Settings:
         default = getattr(settings, entry.name)
         description = entry.metadata['description']
         value = node.declare_parameter(
-            entry.name, default, description.descriptor(default)).value
+            entry.name, default, _descriptor(description, default)).value
         if value is None:  # what rcl makes of an empty list in YAML
             raise InvalidValueError(entry.name, value, 'a value, or left out')
         values[entry.name] = _plain(value)
@@ -102,7 +69,7 @@ def declare_arm(node: Node) -> Arm:
     """
     description = Description(
         text='Name of a preset in config/arms, or path of an arm file.', read_only=True)
-    name = str(node.declare_parameter('arm', _DEFAULT_ARM, description.descriptor('')).value)
+    name = str(node.declare_parameter('arm', _DEFAULT_ARM, _descriptor(description, '')).value)
     return load_arm(name)
 
 
@@ -130,9 +97,20 @@ def judge_changes(settings: Any, changes: list[Parameter]) -> SetParametersResul
     return SetParametersResult(successful=True)
 
 
-def as_mapping(settings: Any) -> Mapping[str, Any]:
-    """Return settings by parameter name."""
-    return {entry.name: getattr(settings, entry.name) for entry in fields(settings)}
+def _descriptor(description: Description, value: object) -> ParameterDescriptor:
+    """Return the descriptor of a parameter with such a value."""
+    descriptor = ParameterDescriptor(description=description.text,
+                                     read_only=description.read_only)
+    lowest, highest = description.lowest, description.highest
+    if lowest is None or highest is None:
+        return descriptor
+    if isinstance(value, int):
+        descriptor.integer_range = [IntegerRange(
+            from_value=int(lowest), to_value=int(highest), step=0)]
+    else:
+        descriptor.floating_point_range = [FloatingPointRange(
+            from_value=float(lowest), to_value=float(highest), step=0.0)]
+    return descriptor
 
 
 def _plain(value: Any) -> Any:

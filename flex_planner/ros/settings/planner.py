@@ -22,12 +22,13 @@ from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.optimal_control.task import MAX_PAYLOAD
 from flex_planner.planning.kinds.effort import SearchEffort
 from flex_planner.planning.sampling import MAX_PERIOD, SamplingSettings
-from flex_planner.ros.runtime.parameters import parameter_field
+from flex_planner.ros.settings.fields import parameter_field
 import numpy as np
 
 # of the largest payload [kg]
 MIN_ACCURACY, MAX_ACCURACY = 1e-6, 1e3
-# of a file of a recording [bytes]: a slip in the unit must not make a file of every message
+# of a file of a recording, and of all recordings [bytes]: a slip in the unit must not make a file
+# of every message, nor remove all
 MIN_RECORDING_SIZE, MAX_RECORDING_SIZE = 2**16, 2**40
 
 
@@ -111,6 +112,15 @@ class PlannerSettings:
     max_recording_size: int = parameter_field(
         0, 'Size at which a recording continues in another file, at least 65536 [bytes]; 0: '
         'recordings are never split.', lowest=0, highest=MAX_RECORDING_SIZE)
+    max_recordings: int = parameter_field(
+        0, 'Recordings that are kept in the folder: beyond it, the oldest finished one is removed '
+        'once another is written; 0: all.', lowest=0, highest=10**6)
+    max_total_recording_size: int = parameter_field(
+        0, 'Size of all recordings together that are kept, at least 65536 [bytes]; 0: any. The '
+        'newest is kept in any case.', lowest=0, highest=MAX_RECORDING_SIZE)
+    recording_required: bool = parameter_field(
+        False, 'Whether a plan that cannot be recorded fails (RECORDING_FAILED) and is not '
+        'published; if not, its report has the warning NOT_RECORDED.')
 
     def __post_init__(self) -> None:
         if self.elbow not in (-1, 1):
@@ -124,9 +134,10 @@ class PlannerSettings:
         if -1 < self.controller_period < 0:
             raise InvalidValueError('controller_period', self.controller_period,
                                     f'-1, or from 0 to {MAX_PERIOD:g} s')
-        if 0 < self.max_recording_size < MIN_RECORDING_SIZE:
-            raise InvalidValueError('max_recording_size', self.max_recording_size,
-                                    f'0 or at least {MIN_RECORDING_SIZE} bytes')
+        for name in ('max_recording_size', 'max_total_recording_size'):
+            if 0 < getattr(self, name) < MIN_RECORDING_SIZE:
+                raise InvalidValueError(name, getattr(self, name),
+                                        f'0 or at least {MIN_RECORDING_SIZE} bytes')
         SearchEffort.of(self.search)
         self.solver()
         self.sampling()

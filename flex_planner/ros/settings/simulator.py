@@ -9,7 +9,7 @@ from flex_planner.base.validation import vector
 from flex_planner.control.default_gains import default_gains
 from flex_planner.control.joint_controller import EffortHold, Gains, MAX_RATE, MIN_RATE
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
-from flex_planner.ros.runtime.parameters import parameter_field
+from flex_planner.ros.settings.fields import parameter_field
 from flex_planner.simulation.joint_control import Disturbance, Encoder
 from flex_planner.simulation.mismatch import AS_GIVEN, Mismatch
 from flex_planner.simulation.plant import Control

@@ -248,3 +248,18 @@ def test_script_is_sound() -> None:
         pytest.skip('no node is installed')
     script = Path(__file__).parents[3] / 'flex_planner' / 'reports' / 'recording' / 'plots.js'
     subprocess.run([node, '--check', str(script)], check=True)
+
+
+def test_lists_of_different_lengths_are_shown_as_far_as_they_go(
+        request_of_plan: RecordedRequest) -> None:
+    report = SimpleNamespace(**{name: getattr(request_of_plan.report, name)
+                                for name in dir(request_of_plan.report) if name[0] != '_'})
+    report.warnings, report.kind_values = [*report.warnings, 'one more'], [0.5, 0.6, 0.7]
+    report.saturation, report.tried_objectives = [], ['speed']
+    report.tried_weights, report.tried_shares = [1.0, 2.0], []
+    found = Page(report_page(replace(request_of_plan, report=report))).data['tables']
+    shown = {table['title'].split(',')[0]: table['rows'] for table in found}
+    assert shown['Warnings'][-1] == ['nan', 'one more']
+    assert len(shown['Kinds of motion']) == 3
+    assert shown['Motors'][0][-1] == '–'
+    assert shown['Weights tried for the objectives'][1] == ['nan', '2', 'nan']

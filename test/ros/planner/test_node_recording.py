@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 import shutil
 from typing import Any, NamedTuple
 
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from factories import PlanFactory
 from flex_planner.arms.arm import Arm
 from flex_planner.planning.plan import Plan
@@ -242,23 +244,50 @@ def test_every_recording_has_its_own_folder(planner: Planner) -> None:
     assert {str(Path(path).parent) for path in paths} == {planner.parameter('recording_folder')}
 
 
-def test_plan_that_cannot_be_recorded_is_returned_but_not_published(planner: Planner) -> None:
-    before = planner.plan(publish=True).trajectory.joint_trajectory
+@contextmanager
+def no_folder(planner: Planner) -> Iterator[None]:
+    """Put a file in the place of the folder of the recordings."""
+    planner.recordings.mkdir(exist_ok=True)
     aside = planner.recordings.rename(planner.recordings.with_name('aside'))
     planner.recordings.write_text('no folder')
     try:
-        answer = planner.plan(publish=True, payload_mass=0.9)
-        wrong = planner.report(duration=-1.0)
+        yield
     finally:
         planner.recordings.unlink()
         aside.rename(planner.recordings)
+
+
+def test_plan_that_cannot_be_recorded_is_published_with_a_warning(planner: Planner) -> None:
+    told: list[Any] = planner.listen(DiagnosticArray, '/diagnostics', 10)
+    with no_folder(planner):
+        wrong = planner.report(duration=-1.0)
+        answer = planner.plan(publish=True, payload_mass=0.9)
+        planner.wait('the warning on /diagnostics', lambda: any(
+            status.level == DiagnosticStatus.WARN and 'could not be recorded' in status.message
+            for message in told for status in message.status))
+    report = answer.report
+    assert (report.error_code, report.error_msg, report.recording) == (PlanReport.NONE, '', '')
+    assert report.warning_kinds[-1] == wrong.warning_kinds[-1] == 'NOT_RECORDED'
+    assert report.warnings[-1].startswith(
+        f'the request could not be recorded: cannot write {planner.recordings}')
+    assert wrong.error_code == PlanReport.OUT_OF_RANGE
+    published = planner.latched(JointTrajectory, f'{NODE}/joint_trajectory')
+    assert published == answer.trajectory.joint_trajectory
+    assert 'Traceback' not in planner.log()
+
+
+def test_plan_that_must_be_recorded_and_cannot_is_returned_but_not_published(
+        planner: Planner) -> None:
+    before = planner.plan(publish=True).trajectory.joint_trajectory
+    assert planner.set_parameter('recording_required', True).successful
+    with no_folder(planner):
+        answer = planner.plan(publish=True, payload_mass=0.9)
+    assert planner.set_parameter('recording_required', False).successful
     assert answer.report.error_code == PlanReport.RECORDING_FAILED
     assert str(planner.recordings) in answer.report.error_msg
-    assert answer.report.recording == wrong.recording == ''
+    assert answer.report.recording == ''
     assert len(answer.trajectory.points) > 100
-    assert wrong.error_code == PlanReport.OUT_OF_RANGE
     assert planner.latched(JointTrajectory, f'{NODE}/joint_trajectory') == before
-    assert 'Traceback' not in planner.log()
 
 
 # Searches for the maximum payload

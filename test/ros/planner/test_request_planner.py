@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import replace
+import logging
 import math
 from pathlib import Path
 import threading
+import time
 from typing import Any
 
 from flex_planner.arms.arm import Arm, Joint
 from flex_planner.base.progress import StoppedError, StopReason
 from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.recording import read_metadata
+from flex_planner.reports.recording import RecordedRequest
 from flex_planner.ros.planner import request_planner
 from flex_planner.ros.planner.outcome import Outcome
 from flex_planner.ros.planner.recorder import OutcomeRecorder
 from flex_planner.ros.planner.request_planner import RequestPlanner
 from flex_planner.ros.planner.request_state import RequestState
-from flex_planner.ros.settings.planner import PlannerSettings
+from flex_planner.ros.settings.planner import MIN_RECORDING_SIZE, PlannerSettings
 from flex_planner_interfaces.msg import PayloadSearch, PlanReport
 import pytest
 from ros_support import search_request, task
@@ -95,11 +99,55 @@ def test_recording_that_is_abandoned_leaves_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize('fields', [{}, {'duration': -1.0}])
 def test_client_that_gives_up_is_recorded_as_canceled(
-        worker: RequestPlanner, settings: PlannerSettings, tmp_path: Path) -> None:
-    outcome = worker.plan(task(), RequestState(settings=settings, withdrawn=True))
-    assert outcome.report.error_code == PlanReport.CANCELED
+        worker: RequestPlanner, settings: PlannerSettings, tmp_path: Path,
+        fields: dict[str, Any]) -> None:
+    state = RequestState(settings=settings)
+    state.withdraw()
+    time.sleep(0.01)
+    outcome = worker.plan(task(**fields), state)
+    report = RecordedRequest.read(next(tmp_path.iterdir())).report
+    assert report.error_code == outcome.report.error_code == PlanReport.CANCELED
     assert [str(path) for path in tmp_path.iterdir()] == [outcome.report.recording]
+    assert report.planning_time.nanosec == state.elapsed_ns < 10**7
+
+
+@pytest.mark.parametrize('bounds', [
+    {'max_recordings': 2}, {'max_total_recording_size': MIN_RECORDING_SIZE}])
+def test_old_recordings_are_removed_and_that_is_told(
+        worker: RequestPlanner, settings: PlannerSettings, tmp_path: Path,
+        bounds: dict[str, int], caplog: pytest.LogCaptureFixture) -> None:
+    (tmp_path / 'notes.txt').write_text('precious')
+    paths = []
+    with caplog.at_level(logging.INFO, 'flex_planner'):
+        for _ in range(12):
+            wrong = task(duration=-1.0)
+            state = RequestState(settings=replace(settings, **bounds))
+            paths.append(worker.plan(wrong, state).report.recording)
+    left = sorted(str(path) for path in tmp_path.iterdir() if path.is_dir())
+    assert left == paths[len(paths) - len(left):]
+    if 'max_recordings' in bounds:
+        assert len(left) == 2
+    else:
+        sizes = [sum(file.stat().st_size for file in Path(path).iterdir()) for path in left]
+        assert sum(sizes) <= MIN_RECORDING_SIZE < sum(sizes) + min(sizes) + 1000
+    assert (tmp_path / 'notes.txt').read_text() == 'precious'
+    gone = [path for path in paths if path not in left]
+    assert [record.args[0] for record in caplog.records] == [Path(path) for path in gone]
+    assert f'removed the recording {gone[0]} of' in caplog.messages[0]
+
+
+def test_topics_of_a_recording_are_named_as_they_are_remapped(
+        rigid_arm: Arm, rigid_model: ArmModel, settings: PlannerSettings) -> None:
+    remapped = {'~/joint_trajectory': '/controller/joint_trajectory'}
+    worker = RequestPlanner(rigid_model, OutcomeRecorder(
+        rigid_arm, lambda name: remapped.get(name, name.replace('~', '/planner'))))
+    path = worker.plan(task(), RequestState(settings=settings)).report.recording
+    assert [entry.topic.name for entry in read_metadata(path).topics] == [
+        '/planner/motion_task', '/planner/plan_report', '/controller/joint_trajectory',
+        '/planner/flexible_trajectory', '/planner/reference_states']
+    assert RecordedRequest.read(path).solved
 
 
 def test_ticket_tells_how_far_a_plan_is(worker: RequestPlanner, settings: PlannerSettings) -> None:
@@ -250,7 +298,8 @@ def test_payload_found_is_returned_but_not_published_if_it_cannot_be_recorded(
         worker: RequestPlanner, settings: PlannerSettings, tmp_path: Path) -> None:
     blocker = tmp_path / 'file'
     blocker.write_text('no folder')
-    outcome = search(worker, replace(settings, recording_folder=str(blocker / 'recordings')))
+    blocked = replace(settings, recording_folder=str(blocker / 'recordings'))
+    outcome = search(worker, replace(blocked, recording_required=True))
     assert (outcome.report.error_code, outcome.publishable) == (PlanReport.RECORDING_FAILED, False)
     assert outcome.search is not None
     assert outcome.search.payload == pytest.approx(MOST, abs=ACCURACY)

@@ -113,6 +113,29 @@ def test_withdrawn_request_has_its_outcome_at_once_and_keeps_it(
     assert code(pending) == PlanReport.CANCELED
 
 
+def test_request_that_is_withdrawn_while_it_waits_is_called_to_note_its_end(
+        queue: RequestQueue, settings: PlannerSettings) -> None:
+    noted: list[bool] = []
+
+    def note(state: RequestState) -> Outcome:
+        noted.append(state.withdrawn)
+        return unknown_failure(ValueError('too late'))
+
+    first = queue.submit(until_canceled, settings, FakeExecutor())
+    wait('a request at work', lambda: queue.active)
+    second = queue.submit(note, settings, FakeExecutor())
+    queue.withdraw(second)
+    assert code(second) == PlanReport.CANCELED
+    third = queue.submit(until_canceled, settings, FakeExecutor())
+    assert (queue.waiting, noted) == (1, [])
+    queue.withdraw(first)
+    wait('the note', lambda: noted)
+    assert noted == [True]
+    assert code(second) == PlanReport.CANCELED
+    wait('the third', lambda: queue.active is third.state)
+    queue.withdraw(third)
+
+
 def test_desk_that_closes_tells_the_work_and_takes_no_more(settings: PlannerSettings) -> None:
     queue = RequestQueue(1)
     queue.submit(until_canceled, settings, FakeExecutor())
