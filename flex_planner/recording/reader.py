@@ -17,6 +17,7 @@ from typing import Any, BinaryIO, Final, NamedTuple
 import zlib
 
 from flex_planner.base.errors import RecordingError
+from flex_planner.base.paths import expand_path
 from flex_planner.recording.definitions import MessageTypes
 from flex_planner.recording.metadata import FileSummary, RecordingMetadata, TopicSummary
 from flex_planner.recording.topics import QosProfile, Topic
@@ -143,7 +144,7 @@ def _verify_files(path: Path | str) -> list[Path]:
     for file in files:
         with _reading(file), file.open('rb') as stream:
             _verify(stream)
-    missing = _listed_files(Path(path) / 'metadata.yaml') - {file.name for file in files}
+    missing = _listed_files(expand_path(path) / 'metadata.yaml') - {file.name for file in files}
     if missing:
         raise RecordingError(f'{path} lacks {", ".join(sorted(missing))}, which its '
                              'metadata.yaml lists')
@@ -188,7 +189,7 @@ def recording_files(path: Path | str) -> list[Path]:
         If a folder has none, or some that are not the parts of one recording.
 
     """
-    path = Path(path)
+    path = expand_path(path)
     if not path.is_dir():
         return [path]
     files = {file.name: file for file in path.glob('*.mcap')}

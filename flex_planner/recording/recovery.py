@@ -16,6 +16,7 @@ import re
 from typing import Final
 
 from flex_planner.base.errors import RecordingError
+from flex_planner.base.paths import expand_path
 from flex_planner.recording.definitions import MessageTypes
 from flex_planner.recording.reader import (
     check_definition,
@@ -56,7 +57,7 @@ def recover_recording(path: Path | str, types: MessageTypes) -> Path:
         recording exists or cannot be written.
 
     """
-    path = Path(path)
+    path = expand_path(path)
     files, target = recording_files(path), _target(path.absolute())
     _refuse_unfinished_work(files[-1])
     records = [record for file in files for record in _complete_records(file)]

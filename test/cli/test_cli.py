@@ -132,7 +132,7 @@ def test_rigid_arm_has_nothing_to_draw(capsys: pytest.CaptureFixture[str], tmp_p
 
 
 @pytest.mark.parametrize(('arguments', 'message'), [
-    (['korayem'], "arm 'korayem' is neither a path ending in .yaml nor one of the presets"),
+    (['korayem'], "arm 'korayem' is neither a file nor one of the presets"),
     (['missing.yaml'], "arm file 'missing.yaml' does not exist"),
     (['korayem_rigid', '--payload', '-1'], '--payload is -1.0, but must be a number >= 0 kg'),
     (['korayem_rigid', '--payload', 'nan'], '--payload is nan'),

@@ -54,7 +54,7 @@ MISTAKES: list[tuple[str, object, str]] = [
     ('name', REMOVE, 'name is None, but must be given'),
     ('nam', 'a', "nam is 'a', but must be left out: there is no such field"),
     ('arm', REMOVE, 'arm is None, but must be given'),
-    ('arm', 'korayem', "arm: arm 'korayem' is neither a path"),
+    ('arm', 'korayem', "arm: arm 'korayem' is neither a file"),
     ('arm', 'arms/mine.yaml', 'arm: arm file '),
     ('arm', {'name': 'x', 'links': [{'length': -1}], 'joints': [{}]}, 'arm.links[0].length is -1'),
     ('arm', 3, 'arm is 3, but must be a mapping of fields'),

@@ -11,7 +11,7 @@ from flex_planner.base.progress import Monitor
 from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.capacity.results import MaxPayload, PayloadMethod
 from flex_planner.cli.controller_options import add_controller
-from flex_planner.cli.options import Commands
+from flex_planner.cli.options import Commands, integer_argument, number_argument
 from flex_planner.cli.outputs import add_outputs, Outputs
 from flex_planner.cli.progress_line import run_with_progress
 from flex_planner.cli.request import add_objectives, add_task, Request, translate_errors
@@ -42,7 +42,7 @@ def add_commands(commands: Commands) -> None:
     add_task(plan, payload='mass at the tip (default: 0)')
     add_objectives(plan)
     _add_kinds(plan)
-    plan.add_argument('--kind', type=int, default=1, metavar='N',
+    plan.add_argument('--kind', type=integer_argument, default=1, metavar='N',
                       help='plan the N-th of the kinds of motion that are listed, 1 to 4 '
                       '(default: 1, the best)')
     add_controller(plan)
@@ -65,9 +65,9 @@ def _add_search(parser: argparse.ArgumentParser) -> None:
                         default='direct', help='direct: the payload is an unknown (default); '
                         'incremental: it is raised step by step as in the paper, which takes '
                         'longer')
-    parser.add_argument('--accuracy', type=float, default=1e-3, metavar='KG',
+    parser.add_argument('--accuracy', type=number_argument, default=1e-3, metavar='KG',
                         help='accuracy of the largest payload (default: 0.001)')
-    parser.add_argument('--step', type=float, metavar='KG',
+    parser.add_argument('--step', type=number_argument, metavar='KG',
                         help='first step of the incremental method (default: 1)')
 
 

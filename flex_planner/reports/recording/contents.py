@@ -9,7 +9,9 @@ from typing import Any
 
 from flex_planner.arms.arm import Arm, Joint, Link, Motor, Node
 from flex_planner.base.errors import FlexPlannerError, RecordingError
+from flex_planner.base.paths import expand_path
 from flex_planner.base.validation import Array
+from flex_planner.base.yaml_text import parse_yaml, YamlTextError
 from flex_planner.control.joint_reference import JointReference
 from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.recording import (
@@ -20,7 +22,6 @@ from flex_planner.recording import (
     read_recording,
 )
 import numpy as np
-import yaml
 
 _TYPES = 'flex_planner_interfaces/msg/'
 _WANTED = ('MotionTask', 'PlanReport', 'PayloadSearch', 'FlexibleTrajectory')
@@ -149,8 +150,9 @@ class RecordedRequest:
             motion = RecordedMotion.of(trajectory) if trajectory else None
             if motion is not None:
                 _check_sizes(arm, motion)
-            return cls(path=Path(path), arm=arm, settings=settings, task=found['MotionTask'],
-                       report=found['PlanReport'], search=found.get('PayloadSearch'),
+            return cls(path=expand_path(path), arm=arm, settings=settings,
+                       task=found['MotionTask'], report=found['PlanReport'],
+                       search=found.get('PayloadSearch'),
                        joint_names=tuple(settings['joint_names']), motion=motion)
         except (FlexPlannerError, LookupError, TypeError, ValueError) as error:
             raise RecordingError(f'{path} contradicts itself: {error}') from error
@@ -206,8 +208,8 @@ def _scenario(path: Path | str) -> Mapping[str, Any]:
     if attached is None:
         raise RecordingError(f'{path} is not the recording of a request: it has no scenario.yaml')
     try:
-        scenario = yaml.safe_load(attached)
-    except yaml.YAMLError as error:
+        scenario = parse_yaml(attached.decode('utf-8'))
+    except (UnicodeDecodeError, YamlTextError) as error:
         raise RecordingError(f'{path} has a scenario.yaml that is not YAML: {error}') from error
     if not isinstance(scenario, Mapping):
         raise RecordingError(f'{path} has a scenario.yaml without arm and parameters')

@@ -10,6 +10,7 @@ from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import plain_arm
 from flex_planner.base.errors import RecordingError
 from flex_planner.base.version import VERSION
+from flex_planner.base.yaml_text import format_yaml
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.sampling import SampledPlan
 from flex_planner.recording import (
@@ -26,7 +27,6 @@ from flex_planner.ros.planner.request_state import RequestState
 from flex_planner.ros.runtime.parameters import as_mapping
 from flex_planner.ros.settings.planner import PlannerSettings
 from flex_planner_interfaces.msg import MotionTask, PayloadSearch
-import yaml
 
 
 class OutcomeRecorder:
@@ -120,6 +120,5 @@ class OutcomeRecorder:
 
     def _scenario(self, settings: PlannerSettings) -> str:
         """Return arm and parameters as YAML."""
-        text: str = yaml.safe_dump({'arm': plain_arm(self._arm),
-                                    'parameters': dict(as_mapping(settings))}, sort_keys=False)
-        return text
+        return format_yaml({'arm': plain_arm(self._arm),
+                            'parameters': dict(as_mapping(settings))})
