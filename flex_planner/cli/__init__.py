@@ -9,7 +9,7 @@ import sys
 from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.progress import StoppedError, StopReason
 from flex_planner.base.version import VERSION
-from flex_planner.cli.commands import arm, compare, paper, plan, recordings
+from flex_planner.cli.commands import arm, cache, compare, paper, plan, recordings
 from flex_planner.cli.commands import map as maps
 from flex_planner.cli.options import join_lists
 from flex_planner.cli.progress_line import CanceledError
@@ -53,5 +53,6 @@ def _parser() -> argparse.ArgumentParser:
     compare.add_command(commands)
     maps.add_command(commands)
     paper.add_command(commands)
+    cache.add_command(commands)
     recordings.add_commands(commands)
     return parser
