@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import math
 from typing import TYPE_CHECKING
 
-from flex_planner.arms.beam_eigenmodes import TipLoad
+from flex_planner.arms.beam_eigenmodes import MAX_LOAD_RATIO, TipLoad
 from flex_planner.arms.mode_shapes import FAMILIES, LinkModes, mode_shapes
 from flex_planner.arms.quantities import check_quantity
 from flex_planner.base.errors import InvalidValueError
@@ -74,6 +74,12 @@ class Link:
             raise InvalidValueError('mode_family', self.mode_family, f'one of {list(FAMILIES)}')
         check_quantity('shape_mass', self.shape_mass, 'mass', at_least=0)
         check_quantity('shape_inertia', self.shape_inertia, 'inertia', at_least=0)
+        # the integrals of shapes with a still heavier load would be lost in rounding
+        number('shape_mass', self.shape_mass, at_most=MAX_LOAD_RATIO * self.mass,
+               unit=f'kg, {MAX_LOAD_RATIO:g} times the mass of the link')
+        number('shape_inertia', self.shape_inertia,
+               at_most=MAX_LOAD_RATIO * self.mass * self.length**2,
+               unit=f'kg m^2, {MAX_LOAD_RATIO:g} times that of the link')
         ratio = number('damping_ratio', self.damping_ratio, at_least=0)
         if ratio >= 1:
             raise InvalidValueError('damping_ratio', ratio, 'a number < 1')

@@ -24,16 +24,17 @@ def expand_path(path: str | os.PathLike[str]) -> Path:
     Raises
     ------
     PathError
-        If there is no such user, or the path cannot be that of a file.
+        If that user has no home folder, or the path cannot be that of a file.
 
     """
     text = os.fspath(path)
     if '\0' in text:
         raise PathError(f'{text!r} is no path: it holds a null character')
     expanded = os.path.expanduser(text)
-    if expanded.startswith('~'):
-        home = Path(text).parts[0]
-        whose = f'no user {home[1:]!r}' if home[1:] else 'no home folder of this user'
+    home = Path(text).parts[0] if text.startswith('~') else ''
+    # users of services may have a home folder that nobody made, where nothing is to be written
+    if expanded.startswith('~') or (home[1:] and not os.path.isdir(os.path.expanduser(home))):
+        whose = f'no home folder of a user {home[1:]!r}' if home[1:] else 'no home folder'
         raise PathError(f'{text!r} is no path, because there is {whose}; '
                         f'write {"./" + text!r} for a file of that name')
     return Path(expanded)

@@ -362,7 +362,7 @@ def test_home_folder_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setenv('HOME', str(tmp_path))
     write(tmp_path, COMPLETE)
     assert load_arm('~/arm.yaml').name == 'two links'
-    with pytest.raises(ArmFileError, match="there is no user 'no-such-user'"):
+    with pytest.raises(ArmFileError, match="there is no home folder of a user 'no-such-user'"):
         load_arm('~no-such-user/arm.yaml')
 
 

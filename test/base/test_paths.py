@@ -28,8 +28,8 @@ def test_home_folder_of_a_user_is_found() -> None:
 
 @pytest.mark.parametrize('path', ['~no-such-user', '~no-such-user/arm.yaml'])
 def test_user_who_does_not_exist_gets_a_sentence(path: str) -> None:
-    with pytest.raises(PathError, match=f"^'{path}' is no path, because there is no user "
-                                        "'no-such-user'; write './~no-such-user"):
+    with pytest.raises(PathError, match=f"^'{path}' is no path, because there is no home "
+                                        "folder of a user 'no-such-user'; write './~no-such-user"):
         expand_path(path)
 
 
@@ -55,3 +55,10 @@ def test_folder_of_an_environment_variable_is_absolute(
     ('-', 'stdin'), ('/dev/stdin', 'stdin'), ('/dev/fd/63', 'pipe'), ('/proc/self/fd/0', 'stdin')])
 def test_files_are_named_after_files_not_after_pipes(path: str, stem: str) -> None:
     assert file_stem(path) == stem
+
+
+def test_user_without_a_home_folder_gets_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    # as of nobody, on many systems
+    monkeypatch.setattr('os.path.isdir', lambda path: False)
+    with pytest.raises(PathError, match="'~root/a' is no path, because there is no home folder"):
+        expand_path('~root/a')

@@ -16,6 +16,7 @@ from flex_planner.cli.options import (
     path_argument,
 )
 from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.task import MAX_PAYLOAD
 from flex_planner.reports.arm import describe_arm, standard_postures
 
 
@@ -38,7 +39,7 @@ def add_command(commands: Commands) -> None:
 def _run(options: argparse.Namespace) -> int:
     """Print an arm's properties and draw its mode shapes."""
     arm = load_arm(options.arm)
-    payload = number('--payload', options.payload, at_least=0, unit='kg')
+    payload = number('--payload', options.payload, at_least=0, at_most=MAX_PAYLOAD, unit='kg')
     postures = ([angles('--posture', text, arm.n_joints) for text in options.posture]
                 if options.posture else standard_postures(arm))
     model = ArmModel(arm)
