@@ -48,7 +48,7 @@ MISTAKES: list[tuple[str, object, str, str]] = [
     ('links/0/length', 0, 'links[0].length', '> 0 m'),
     ('links/0/length', '0.5 m', 'links[0].length', '> 0 m'),
     ('links/0/length', True, 'links[0].length', '> 0 m'),
-    ('links/0/mass', REMOVE, DENSITY, 'is None, but must be given, exactly one of them'),
+    ('links/0/mass', REMOVE, DENSITY, 'is missing, but must be given, exactly one of them'),
     ('links/0/linear_density', 6.0, DENSITY, "is 'linear_density and mass', but must be given, "),
     ('links/0/density', 2700.0, DENSITY,
      "is 'mass and density', but must be given, exactly one of them"),
@@ -61,7 +61,7 @@ MISTAKES: list[tuple[str, object, str, str]] = [
     ('links/1/length', -0.25, 'links[1].length', '> 0 m'),
     ('links/1/linear_density', 0.0, 'links[1].linear_density', '> 0 kg/m'),
     ('links/0/flexural_rigidity', REMOVE, RIGIDITY,
-     'is None, but must be given, exactly one of them'),
+     'is missing, but must be given, exactly one of them'),
     ('links/0/youngs_modulus', 7e10, RIGIDITY, "is 'flexural_rigidity and youngs_modulus'"),
     ('links/1/youngs_modulus', 7e10, SECTION, 'given with youngs_modulus'),
     ('links/1/youngs_modulus', -1.0, 'links[1].youngs_modulus', '> 0 N/m^2'),
@@ -194,11 +194,11 @@ def test_quantities_of_a_beam_combine(fields: dict[str, Any], density: float,
 
 
 @pytest.mark.parametrize(('fields', 'message'), [
-    ({'section': REMOVE}, 'section is None, but must be given with density'),
+    ({'section': REMOVE}, 'section is missing, but must be given with density'),
     ({'section': REMOVE, 'second_moment_of_area': 1e-10},
-     'section is None, but must be given with density'),
+     'section is missing, but must be given with density'),
     ({'section': REMOVE, 'density': REMOVE, 'mass': 1.0},
-     'section or second_moment_of_area is None, but must be given with youngs_modulus'),
+     'section or second_moment_of_area is missing, but must be given with youngs_modulus'),
     ({'second_moment_of_area': 1e-10}, 'second_moment_of_area is 1e-10, but must be left out')])
 def test_combination_that_leaves_the_beam_open_is_named(fields: dict[str, Any],
                                                         message: str) -> None:
@@ -223,7 +223,7 @@ def test_shapes_with_a_load_need_to_be_told_it(field: str) -> None:
     link = {'length': 0.5, 'mass': 3.0, 'flexural_rigidity': 50.0, 'modes': 2,
             'mode_family': 'clamped_mass', 'shape_mass': 1.5, 'shape_inertia': 0.25}
     del link[field]
-    with pytest.raises(InvalidValueError, match=rf'^links\[0\]\.{field} is None'):
+    with pytest.raises(InvalidValueError, match=rf'^links\[0\]\.{field} is missing'):
         arm_from_mapping(changed('links/0', link))
 
 

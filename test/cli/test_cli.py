@@ -136,7 +136,7 @@ def test_rigid_arm_has_nothing_to_draw(capsys: pytest.CaptureFixture[str], tmp_p
     (['missing.yaml'], "arm file 'missing.yaml' does not exist"),
     (['korayem_rigid', '--payload', '-1'], '--payload is -1.0, but must be a number >= 0 kg'),
     (['korayem_rigid', '--payload', 'nan'], '--payload is nan'),
-    (['korayem_rigid', '--posture', '1'], '--posture has 1 numbers, but must be a list of 2'),
+    (['korayem_rigid', '--posture', '1'], '--posture has 1 number, but must be a list of 2'),
     (['korayem_rigid', '--posture', '1,two'], "--posture is '1,two', but must be numbers"),
     (['korayem_rigid', '--posture', '1,inf'], '--posture[1] is inf')])
 def test_bad_input_is_answered_by_one_line(capsys: pytest.CaptureFixture[str],

@@ -8,6 +8,7 @@ import sys
 
 from flex_planner.base.paths import file_stem
 from flex_planner.base.progress import Monitor
+from flex_planner.base.sentences import say_reason
 from flex_planner.cli.options import (
     Commands,
     integer_argument,
@@ -85,7 +86,8 @@ def _compare(options: argparse.Namespace) -> int:
         print(table([('picture', str(path))]))
     if not found.solved:
         failed = found.rigid if found.flexible.solved else found.flexible
-        print(f'flex-planner: {failed.arm.name}: {failed.status.value}', file=sys.stderr)
+        print(f'flex-planner: {failed.arm.name}: '
+              f'{say_reason(failed.status.value, failed.message)}', file=sys.stderr)
     return 0 if found.solved else 1
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import sys
 
 from flex_planner.base.progress import Monitor
+from flex_planner.base.sentences import say_reason
 from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.capacity.results import MaxPayload, PayloadMethod
 from flex_planner.cli.controller_options import add_controller
@@ -158,8 +159,8 @@ def _exit_code(request: Request, outcome: Plan | MaxPayload) -> int:
     """Return the exit code of a result; print the reason of a failure."""
     if outcome.solved:
         return 0
-    reasons = [outcome.status.value, outcome.message]
+    reason = outcome.message
     if outcome.status is PlanStatus.TIMEOUT:
-        reasons[1] = f'--time-limit is {request.time_limit:g} s'
-    print(f'flex-planner: {": ".join(dict.fromkeys(reasons))}', file=sys.stderr)
+        reason = f'--time-limit is {request.time_limit:g} s'
+    print(f'flex-planner: {say_reason(outcome.status.value, reason)}', file=sys.stderr)
     return 1

@@ -194,7 +194,7 @@ def test_search_from_more_than_the_maximum_finds_nothing(worker: RequestPlanner,
     ({'payload_step': 1e-4}, PlanReport.OUT_OF_RANGE, 'payload_step is 0.0001, but must be'),
     ({'payload_step': math.inf}, PlanReport.NOT_FINITE, 'payload_step is inf, but must be'),
     ({'payload_mass': math.nan}, PlanReport.NOT_FINITE, 'payload_mass is nan, but must be'),
-    ({'effort_weights': [1.0]}, PlanReport.INVALID_SIZE, 'effort_weights has 1 numbers, but'),
+    ({'effort_weights': [1.0]}, PlanReport.INVALID_SIZE, 'effort_weights has 1 number, but'),
     ({'allowed_planning_time': 1e-9}, PlanReport.TIMEOUT, 'time limit reached'),
 ])
 def test_search_that_cannot_be_done_says_why(worker: RequestPlanner, settings: PlannerSettings,
