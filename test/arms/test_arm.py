@@ -65,9 +65,9 @@ VECTORS = [
     # task field, its length, a bad entry, the bound in the message
     ('start_positions', 2, 100.1, '>= -100 and <= 100 rad'),
     ('goal_positions', 2, -100.1, '>= -100 and <= 100 rad'),
-    ('effort_weights', 2, 0.0, '> 0'),
-    ('position_weights', 3, -1.0, '>= 0'),
-    ('velocity_weights', 3, -1.0, '>= 0'),
+    ('effort_weights', 2, 0.0, '> 0 and <= 1e+18'),
+    ('position_weights', 3, -1.0, '>= 0 and <= 1e+18'),
+    ('velocity_weights', 3, -1.0, '>= 0 and <= 1e+18'),
 ]
 
 
