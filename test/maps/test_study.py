@@ -7,12 +7,13 @@ import copy
 from dataclasses import replace
 from itertools import product
 import math
+import os
 from pathlib import Path
 import pickle
 from typing import Any
 
 from flex_planner.arms.arm import Arm
-from flex_planner.arms.arm_files import load_arm
+from flex_planner.arms.arm_files import load_arm, preset_files
 from flex_planner.base.errors import (
     FlexPlannerError,
     InvalidValueError,
@@ -443,3 +444,50 @@ def test_one_compiled_model_does_for_every_cell() -> None:
     assert shared.certificate.tip_error == own.certificate.tip_error
     assert shared.saturation.tolist() == own.saturation.tolist()
     assert shared.cost != plan_path(replace(task, arm=study.arm)).cost
+
+
+@pytest.mark.parametrize(('place', 'value', 'message'), [
+    ('goal', [math.inf, 0.5], 'goal is inf'),  # also where an axis gives that coordinate
+    ('goal', [1e308, 0.5], 'goal is 1e+308, but must be a number >= -1000 and <= 1000 m'),
+    ('axes/goal_x', {'from': -1e308, 'to': 1e308, 'count': 5}, 'axes.goal_x.from is -1e+308'),
+    ('axes/payload_mass', {'from': 0, 'to': 1e308, 'count': 5}, 'axes.payload_mass.to is 1e+308'),
+    ('duration', 1e-300, 'duration is 1e-300, but must be a number >= 1e-09 s'),
+    ('effort_weights', [1e-300, 1.0], 'effort_weights[0] is 1e-300'),
+    ('settling', 5e-324, 'settling is 5e-324, but must be a number >= 0.001'),
+    ('mismatch/payload_mass', 1e308, 'mismatch.payload_mass is 1e+308')])
+def test_extreme_number_is_named_with_its_range(tmp_path: Path, place: str, value: object,
+                                                message: str) -> None:
+    with pytest.raises(StudyError) as caught:
+        study_of(tmp_path, changed(place, value))
+    assert message in str(caught.value)
+
+
+def test_study_and_its_arm_are_found_below_the_home_folder(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv('HOME', str(tmp_path))
+    (tmp_path / 'arm').write_bytes(preset_files()['korayem_ei50'].read_bytes())
+    for arm in ('~/arm', './arm', 'arm'):
+        study_of(tmp_path, changed('arm', arm))
+        assert load_study('~/study.yaml').arm.name == load_arm('korayem_ei50').name
+    with pytest.raises(StudyError, match="no home folder of a user 'no-such-user'"):
+        study_of(tmp_path, changed('arm', '~no-such-user/arm.yaml'))
+
+
+def test_study_comes_through_a_pipe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    reader, writer = os.pipe()
+    os.write(writer, yaml.safe_dump(COMPLETE).encode())
+    os.close(writer)
+    try:
+        assert load_study(f'/dev/fd/{reader}').name == 'a map'
+    finally:
+        os.close(reader)
+
+
+@pytest.mark.parametrize('text', ['duration: 010', 'duration: 1:30', 'duration: 1_0'])
+def test_number_that_could_be_misread_is_refused(tmp_path: Path, text: str) -> None:
+    content = yaml.safe_dump(changed('duration', REMOVE))
+    file = tmp_path / 'study.yaml'
+    file.write_text(f'{content}{text}\n')
+    with pytest.raises(StudyError, match=r'cannot be read: line \d+, column 11: .* must be'):
+        load_study(file)
