@@ -14,11 +14,11 @@ import re
 from flex_planner.base.errors import FlexPlannerError
 
 INTEGER = re.compile(r'[-+]?[0-9]+')
-DECIMAL = re.compile(r'[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?')
+DECIMAL = re.compile(r'[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?')
 SPECIAL = re.compile(r'[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)')
 # leading zeros; other bases; sexagesimal; digits in groups
 AMBIGUOUS = re.compile(r'[-+]?(0[0-9]+|0[xXoObB][0-9a-fA-F_]+|[0-9][0-9_]*(:[0-9]+)+(\.[0-9_]*)?|'
-                       r'[0-9][0-9_]*_[0-9_]*(\.[0-9_]*)?([eE][-+]?[0-9_]+)?|'
+                       r'[0-9](?=[0-9]*_)[0-9_]*(\.[0-9_]*)?([eE][-+]?[0-9_]+)?|'
                        r'[0-9]+\.[0-9]*_[0-9_]*([eE][-+]?[0-9_]+)?)')
 _MOST_DIGITS = 15  # of an integer that a float holds exactly
 

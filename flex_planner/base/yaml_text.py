@@ -70,7 +70,7 @@ class _Loader(yaml.SafeLoader):
     yaml_constructors: ClassVar[dict[Any, Any]] = {}
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        """Return a mapping; PyYAML itself would keep the last of equal keys silently."""
+        """Return a mapping of text; PyYAML itself would keep the last of equal keys silently."""
         given = set[str]()
         for key, _ in node.value:
             if not isinstance(key, yaml.ScalarNode):
@@ -78,7 +78,8 @@ class _Loader(yaml.SafeLoader):
             if key.value in given:
                 raise _error(key, f'field {_cut(key.value)!r} is given twice')
             given.add(key.value)
-        return super().construct_mapping(node, deep)
+        self.flatten_mapping(node)
+        return {key.value: self.construct_object(value, deep=deep) for key, value in node.value}
 
     def construct_number(self, node: yaml.ScalarNode) -> int | float:
         """Return a number; a ScalarNode that is tagged as one may hold anything."""

@@ -18,14 +18,15 @@ import numpy as np
 
 Commands: TypeAlias = 'argparse._SubParsersAction[argparse.ArgumentParser]'
 
-_NEGATIVE_LIST = re.compile(r'-[\d.].*,')
+# argparse takes them for options
+_NEGATIVE = re.compile(r'-[\d.].*[,eE]')
 
 
 def join_lists(arguments: Sequence[str]) -> list[str]:
     """Return the arguments with ``--to -1,2`` as ``--to=-1,2``: argparse would see an option."""
     joined: list[str] = []
     for argument in arguments:
-        if joined and joined[-1].startswith('--') and _NEGATIVE_LIST.match(argument):
+        if joined and joined[-1].startswith('--') and _NEGATIVE.match(argument):
             joined[-1] += f'={argument}'
         else:
             joined.append(argument)

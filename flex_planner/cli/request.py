@@ -16,12 +16,15 @@ from flex_planner.base.errors import (
     SingularError,
     UnreachableError,
 )
+from flex_planner.base.sentences import say_reason
 from flex_planner.base.validation import Array, number
+from flex_planner.capacity.results import MaxPayload
 from flex_planner.cli.controller_options import sampling_settings
 from flex_planner.cli.options import add_arm, angles, integer_argument, number_argument, numbers
 from flex_planner.optimal_control.ends_at_points import ends_at_points
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.objectives import Objectives
+from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.point_times import MAX_SAMPLES
 from flex_planner.planning.sampling import SamplingSettings
 import numpy as np
@@ -93,6 +96,14 @@ class Request:
         """Return the motion in words."""
         ends = ' to '.join(_say_end(self.task, name) for name in ('start', 'goal'))
         return f'{ends} in {self.task.duration:g} s'
+
+
+def say_failure(outcome: Plan | MaxPayload, time_limit: float) -> str:
+    """Return why there is no result, with the time limit if that was it [s]."""
+    reason = outcome.message
+    if outcome.status is PlanStatus.TIMEOUT:
+        reason = f'--time-limit is {time_limit:g} s'
+    return say_reason(outcome.status.value, reason)
 
 
 def add_task(parser: argparse.ArgumentParser, payload: str) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from flex_planner.base.errors import InvalidValueError
-from flex_planner.base.sentences import count_of, say_reason
+from flex_planner.base.sentences import count_of, say_os_error, say_reason
 from flex_planner.base.validation import number, vector
 import pytest
 
@@ -33,3 +33,11 @@ def test_bound_without_a_limit_names_the_unit() -> None:
 def test_missing_value_is_called_missing() -> None:
     with pytest.raises(InvalidValueError, match='^x is missing, but must be a number > 0 m$'):
         number('x', None, above=0, unit='m')
+
+
+@pytest.mark.parametrize(('error', 'sentence'), [
+    (FileNotFoundError(2, 'No such file', '/a'), '/a: No such file'),
+    (OSError(18, 'Invalid cross-device link', '/a', None, '/b'),
+     '/a: /b: Invalid cross-device link'), (OSError('it broke'), 'it broke')])
+def test_error_of_the_system_is_told_without_its_number(error: OSError, sentence: str) -> None:
+    assert say_os_error(error) == sentence

@@ -208,6 +208,10 @@ def test_argument_that_is_not_what_it_should_be_is_named(
     assert message in capsys.readouterr().err.splitlines()[-1]
 
 
+def test_negative_number_with_an_exponent_is_no_option(capsys: pytest.CaptureFixture[str]) -> None:
+    assert '--payload is -1000.0, but' in refused(capsys, 'korayem_rigid', '--payload', '-1e3')
+
+
 @pytest.mark.parametrize('entry', ['010', '1_0', '0x10', '1:30'])
 def test_number_in_a_list_is_plain(capsys: pytest.CaptureFixture[str], entry: str) -> None:
     assert f"--posture is '{entry}', but must be a plain decimal number" in refused(

@@ -8,7 +8,6 @@ import sys
 
 from flex_planner.base.paths import file_stem
 from flex_planner.base.progress import Monitor
-from flex_planner.base.sentences import say_reason
 from flex_planner.cli.options import (
     Commands,
     integer_argument,
@@ -18,7 +17,7 @@ from flex_planner.cli.options import (
 )
 from flex_planner.cli.outputs import check_folder
 from flex_planner.cli.progress_line import run_with_progress
-from flex_planner.cli.request import add_task, Request, translate_errors
+from flex_planner.cli.request import add_task, Request, say_failure, translate_errors
 from flex_planner.control.joint_controller import Gains
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.reports.comparison import comparison_rows, comparison_table
@@ -87,7 +86,7 @@ def _compare(options: argparse.Namespace) -> int:
     if not found.solved:
         failed = found.rigid if found.flexible.solved else found.flexible
         print(f'flex-planner: {failed.arm.name}: '
-              f'{say_reason(failed.status.value, failed.message)}', file=sys.stderr)
+              f'{say_failure(failed, request.time_limit)}', file=sys.stderr)
     return 0 if found.solved else 1
 
 
