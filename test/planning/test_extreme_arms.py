@@ -11,7 +11,7 @@ import warnings
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import arm_from_mapping
 from flex_planner.arms.quantities import QUANTITIES
-from flex_planner.base.errors import FlexPlannerError, InvalidValueError
+from flex_planner.base.errors import FlexPlannerError, InvalidTaskError, InvalidValueError
 from flex_planner.base.progress import Monitor
 from flex_planner.control.default_gains import default_gains
 from flex_planner.dynamics import compiled_functions
@@ -147,3 +147,13 @@ def test_extreme_task_is_named_with_its_range(rigid_arm: Arm, changes: dict[str,
     fields = {'start_positions': [0, 1], 'goal_positions': [1, 1], 'duration': 1.0, **changes}
     with pytest.raises(InvalidValueError, match=message):
         Task(arm=rigid_arm, **fields)
+
+
+def test_links_too_unequal_to_compute_with_get_a_sentence() -> None:
+    arm = arm_from_mapping({'name': 'unequal', 'joints': [{}, {}], 'links': [
+        {'length': 1e-5, 'linear_density': 1e6}, {'length': 1e4, 'linear_density': 1.0}]})
+    task = Task(arm=arm, start_positions=[0.0, 0.0], goal_positions=[0.5, 0.5], duration=1.0)
+    for compute in (lambda: plan_path(task), lambda: default_gains(ArmModel(arm)),
+                    lambda: describe_arm(ArmModel(arm), standard_postures(arm), 0.0)):
+        with pytest.raises(InvalidTaskError, match='inertia of the lightest is lost in rounding'):
+            compute()
