@@ -1,7 +1,8 @@
 """
 A planar manipulator as validated data: links, joints with motors, nodes, gravity.
 
-Units are SI, angles in radians. Nothing here computes a motion.
+Units are SI, angles in radians; the ranges of all quantities are in `QUANTITIES`. Nothing here
+computes a motion.
 
 """
 
@@ -11,8 +12,9 @@ from dataclasses import dataclass, field
 import math
 from typing import TYPE_CHECKING
 
-from flex_planner.arms.beam_eigenmodes import TipLoad
+from flex_planner.arms.beam_eigenmodes import MAX_LOAD_RATIO, TipLoad
 from flex_planner.arms.mode_shapes import FAMILIES, LinkModes, mode_shapes
+from flex_planner.arms.quantities import check_quantity
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.validation import Array, integer, number, vector
 import numpy as np
@@ -63,15 +65,21 @@ class Link:
     damping_ratio: float = 0.0
 
     def __post_init__(self) -> None:
-        number('length', self.length, above=0, unit='m')
-        number('linear_density', self.linear_density, above=0, unit='kg/m')
+        check_quantity('length', self.length, 'length', above=0)
+        check_quantity('linear_density', self.linear_density, 'linear_density', above=0)
         integer('modes', self.modes, at_least=0, at_most=MAX_MODES)
-        number('flexural_rigidity', self.flexural_rigidity, above=0, infinite=self.modes == 0,
-               unit='N m^2 (needed for a link with modes)')
+        check_quantity('flexural_rigidity', self.flexural_rigidity, 'flexural_rigidity', above=0,
+                       infinite=self.modes == 0, note=' (needed for a link with modes)')
         if self.mode_family not in list(FAMILIES):
             raise InvalidValueError('mode_family', self.mode_family, f'one of {list(FAMILIES)}')
-        number('shape_mass', self.shape_mass, at_least=0, unit='kg')
-        number('shape_inertia', self.shape_inertia, at_least=0, unit='kg m^2')
+        check_quantity('shape_mass', self.shape_mass, 'mass', at_least=0)
+        check_quantity('shape_inertia', self.shape_inertia, 'inertia', at_least=0)
+        # the integrals of shapes with a still heavier load would be lost in rounding
+        number('shape_mass', self.shape_mass, at_most=MAX_LOAD_RATIO * self.mass,
+               unit=f'kg, {MAX_LOAD_RATIO:g} times the mass of the link')
+        number('shape_inertia', self.shape_inertia,
+               at_most=MAX_LOAD_RATIO * self.mass * self.length**2,
+               unit=f'kg m^2, {MAX_LOAD_RATIO:g} times that of the link')
         ratio = number('damping_ratio', self.damping_ratio, at_least=0)
         if ratio >= 1:
             raise InvalidValueError('damping_ratio', ratio, 'a number < 1')
@@ -116,9 +124,9 @@ class Motor:
     max_speed: float = math.inf
 
     def __post_init__(self) -> None:
-        number('stall_torque', self.stall_torque, above=0, infinite=True, unit='N m')
-        number('no_load_speed', self.no_load_speed, above=0, infinite=True, unit='rad/s')
-        number('max_speed', self.max_speed, above=0, infinite=True, unit='rad/s')
+        check_quantity('stall_torque', self.stall_torque, 'stall_torque', above=0, infinite=True)
+        for name in ('no_load_speed', 'max_speed'):
+            check_quantity(name, getattr(self, name), 'speed', above=0, infinite=True)
         if math.isinf(self.stall_torque) and math.isfinite(self.no_load_speed):
             raise InvalidValueError('no_load_speed', self.no_load_speed,
                                     'infinite where stall_torque is infinite')
@@ -157,9 +165,13 @@ class Joint:
     upper_limit: float = math.inf
 
     def __post_init__(self) -> None:
-        number('viscous_friction', self.viscous_friction, at_least=0, unit='N m s/rad')
-        number('lower_limit', self.lower_limit, infinite=True, unit='rad')
-        number('upper_limit', self.upper_limit, above=self.lower_limit, infinite=True, unit='rad')
+        check_quantity('viscous_friction', self.viscous_friction, 'viscous_friction', at_least=0)
+        lower = check_quantity('lower_limit', self.lower_limit, 'angle', infinite=True)
+        upper = check_quantity('upper_limit', self.upper_limit, 'angle', above=lower,
+                               infinite=True)
+        if lower == math.inf or upper == -math.inf:
+            name, value = (('lower_limit', lower) if lower == math.inf else ('upper_limit', upper))
+            raise InvalidValueError(name, value, 'an angle in rad, or left out for no limit')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -183,8 +195,8 @@ class Node:
     inertia: float = 0.0
 
     def __post_init__(self) -> None:
-        number('mass', self.mass, at_least=0, unit='kg')
-        number('inertia', self.inertia, at_least=0, unit='kg m^2')
+        check_quantity('mass', self.mass, 'mass', at_least=0)
+        check_quantity('inertia', self.inertia, 'inertia', at_least=0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -206,12 +218,12 @@ class Arm:
     nodes : tuple of Node
         One per joint and one for the tip; empty for none.
     gravity : array_like, shape (2,)
-        In the plane of motion [m/s^2]; zero for a horizontal plane.
+        In the plane of motion, within +-1000 [m/s^2]; zero for a horizontal plane.
 
     Raises
     ------
     InvalidValueError
-        If the numbers of links, joints and nodes do not fit, or gravity is not finite.
+        If the numbers of links, joints and nodes do not fit, or gravity breaks its bound.
 
     """
 
@@ -238,7 +250,10 @@ class Arm:
                                     f'0 or {n + 1}, one per joint and one for the tip')
         if not self.nodes:
             object.__setattr__(self, 'nodes', (Node(),) * (n + 1))
-        object.__setattr__(self, 'gravity', vector('gravity', self.gravity, 2, unit='m/s^2'))
+        gravity = vector('gravity', self.gravity, 2, unit='m/s^2')
+        for index, entry in enumerate(gravity):
+            check_quantity(f'gravity[{index}]', entry, 'gravity')
+        object.__setattr__(self, 'gravity', gravity)
 
     @property
     def n_joints(self) -> int:

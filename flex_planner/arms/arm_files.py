@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict
 import math
 import os
 from pathlib import Path
 import sys
-from typing import Any
+from typing import Any, NoReturn
 
 from flex_planner.arms.arm import Arm, Joint, Link, Motor, Node
+from flex_planner.arms.quantities import check_quantity
 from flex_planner.base.errors import FlexPlannerError, InvalidValueError
+from flex_planner.base.paths import expand_path, PathError, STANDARD_INPUT
+from flex_planner.base.text_files import say_file
 from flex_planner.base.yaml_files import read_yaml, YamlFileError, YamlSection
 
-_UNITS = {'length': 'm', 'mass': 'kg', 'linear_density': 'kg/m', 'density': 'kg/m^3',
-          'flexural_rigidity': 'N m^2', 'youngs_modulus': 'N/m^2', 'width': 'm',
-          'thickness': 'm', 'second_moment_of_area': 'm^4', 'shape_mass': 'kg',
-          'shape_inertia': 'kg m^2'}
+_KINDS = {'shape_mass': 'mass', 'shape_inertia': 'inertia'}
 
 
 class ArmFileError(FlexPlannerError):
@@ -44,16 +44,46 @@ def find_arm_file(name: str) -> Path:
         If there is none; the message lists the presets.
 
     """
-    if name.endswith(('.yaml', '.yml')) or os.sep in name:
-        path = Path(name)
-        if not path.is_file():
-            raise ArmFileError(f'arm file {name!r} does not exist')
-        return path
+    if is_arm_path(name):
+        return _existing(name)
     found = preset_files()
     if name not in found:
-        raise ArmFileError(f'arm {name!r} is neither a path ending in .yaml nor one of the '
-                           f'presets {sorted(found)}')
+        # a file needs no suffix, but a preset of its name comes first
+        return _existing(name) if os.path.lexists(name) else _no_arm(name, found)
     return found[name]
+
+
+def is_arm_path(name: str) -> bool:
+    """Return whether a name is a path, of a file or of a pipe, and no name of a preset."""
+    return (name == STANDARD_INPUT or os.sep in name or name.startswith('~')
+            or name.lower().endswith(('.yaml', '.yml')))
+
+
+def _existing(name: str) -> Path:
+    """Return the path of what is there."""
+    try:
+        path = expand_path(name)
+    except PathError as error:
+        raise ArmFileError(f'arm file {error}') from None
+    if name != STANDARD_INPUT and not _exists(path):
+        raise ArmFileError(f'arm file {name!r} does not exist')
+    return path
+
+
+def _exists(path: Path) -> bool:
+    """Return whether there is something, if need be something that cannot be read."""
+    try:
+        path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    except OSError:
+        pass  # reading it will say why
+    return True
+
+
+def _no_arm(name: str, presets: Iterable[str]) -> NoReturn:
+    raise ArmFileError(f'arm {name!r} is neither a file nor one of the presets '
+                       f'{sorted(presets)}')
 
 
 def preset_files() -> dict[str, Path]:
@@ -69,7 +99,7 @@ def load_arm(name: str | os.PathLike[str]) -> Arm:
     Parameters
     ----------
     name : str or path
-        Name of a preset in ``config/arms``, or path of a YAML file.
+        Name of a preset in ``config/arms``, or path of a YAML file; ``-`` is the standard input.
 
     Raises
     ------
@@ -83,7 +113,7 @@ def load_arm(name: str | os.PathLike[str]) -> Arm:
     except YamlFileError as error:
         raise ArmFileError(str(error)) from None
     except InvalidValueError as error:
-        raise ArmFileError(f'{path}: {error}') from error
+        raise ArmFileError(f'{say_file(path)}: {error}') from error
 
 
 def arm_from_mapping(content: object, path: str = '') -> Arm:
@@ -129,13 +159,14 @@ def _link(section: YamlSection) -> Link:
     area, second_moment = _cross_section(section)
     density = _one_of(section, {
         'linear_density': lambda value: value, 'mass': lambda value: value / length,
-        'density': lambda value: value * area})
+        'density': lambda value: value * area}, {'mass': 'length', 'density': 'section'})
     modes = section.take('modes', 0)
     rigidity = math.inf
     if modes or section.has('flexural_rigidity') or section.has('youngs_modulus'):
         rigidity = _one_of(section, {
             'flexural_rigidity': lambda value: value,
-            'youngs_modulus': lambda value: value * second_moment})
+            'youngs_modulus': lambda value: value * second_moment},
+            {'youngs_modulus': 'second moment of area'})
     family = section.take('mode_family', 'pinned_pinned')
     shape = {name: _number(section, name, above=-math.inf)
              for name in ('shape_mass', 'shape_inertia') if family == 'clamped_mass'}
@@ -146,8 +177,8 @@ def _link(section: YamlSection) -> Link:
 
 
 def _number(section: YamlSection, key: str, above: float = 0.0) -> float:
-    """Return a quantity in its unit."""
-    return section.number(key, above=above, unit=_UNITS[key])
+    """Return a quantity within its range."""
+    return check_quantity(section.name(key), section.take(key), _KINDS.get(key, key), above=above)
 
 
 def _cross_section(section: YamlSection) -> tuple[float, float]:
@@ -162,8 +193,14 @@ def _cross_section(section: YamlSection) -> tuple[float, float]:
     return math.nan, math.nan
 
 
-def _one_of(section: YamlSection, conversions: Mapping[str, Callable[[float], float]]) -> float:
-    """Return a quantity that a file may give by several fields, but must give by one."""
+def _one_of(section: YamlSection, conversions: Mapping[str, Callable[[float], float]],
+            others: Mapping[str, str]) -> float:
+    """
+    Return a quantity that a file may give by several fields, but must give by one.
+
+    It is the first of `conversions`; `others` are what it is computed from besides the given.
+
+    """
     given = [name for name in conversions if section.has(name)]
     if len(given) != 1:
         raise InvalidValueError(section.name(' or '.join(conversions)),
@@ -172,7 +209,9 @@ def _one_of(section: YamlSection, conversions: Mapping[str, Callable[[float], fl
     if math.isnan(result):
         needs = 'section' if given[0] == 'density' else 'section or second_moment_of_area'
         raise InvalidValueError(section.name(needs), None, f'given with {given[0]}')
-    return result
+    kind = next(iter(conversions))
+    name = f'{kind} (of {given[0]} and {others[given[0]]})' if given[0] in others else kind
+    return check_quantity(section.name(name), result, kind, above=0)
 
 
 def _joint(section: YamlSection) -> Joint:

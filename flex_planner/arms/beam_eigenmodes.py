@@ -19,6 +19,7 @@ _SERIES_BELOW = 1.0
 _SERIES_TERMS = 9
 _BRACKET = 1e-7
 _EPSILON = 4 * np.finfo(float).eps
+MAX_LOAD_RATIO = 1e9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,9 +30,9 @@ class TipLoad:
     Parameters
     ----------
     mass_ratio : float
-        M / (rho L), >= 0.
+        M / (rho L), 0 to 2e9.
     inertia_ratio : float
-        J / (rho L^3), >= 0.
+        J / (rho L^3), 0 to 2e9.
 
     """
 
@@ -39,8 +40,8 @@ class TipLoad:
     inertia_ratio: float = 0.0
 
     def __post_init__(self) -> None:
-        number('mass_ratio', self.mass_ratio, at_least=0)
-        number('inertia_ratio', self.inertia_ratio, at_least=0)
+        number('mass_ratio', self.mass_ratio, at_least=0, at_most=2 * MAX_LOAD_RATIO)
+        number('inertia_ratio', self.inertia_ratio, at_least=0, at_most=2 * MAX_LOAD_RATIO)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

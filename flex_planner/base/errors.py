@@ -31,7 +31,8 @@ class InvalidValueError(FlexPlannerError, ValueError):
         self.field = field
         self.value = value
         self.bound = bound
-        super().__init__(f'{field} is {value!r}, but must be {bound}')
+        shown = 'missing' if value is None else repr(value)
+        super().__init__(f'{field} is {shown}, but must be {bound}')
 
 
 class InvalidSizeError(InvalidValueError):

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import math
 
 from flex_planner.base.errors import InvalidSizeError, InvalidValueError, NotFiniteError
+from flex_planner.base.sentences import count_of
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -67,7 +68,9 @@ def _bound(above: float, at_least: float, at_most: float, unit: str) -> str:
         parts.append(f'>= {at_least:g}')
     if at_most < math.inf:
         parts.append(f'<= {at_most:g}')
-    return (' and '.join(parts) + (f' {unit}' if unit else '')).strip()
+    if unit and not parts:
+        return f'in {unit}'
+    return ' '.join([' and '.join(parts), unit]).strip()
 
 
 def integer(field: str, value: object, *, at_least: int, at_most: int) -> int:
@@ -118,14 +121,16 @@ def vector(
     """
     sizes = (size,) if isinstance(size, int) else tuple(size)
     wanted = ' or '.join(str(entry) for entry in sizes)
+    numbers = 'number' if sizes == (1,) else 'numbers'
     try:
         array = np.array(values, dtype=float)
     except (TypeError, ValueError, OverflowError):
-        raise InvalidValueError(field, values, f'a list of {wanted} numbers') from None
+        raise InvalidValueError(field, values, f'a list of {wanted} {numbers}') from None
     if array.ndim != 1:
-        raise InvalidSizeError(field, f'shape {array.shape}', f'a list of {wanted} numbers')
+        raise InvalidSizeError(field, f'shape {array.shape}', f'a list of {wanted} {numbers}')
     if array.size not in sizes:
-        raise InvalidSizeError(field, f'{array.size} numbers', f'a list of {wanted} numbers')
+        raise InvalidSizeError(field, count_of(array.size, 'number'),
+                               f'a list of {wanted} {numbers}')
     for index, entry in enumerate(array):
         number(f'{field}[{index}]', entry, above=above, at_least=at_least, at_most=at_most,
                unit=unit)

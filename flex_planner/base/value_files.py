@@ -14,13 +14,13 @@ from dataclasses import fields, is_dataclass
 from enum import Enum
 import json
 import os
-from pathlib import Path
 import threading
 from typing import Any
 import zipfile
 import zlib
 
 from flex_planner.base.errors import FlexPlannerError, ValueFileError
+from flex_planner.base.paths import expand_path
 from flex_planner.base.validation import Array
 import numpy as np
 
@@ -51,7 +51,7 @@ def save_value(path: str | os.PathLike[str], value: object) -> None:
     root = writer.encode(value)
     header = {'format': _FORMAT, 'objects': writer.objects, 'root': root}
     parts: dict[str, Any] = {_HEADER: np.array(json.dumps(header)), **writer.arrays}
-    target = Path(path)
+    target = expand_path(path)
     partial = target.with_name(f'.{target.name}.{os.getpid()}.{threading.get_ident()}.partial')
     try:
         with partial.open('wb') as file:
@@ -81,7 +81,7 @@ def load_value(path: str | os.PathLike[str], classes: Iterable[type]) -> object:
 
     """
     try:
-        with Path(path).open('rb') as file, np.load(file, allow_pickle=False) as stored:
+        with expand_path(path).open('rb') as file, np.load(file, allow_pickle=False) as stored:
             arrays = {name: stored[name] for name in stored.files}
         header = json.loads(str(arrays.pop(_HEADER)))
         if header['format'] != _FORMAT:

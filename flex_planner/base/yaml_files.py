@@ -11,14 +11,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 import math
 from pathlib import Path
-import re
 from typing import Any
 
 from flex_planner.base.errors import FlexPlannerError, InvalidValueError
+from flex_planner.base.text_files import read_text, say_file, TextFileError
 from flex_planner.base.validation import number
-import yaml
-
-_MAX_BYTES = 1_000_000
+from flex_planner.base.yaml_text import parse_yaml, YamlTextError
 
 
 class YamlFileError(FlexPlannerError):
@@ -27,40 +25,21 @@ class YamlFileError(FlexPlannerError):
 
 def read_yaml(path: Path) -> tuple[str, object]:
     """
-    Return the text of a file and what it says.
+    Return the text of a file, pipe or the standard input (``-``), and what it says.
 
     Raises
     ------
     YamlFileError
-        If it cannot be read, is too large, is no plain YAML, or has a key twice.
+        If it cannot be read, is empty or too large, is no plain YAML, or has a key twice.
 
     """
     try:
-        if path.stat().st_size > _MAX_BYTES:
-            raise YamlFileError(f'{path}: the file is larger than {_MAX_BYTES} bytes')
-        text = path.read_text(encoding='utf-8')
-        return text, yaml.load(text, _StrictLoader)
-    except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
-        raise YamlFileError(f'{path}: cannot be read: {error}') from None
-
-
-class _StrictLoader(yaml.SafeLoader):
-    """YAML in which a key may be given once only."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        """Return a mapping; PyYAML itself would keep the last of equal keys silently."""
-        keys = [key.value for key, _ in node.value]
-        for key_node, _ in node.value:
-            if keys.count(key_node.value) > 1:
-                raise yaml.constructor.ConstructorError(
-                    None, None, f'field {key_node.value!r} is given twice', key_node.start_mark)
-        return super().construct_mapping(node, deep)
-
-
-# YAML 1.1, which PyYAML reads, takes 7e10 and 7.0e10 for text
-_StrictLoader.add_implicit_resolver(
-    'tag:yaml.org,2002:float', re.compile(r'[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+$'),
-    list('-+.0123456789'))
+        text = read_text(path)
+        return text, parse_yaml(text)
+    except TextFileError as error:
+        raise YamlFileError(str(error)) from None
+    except YamlTextError as error:
+        raise YamlFileError(f'{say_file(path)}: cannot be read: {error}') from None
 
 
 class YamlSection:

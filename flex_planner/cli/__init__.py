@@ -8,8 +8,9 @@ import sys
 
 from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.progress import StoppedError, StopReason
+from flex_planner.base.sentences import say_os_error
 from flex_planner.base.version import VERSION
-from flex_planner.cli.commands import arm, compare, paper, plan, recordings
+from flex_planner.cli.commands import arm, cache, compare, paper, plan, recordings
 from flex_planner.cli.commands import map as maps
 from flex_planner.cli.options import join_lists
 from flex_planner.cli.progress_line import CanceledError
@@ -31,8 +32,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(join_lists(given))
     try:
         return int(options.run(options))
-    except (FlexPlannerError, OSError) as error:
+    except FlexPlannerError as error:
         print(f'flex-planner: {error}', file=sys.stderr)
+        return 1
+    except OSError as error:
+        print(f'flex-planner: {say_os_error(error)}', file=sys.stderr)
         return 1
     except StoppedError as error:
         print(f'flex-planner: {error}', file=sys.stderr)
@@ -53,5 +57,6 @@ def _parser() -> argparse.ArgumentParser:
     compare.add_command(commands)
     maps.add_command(commands)
     paper.add_command(commands)
+    cache.add_command(commands)
     recordings.add_commands(commands)
     return parser

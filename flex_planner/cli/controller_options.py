@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from flex_planner.arms.arm import Arm
 from flex_planner.base.validation import number, vector
-from flex_planner.cli.options import numbers
+from flex_planner.cli.options import number_argument, numbers
 from flex_planner.control.default_gains import default_gains
 from flex_planner.control.joint_controller import (
     EffortHold,
@@ -26,7 +26,7 @@ def add_controller(parser: argparse.ArgumentParser) -> None:
         'joint controller', 'that the trajectory is for, and that carries it out on the model '
         'before it is published')
     add = group.add_argument
-    add('--controller-rate', type=float, default=1000.0, metavar='HZ',
+    add('--controller-rate', type=number_argument, default=1000.0, metavar='HZ',
         help='rate of its updates (default: %(default)g)')
     add('--effort-hold', choices=[hold.value for hold in EffortHold], default='end',
         help='effort that it applies between two updates: end, as joint_trajectory_controller '
@@ -35,9 +35,9 @@ def add_controller(parser: argparse.ArgumentParser) -> None:
         '(default: 100 for each joint, or what suits the arm)')
     add('--controller-damping', metavar='D,D,...', help='derivative gains [N m s/rad] '
         '(default: 10 for each joint, or what suits the arm)')
-    add('--controller-period', type=float, metavar='S', help='shift the efforts by half this '
-        'time, in which they are held, so that their mean is right (default: 1 / rate; 0: not '
-        'at all)')
+    add('--controller-period', type=number_argument, metavar='S',
+        help='shift the efforts by half this time, in which they are held, so that their mean is '
+        'right (default: 1 / rate; 0: not at all)')
 
 
 def sampling_settings(options: argparse.Namespace, arm: Arm) -> SamplingSettings:

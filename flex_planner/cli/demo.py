@@ -18,6 +18,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import load_arm
 from flex_planner.base.validation import Array
+from flex_planner.cli.options import path_argument
 from flex_planner.optimal_control.task import postures_from_points
 from flex_planner.plotting import draw_motion, Execution, Motion
 from flex_planner.reports.motion import certificate_rows, joint_rows, planning_row, table
@@ -190,7 +191,7 @@ def run(folder: Path) -> str:
 def main() -> None:
     """Run the demonstration from the command line."""
     parser = argparse.ArgumentParser(description=__doc__.strip().splitlines()[0])
-    parser.add_argument('--output', type=Path, default=Path('output'),
+    parser.add_argument('--output', type=path_argument, default=Path('output'),
                         help='folder for picture and recording (default: output)')
     folder = parser.parse_args().output.resolve()
     rclpy.init()

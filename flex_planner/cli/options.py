@@ -4,35 +4,64 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from pathlib import Path
 import re
 from typing import TypeAlias
 
 from flex_planner.arms.arm_files import preset_files
 from flex_planner.base.errors import InvalidValueError
+from flex_planner.base.number_texts import AMBIGUOUS, NumberTextError, read_number
+from flex_planner.base.paths import expand_path, PathError
 from flex_planner.base.validation import Array, vector
 from flex_planner.optimal_control.task import MAX_JOINT_ANGLE
 import numpy as np
 
 Commands: TypeAlias = 'argparse._SubParsersAction[argparse.ArgumentParser]'
 
-_NEGATIVE_LIST = re.compile(r'-[\d.].*,')
+# argparse takes them for options
+_NEGATIVE = re.compile(r'-[\d.].*[,eE]')
 
 
 def join_lists(arguments: Sequence[str]) -> list[str]:
     """Return the arguments with ``--to -1,2`` as ``--to=-1,2``: argparse would see an option."""
     joined: list[str] = []
     for argument in arguments:
-        if joined and joined[-1].startswith('--') and _NEGATIVE_LIST.match(argument):
+        if joined and joined[-1].startswith('--') and _NEGATIVE.match(argument):
             joined[-1] += f'={argument}'
         else:
             joined.append(argument)
     return joined
 
 
+def path_argument(text: str) -> Path:
+    """Return a path of the command line, see `expand_path`; for argparse."""
+    try:
+        return expand_path(text)
+    except PathError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def number_argument(text: str) -> float:
+    """Return a number of the command line, see `read_number`; for argparse."""
+    try:
+        return float(read_number(text.strip()))
+    except NumberTextError as error:
+        raise argparse.ArgumentTypeError(f'{text!r} must be {error}') from None
+
+
+def integer_argument(text: str) -> int:
+    """Return an integer of the command line; for argparse."""
+    value = number_argument(text)
+    if not value.is_integer():
+        raise argparse.ArgumentTypeError(f'{text!r} must be an integer')
+    return int(value)
+
+
 def add_arm(parser: argparse.ArgumentParser) -> None:
     """Add the arm, which every command needs."""
     parser.add_argument('arm', metavar='ARM',
-                        help=f'arm file, or a preset: {", ".join(sorted(preset_files()))}')
+                        help='arm file, - for standard input, or a preset: '
+                        f'{", ".join(sorted(preset_files()))}')
 
 
 def numbers(option: str, text: str, sizes: int | Sequence[int] = (), unit: str = '', *,
@@ -46,11 +75,18 @@ def numbers(option: str, text: str, sizes: int | Sequence[int] = (), unit: str =
         Naming the option, if they are no numbers or not as many as one of `sizes`.
 
     """
-    try:
-        values = [float(part) for part in text.split(',')]
-    except ValueError:
-        raise InvalidValueError(option, text, 'numbers separated by commas') from None
+    values = [_entry(option, part.strip(), text) for part in text.split(',')]
     return vector(option, values, sizes, unit=unit) if finite else np.array(values)
+
+
+def _entry(option: str, part: str, text: str) -> float:
+    """Return a number of a list."""
+    try:
+        return float(read_number(part))
+    except NumberTextError as error:
+        if AMBIGUOUS.fullmatch(part):
+            raise InvalidValueError(option, part, str(error)) from None
+        raise InvalidValueError(option, text, 'numbers separated by commas') from None
 
 
 def angles(option: str, text: str, count: int) -> Array:

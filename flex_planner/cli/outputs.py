@@ -12,7 +12,9 @@ import tempfile
 from typing import TYPE_CHECKING
 
 from flex_planner.base.errors import InvalidValueError, RecordingError
+from flex_planner.base.paths import file_stem
 from flex_planner.capacity.results import MaxPayload
+from flex_planner.cli.options import path_argument
 from flex_planner.cli.request import Request
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.sampling import SampledPlan
@@ -62,7 +64,7 @@ class Outputs:
         draws, records = not options.no_plot, not options.no_recording
         if draws or records:
             check_folder(options.output)
-        return cls(folder=options.output, stem=Path(options.arm).stem, draws=draws,
+        return cls(folder=options.output, stem=file_stem(options.arm), draws=draws,
                    recorder=_recorder(request, options.output) if records else None)
 
     def write_plan(self, plan: Plan, reference: SampledPlan | None) -> Iterator[Row]:
@@ -99,7 +101,7 @@ class Outputs:
 
 def add_outputs(parser: argparse.ArgumentParser) -> None:
     """Add the options for what is written."""
-    parser.add_argument('--output', type=Path, default=Path('output'), metavar='DIR',
+    parser.add_argument('--output', type=path_argument, default=Path('output'), metavar='DIR',
                         help='folder for pictures and recordings (default: output)')
     parser.add_argument('--no-plot', action='store_true', help='draw nothing')
     parser.add_argument('--no-recording', action='store_true', help='record nothing')

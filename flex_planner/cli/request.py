@@ -16,12 +16,15 @@ from flex_planner.base.errors import (
     SingularError,
     UnreachableError,
 )
+from flex_planner.base.sentences import say_reason
 from flex_planner.base.validation import Array, number
+from flex_planner.capacity.results import MaxPayload
 from flex_planner.cli.controller_options import sampling_settings
-from flex_planner.cli.options import add_arm, angles, numbers
+from flex_planner.cli.options import add_arm, angles, integer_argument, number_argument, numbers
 from flex_planner.optimal_control.ends_at_points import ends_at_points
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.objectives import Objectives
+from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.point_times import MAX_SAMPLES
 from flex_planner.planning.sampling import SamplingSettings
 import numpy as np
@@ -95,6 +98,14 @@ class Request:
         return f'{ends} in {self.task.duration:g} s'
 
 
+def say_failure(outcome: Plan | MaxPayload, time_limit: float) -> str:
+    """Return why there is no result, with the time limit if that was it [s]."""
+    reason = outcome.message
+    if outcome.status is PlanStatus.TIMEOUT:
+        reason = f'--time-limit is {time_limit:g} s'
+    return say_reason(outcome.status.value, reason)
+
+
 def add_task(parser: argparse.ArgumentParser, payload: str) -> None:
     """Add the options that describe a motion; `payload` says what the payload is for."""
     add_arm(parser)
@@ -111,22 +122,23 @@ def add_task(parser: argparse.ArgumentParser, payload: str) -> None:
         '[m/s] (default: zeros)')
     add('--start-modal-displacements', metavar='M,M,...',
         help='modal displacements at the start, with --from-angles (default: those at rest)')
-    add('--elbow', type=int, default=-1, metavar='SIGN',
+    add('--elbow', type=integer_argument, default=-1, metavar='SIGN',
         help='sign of the second joint angle at the points, 1 or -1 (default: -1)')
-    add('--duration', type=float, required=True, metavar='S',
+    add('--duration', type=number_argument, required=True, metavar='S',
         help='duration of the motion')
-    add('--payload', dest='payload_mass', type=float, default=0.0, metavar='KG', help=payload)
-    add('--payload-inertia', type=float, default=0.0, metavar='KG_M2',
+    add('--payload', dest='payload_mass', type=number_argument, default=0.0, metavar='KG',
+        help=payload)
+    add('--payload-inertia', type=number_argument, default=0.0, metavar='KG_M2',
         help='rotary inertia of the payload about the tip (default: 0)')
     for name, what in (('effort', 'R: torques (default: ones)'),
                        ('velocity', 'W_2: velocities (default: zeros)'),
                        ('position', 'W_1: positions (default: zeros)')):
         add(f'--{name}-weights', metavar='W,W,...', help=f'diagonal of {what}')
-    add('--tolerance', type=float, default=1e-3, metavar='EPS',
+    add('--tolerance', type=number_argument, default=1e-3, metavar='EPS',
         help='largest allowed half squared error of the final state, eq. (17) (default: 0.001)')
     add('--allow-large-bending', action='store_true',
         help='accept links that bend by more than 0.3 of their length, though beams are linear')
-    add('--time-limit', type=float, default=MAX_TIME_LIMIT, metavar='S',
+    add('--time-limit', type=number_argument, default=MAX_TIME_LIMIT, metavar='S',
         help='give up after this time (default and maximum: %(default)g)')
 
 

@@ -6,6 +6,7 @@ from flex_planner.base.validation import Array
 from flex_planner.control.joint_controller import Gains
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.physical_parameters import PhysicalParameters
+from flex_planner.dynamics.statics import check_inertia
 import numpy as np
 
 _STIFFNESS, _DAMPING = 100.0, 10.0
@@ -26,10 +27,17 @@ def default_gains(dynamics: ArmDynamics, rate: float = 1000.0) -> Gains:
     would be unstable because next to nothing turns at once with a joint - a link clamped to a
     hub without inertia - the gains of the joints are lowered.
 
+    Raises
+    ------
+    InvalidTaskError
+        See `check_inertia`.
+
     """
     arm, n = dynamics.arm, dynamics.arm.n_joints
     physical = PhysicalParameters.of_arm(arm).physical
     masses = [_mass(dynamics, bend, physical) for bend in _BENDS]
+    for mass in masses:
+        check_inertia(mass)
     scale: Array = np.maximum(1.0, np.diag(masses[0])[:n] / _HEAVY)
     response = np.max([np.diag(np.linalg.inv(mass))[:n] for mass in masses], axis=0)
     # the sum bounds the share of any combination of the joints

@@ -11,6 +11,7 @@ from flex_planner.control.joint_reference import Reference
 import numpy as np
 
 MIN_RATE, MAX_RATE = 10.0, 1e5
+MAX_GAIN = 1e24
 
 
 class EffortHold(Enum):
@@ -67,9 +68,9 @@ class Gains:
     Parameters
     ----------
     stiffness : array_like, shape (n,)
-        >= 0 [N m/rad].
+        0 to 1e24 [N m/rad].
     damping : array_like, shape (n,)
-        >= 0 [N m s/rad].
+        0 to 1e24 [N m s/rad].
 
     """
 
@@ -79,7 +80,8 @@ class Gains:
     def __post_init__(self) -> None:
         for name, unit in (('stiffness', 'N m/rad'), ('damping', 'N m s/rad')):
             given = np.atleast_1d(np.asarray(getattr(self, name), dtype=float))
-            object.__setattr__(self, name, vector(name, given, given.size, at_least=0, unit=unit))
+            object.__setattr__(self, name, vector(
+                name, given, given.size, at_least=0, at_most=MAX_GAIN, unit=unit))
 
     @classmethod
     def of(cls, count: int, stiffness: float, damping: float) -> Gains:

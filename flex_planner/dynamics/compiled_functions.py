@@ -2,8 +2,9 @@
 CasADi functions compiled to machine code, kept on disk, called for many points at once.
 
 A library is found again by a key that its builder computes without CasADi, so a warm start
-neither imports CasADi nor runs a compiler. The calls go through ctypes, which releases the
-interpreter lock. Without a C compiler CasADi's virtual machine evaluates the same functions.
+neither imports CasADi nor runs a compiler; see `library_cache` for where it is kept. The calls go
+through ctypes, which releases the interpreter lock. Without a C compiler CasADi's virtual machine
+evaluates the same functions.
 
 """
 
@@ -14,24 +15,30 @@ import ctypes
 from dataclasses import asdict, dataclass
 from functools import cache
 import hashlib
-import json
-import logging
-import os
 from pathlib import Path
 import platform
-import shutil
-import subprocess
-import tempfile
 from typing import Any, Protocol
 
+from flex_planner.base.paths import PathError
 from flex_planner.base.validation import Array
+from flex_planner.dynamics.compiler import (
+    compile_library,
+    CompilerError,
+    find_compiler,
+    FLAGS,
+)
+from flex_planner.dynamics.library_cache import (
+    build_folders,
+    DamagedEntryError,
+    keep_library,
+    read_library,
+    scratch_folder,
+    warn_once,
+)
 import numpy as np
 
 Builder = Callable[[], Mapping[str, tuple[Any, int]]]
 
-_LOG = logging.getLogger(__name__)
-# -Og: straight-line code gains nothing from more, and -O1 takes up to five times as long
-_FLAGS = ('-Og', '-march=native', '-fPIC', '-shared')
 _POINTERS = ctypes.POINTER(ctypes.c_void_p)
 
 
@@ -167,17 +174,11 @@ class _InterpretedFunction:
         return run
 
 
-def cache_folder() -> Path:
-    """Return the folder of compiled functions: ``$XDG_CACHE_HOME/flex_planner``."""
-    root = os.environ.get('XDG_CACHE_HOME') or os.path.join(os.path.expanduser('~'), '.cache')
-    return Path(root) / 'flex_planner'
-
-
 def content_key(*parts: str | bytes) -> str:
     """Return a short digest of what a library is made of, for its name on disk."""
     digest = hashlib.sha256()
     # this file writes the loops around the functions, and calls them
-    own = (Path(__file__).read_bytes(), ' '.join(_FLAGS), platform.system(), _processor())
+    own = (Path(__file__).read_bytes(), ' '.join(FLAGS), platform.system(), _processor())
     for part in (*parts, *own):
         data = part.encode() if isinstance(part, str) else part
         digest.update(len(data).to_bytes(8, 'little') + data)
@@ -207,25 +208,67 @@ def load_functions(key: str, build: Builder) -> dict[str, BatchFunction]:
         Returns the CasADi functions and the number of batched inputs of each, by name.
 
     """
-    functions = _load(key)
-    if functions is not None:
-        return functions
+    try:
+        functions = read_library(key, _load)
+        if functions is not None:
+            return functions
+    except DamagedEntryError as error:
+        warn_once(f'compiled functions {key} are damaged ({error}) and are built again')
     built = build()
     signatures = {name: Signature.of(f, batched) for name, (f, batched) in built.items()}
-    compiler, reason = _compiler(), 'no C compiler (cc, gcc or clang) found'
-    if compiler is not None:
-        try:
-            return _bind(_compile(compiler, key, _source(built), signatures), signatures)
-        except (OSError, subprocess.CalledProcessError) as error:
-            reason = f'{compiler} failed: {getattr(error, "stderr", "") or error}'
-    _LOG.warning('%s: functions are interpreted, which makes a plan 10 to 50 times slower', reason)
+    try:
+        return _build_library(key, _source(built), signatures)
+    except CompilerError as error:
+        warn_once(f'{error}: functions are interpreted, which makes a plan 10 to 50 times slower')
     return {name: _InterpretedFunction(f, signatures[name]) for name, (f, _) in built.items()}
 
 
-def _compiler() -> str | None:
-    """Return the C compiler: ``$CC``, else the usual names."""
-    names = [os.environ.get('CC', ''), 'cc', 'gcc', 'clang']
-    return next((path for name in names if name and (path := shutil.which(name))), None)
+def _load(library: Path, functions: Mapping[str, Any]) -> dict[str, BatchFunction]:
+    """Load a library with the functions that its entry names."""
+    return _bind(library, {
+        name: Signature(entry['batched'], tuple(entry['inputs']),
+                        tuple((rows, columns) for rows, columns in entry['outputs']))
+        for name, entry in functions.items()})
+
+
+def _build_library(key: str, source: str,
+                   signatures: Mapping[str, Signature]) -> dict[str, BatchFunction]:
+    """
+    Compile, load and keep functions: in a temporary folder if the cache folder is of no use.
+
+    Raises
+    ------
+    CompilerError
+        If it works in neither.
+
+    """
+    compiler, reason = find_compiler(), ''
+    for folder in build_folders():
+        try:
+            with scratch_folder(folder) as scratch:
+                library = compile_library(compiler, source, Path(scratch))
+                # loaded before it is kept: then nobody can remove it in between
+                functions = _bind(library, signatures)
+                _keep(key, library, signatures, reason)
+                return functions
+        except CompilerError as error:
+            reason = str(error)
+        except OSError as error:
+            reason = f'{folder}: {error.strerror or error}'
+    raise CompilerError(reason)
+
+
+def _keep(key: str, library: Path, signatures: Mapping[str, Signature], reason: str) -> None:
+    """Keep a new library, unless there is a reason not to, and say so."""
+    try:
+        if not reason:
+            keep_library(key, library, {name: asdict(s) for name, s in signatures.items()})
+            return
+    except OSError as error:
+        reason = f'{library.parents[1]}: {error.strerror or error}'
+    except PathError as error:
+        reason = str(error)
+    warn_once(f'cannot keep compiled functions ({reason}): they are built again at the next start')
 
 
 def _source(built: Mapping[str, tuple[Any, int]]) -> str:
@@ -262,64 +305,6 @@ int {name}_batch(long long n, int chain, const double *const *in, double *const 
   return 0;
 }}
 """
-
-
-def _compile(compiler: str, key: str, source: str, signatures: Mapping[str, Signature]) -> Path:
-    """Compile in a private folder and put the result where `_load` finds it."""
-    folder = _writable_cache()
-    with tempfile.TemporaryDirectory(dir=folder, prefix='build-') as scratch:
-        code, library = Path(scratch, 'functions.c'), Path(scratch, 'functions.so')
-        code.write_text(source)
-        subprocess.run([compiler, *_FLAGS, str(code), '-o', str(library), '-lm'],
-                       check=True, capture_output=True, text=True)
-        digest = _digest(library)
-        # named by its content: two processes that build at once never mix their files
-        target = folder / f'{key}-{digest[:16]}.so'
-        os.replace(library, target)
-        record = {'library': target.name, 'sha256': digest,
-                  'functions': {name: asdict(s) for name, s in signatures.items()}}
-        entry = Path(scratch, 'entry.json')
-        entry.write_text(json.dumps(record))
-        os.replace(entry, folder / f'{key}.json')
-    return target
-
-
-def _writable_cache() -> Path:
-    """Return the cache folder, or a temporary one where it cannot be written."""
-    folder = cache_folder()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            return folder
-    except OSError as error:
-        _LOG.warning('cannot keep compiled functions in %s (%s): they are built again at the '
-                     'next start', folder, error)
-        return Path(tempfile.mkdtemp(prefix='flex_planner-'))
-
-
-def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
-
-
-def _load(key: str) -> dict[str, BatchFunction] | None:
-    """Return the functions kept under a key, or None if any part is missing or damaged."""
-    folder = cache_folder()
-    try:
-        record = json.loads((folder / f'{key}.json').read_text())
-        library = folder / record['library']
-        # a damaged library would end the process when loaded, so it is read first
-        if _digest(library) != record['sha256']:
-            raise ValueError('wrong checksum')
-        signatures = {
-            name: Signature(entry['batched'], tuple(entry['inputs']),
-                            tuple((rows, columns) for rows, columns in entry['outputs']))
-            for name, entry in record['functions'].items()}
-        return _bind(library, signatures)
-    except (FileNotFoundError, NotADirectoryError):
-        return None
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        _LOG.warning('compiled functions %s are damaged (%s) and are built again', key, error)
-        return None
 
 
 def _bind(library: Path, signatures: Mapping[str, Signature]) -> dict[str, BatchFunction]:

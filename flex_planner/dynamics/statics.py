@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from flex_planner.base.errors import NoEquilibriumError
+from flex_planner.base.errors import InvalidTaskError, NoEquilibriumError
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.physical_parameters import PhysicalParameters
 import numpy as np
 
 _MAX_ITERATIONS = 50
+_LEAST_INERTIA = 1e-14  # of a motion relative to those of single coordinates; rounding is 1e-16
 _STATIONS = 41
 
 
@@ -80,6 +81,11 @@ def natural_modes(dynamics: ArmDynamics, coordinates: Array, parameters: Physica
     vectors : numpy.ndarray, shape (n_f, n_f) or (n_t, n_t)
         Columns are displacements, orthonormal in the mass matrix.
 
+    Raises
+    ------
+    InvalidTaskError
+        See `check_inertia`.
+
     """
     from scipy.linalg import eigh  # see `ArmDynamics.prepare`
 
@@ -89,10 +95,29 @@ def natural_modes(dynamics: ArmDynamics, coordinates: Array, parameters: Physica
     stiffness = dynamics.static_forces(coordinates[None], p)[1][0, first:, first:]
     if not mass.size:
         return np.zeros(0), np.zeros((0, 0))
+    check_inertia(mass)
     squares, vectors = eigh(stiffness, mass)
     # a free joint has no stiffness: rounding makes its square slightly negative
     squares[np.abs(squares) < 1e-10 * np.abs(squares).max(initial=0)] = 0
     return np.sqrt(np.where(squares < 0, np.nan, squares)), vectors
+
+
+def check_inertia(mass: Array) -> None:
+    """
+    Check that a mass matrix is positive definite beyond rounding.
+
+    Raises
+    ------
+    InvalidTaskError
+        If what moves is so unequal that the inertia of the lightest part is lost.
+
+    """
+    scale = np.sqrt(np.diag(mass))
+    least = np.linalg.eigvalsh(mass / np.outer(scale, scale))[0] if (scale > 0).all() else 0.0
+    if not least > _LEAST_INERTIA:
+        raise InvalidTaskError('the links, nodes and the payload are so unequal in mass or length '
+                               'that the inertia of the lightest is lost in rounding: nothing can '
+                               'be computed with them')
 
 
 def residual_vibration(dynamics: ArmDynamics, state: Array, rest: Array,

@@ -167,9 +167,10 @@ def _read_axis(section: YamlSection, name: str, cells: int) -> Axis:
     content = section.take(name)
     if not isinstance(content, Mapping):
         return Axis(name=name, values=content)
-    part, unit = YamlSection(section.name(name), content), AXES[name].unit
-    low = part.number('from', unit=unit)
-    high = part.number('to', above=low, unit=unit)
+    part, kind = YamlSection(section.name(name), content), AXES[name]
+    low = part.number('from', above=kind.above, at_least=kind.at_least, at_most=kind.at_most,
+                      unit=kind.unit)
+    high = part.number('to', above=low, at_most=kind.at_most, unit=kind.unit)
     count = integer(part.name('count'), part.take('count'), at_least=2, at_most=MAX_CELLS)
     part.finish()
     check_cells(cells * count)  # before they fill the memory

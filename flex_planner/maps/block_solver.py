@@ -93,6 +93,9 @@ class _BlockRun:
         if self._monitor is not None:
             limited.canceled = self._monitor.canceled
         result = self._solve(index, limited)
+        if result.code is CellCode.TIMEOUT:
+            result = replace(result, message=f'{result.message}; cell_time_limit is '
+                                             f'{limited.time_limit:g} s')
         return_memory()
         start = self._starts.get(index, NearCells())
         return replace(result, message=result.message[:_LONGEST_MESSAGE],

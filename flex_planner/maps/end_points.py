@@ -68,7 +68,7 @@ class End:
                                         f'left out: {field} gives the {self.name}')
             return
         for entry, name in zip(self.point, self.axes, strict=True):
-            if name not in moved:
+            if name not in moved or not np.isnan(entry):
                 number(self.name, float(entry), at_least=-MAX_COORDINATE, at_most=MAX_COORDINATE,
                        unit='m')
 

@@ -8,13 +8,13 @@ from typing import Any
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import plain_arm
+from flex_planner.base.yaml_text import format_yaml, parse_yaml
 from flex_planner.maps.cell_results import CellCode
 from flex_planner.maps.kept_motions import distances, KeptMotion, signature
 from flex_planner.maps.quantities import Quantity
 from flex_planner.maps.store import MapStoreError, open_group
 from flex_planner.optimal_control.task import Task
 import numpy as np
-import yaml
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -114,8 +114,7 @@ def _value(axis: Any, k: int) -> str:
 
 def _check_arm(path: Path, there: str, arm: Arm) -> None:
     """Refuse a map of another arm; its name and source do not matter."""
-    found = yaml.safe_load(there)
-    own = yaml.safe_load(yaml.safe_dump(plain_arm(arm)))
+    found, own = parse_yaml(there), parse_yaml(format_yaml(plain_arm(arm)))
     differing = [name for name in own if name not in ('name', 'source')
                  and own[name] != found.get(name)]
     if differing:

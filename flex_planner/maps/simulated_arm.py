@@ -10,6 +10,7 @@ from flex_planner.base.validation import number, vector
 from flex_planner.control.joint_controller import Gains
 from flex_planner.optimal_control.task import MAX_PAYLOAD
 from flex_planner.simulation.mismatch import Mismatch
+from flex_planner.simulation.settling import MAX_SETTLING, MIN_SETTLING
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -26,7 +27,7 @@ class SimulatedArm:
     gains : Gains or None
         Of its joint controller; None for the planned torques alone.
     settling : float
-        Time to watch it after its arrival, > 0 and at most 1000 [s].
+        Time to watch it after its arrival, 0.001 to 1000 [s].
 
     """
 
@@ -50,7 +51,7 @@ class SimulatedArm:
             Naming the field as in a study file.
 
         """
-        number('settling', self.settling, above=0, at_most=1000, unit='s')
+        number('settling', self.settling, at_least=MIN_SETTLING, at_most=MAX_SETTLING, unit='s')
         self.mismatch.apply(arm)
         if self.has_payload:
             number('mismatch.payload_mass', self.payload_mass, at_least=0, at_most=MAX_PAYLOAD,

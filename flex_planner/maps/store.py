@@ -19,6 +19,7 @@ from types import TracebackType
 from typing import Any, NoReturn, TYPE_CHECKING
 
 from flex_planner.base.errors import FlexPlannerError
+from flex_planner.base.paths import expand_path
 from flex_planner.maps.axes import Block
 from flex_planner.maps.cell_results import CellCode, CellResult
 from flex_planner.maps.store_layout import BESIDE, differences, metadata, MOTIONS, write_empty
@@ -52,7 +53,7 @@ class MapStore:
     """
 
     def __init__(self, path: Path) -> None:
-        self.path = path
+        self.path = path = expand_path(path)
         self._group = open_group(path, 'r+')
         self._key: str = self._group.attrs['quantity']
         self._lock = _lock_store(path)
@@ -69,6 +70,7 @@ class MapStore:
             If it cannot be written.
 
         """
+        path = expand_path(path)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             # complete or not there at all
@@ -101,6 +103,7 @@ class MapStore:
             If it cannot be written.
 
         """
+        path = expand_path(path)
         if os.path.lexists(path):
             store = cls(path)
             if not reset:
@@ -209,6 +212,7 @@ def open_map(path: Path) -> xr.Dataset:
         If there is none.
 
     """
+    path = expand_path(path)
     open_group(path, 'r')
     opened: xr.Dataset = xr.open_zarr(str(path), chunks=None)
     return opened
@@ -224,6 +228,7 @@ def open_group(path: Path, mode: str) -> Any:
         If there is none.
 
     """
+    path = expand_path(path)
     if not path.exists():
         raise MapStoreError(f'there is no map {path}')
     try:

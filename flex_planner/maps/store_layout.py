@@ -11,13 +11,13 @@ from typing import Any, TYPE_CHECKING
 from dask import array
 from flex_planner.arms.arm_files import plain_arm
 from flex_planner.base.version import VERSION
+from flex_planner.base.yaml_text import format_yaml, parse_yaml
 from flex_planner.maps.cell_results import CellCode
 from flex_planner.maps.kept_motions import signature_fields
 from flex_planner.optimal_control.task import Task
 from numcodecs import Blosc, VLenArray
 import numpy as np
 import xarray as xr
-import yaml
 import zarr
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ def _flags() -> dict[str, Any]:
 def metadata(study: Study) -> dict[str, str]:
     """Return the metadata of a study's store."""
     return {'title': study.name, 'quantity': study.quantity.key, 'study': study.text,
-            'arm': yaml.safe_dump(plain_arm(study.arm), sort_keys=False),
+            'arm': format_yaml(plain_arm(study.arm)),
             'Conventions': _CONVENTIONS,
             'date_created': datetime.now(timezone.utc).isoformat(timespec='seconds'),
             'flex_planner_version': VERSION,
@@ -107,7 +107,7 @@ def differences(there: dict[str, Any], wanted: dict[str, str]) -> list[str]:
     found = [f'{name.replace("_", " ")}: {wanted[name]}, there {there.get(name)}'
              for name in ('flex_planner_version', 'quantity') if wanted[name] != there.get(name)]
     for name in ('study', 'arm'):
-        old, new = yaml.safe_load(str(there.get(name))), yaml.safe_load(wanted[name])
+        old, new = parse_yaml(str(there.get(name))), parse_yaml(wanted[name])
         if old == new:
             continue
         if not isinstance(old, dict) or not isinstance(new, dict):

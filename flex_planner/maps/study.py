@@ -17,6 +17,8 @@ from flex_planner.base.errors import (
     SingularError,
     UnreachableError,
 )
+from flex_planner.base.paths import expand_path, PathError
+from flex_planner.base.text_files import say_file
 from flex_planner.base.validation import Array, integer, number
 from flex_planner.base.yaml_files import read_yaml, YamlFileError, YamlSection
 from flex_planner.maps.axes import Axis, Block, tiles
@@ -260,13 +262,15 @@ def load_study(path: str | os.PathLike[str]) -> Study:
         no sense with the others.
 
     """
-    file = Path(path)
     try:
+        file = expand_path(path)
         text, content = read_yaml(file)
         top = YamlSection('', content)
-        study: Study = top.build(Study, text=text, **read_fields(top, file.parent))
-    except YamlFileError as error:
+        # a pipe has no folder that its writer meant
+        folder = file.parent if file.is_file() else Path()
+        study: Study = top.build(Study, text=text, **read_fields(top, folder))
+    except (PathError, YamlFileError) as error:
         raise StudyError(str(error)) from None
     except FlexPlannerError as error:
-        raise StudyError(f'{file}: {error}') from error
+        raise StudyError(f'{say_file(file)}: {error}') from error
     return study

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import math
-import os
 from pathlib import Path
 from typing import Any
 
 from flex_planner.arms.arm import Arm, MAX_MODES
-from flex_planner.arms.arm_files import arm_from_mapping, ArmFileError, load_arm
+from flex_planner.arms.arm_files import (
+    arm_from_mapping,
+    ArmFileError,
+    is_arm_path,
+    load_arm,
+    preset_files,
+)
 from flex_planner.base.errors import InvalidValueError
+from flex_planner.base.paths import expand_path, PathError, STANDARD_INPUT
 from flex_planner.base.validation import Array, integer, number, vector
 from flex_planner.base.yaml_files import YamlSection
 from flex_planner.control.joint_controller import Gains
@@ -64,10 +70,9 @@ def _arm(top: YamlSection, folder: Path) -> Arm:
     """Return the arm: a preset, a file or a mapping, with another number of modes if given."""
     given = top.take('arm')
     if isinstance(given, str):
-        is_path = given.endswith(('.yaml', '.yml')) or os.sep in given
         try:
-            arm = load_arm(folder / given if is_path else given)
-        except ArmFileError as error:
+            arm = load_arm(_arm_path(given, folder))
+        except (ArmFileError, PathError) as error:
             raise ArmFileError(f'arm: {error}') from error
     else:
         arm = arm_from_mapping(given, 'arm')
@@ -77,6 +82,15 @@ def _arm(top: YamlSection, folder: Path) -> Arm:
     if modes and not arm.n_modes:
         raise InvalidValueError('modes', modes, 'left out: every link of the arm is rigid')
     return Mismatch(modes=modes).apply(arm)
+
+
+def _arm_path(given: str, folder: Path) -> str:
+    """Return the name of a preset as it is, and a path from the folder of the study."""
+    if given != STANDARD_INPUT and is_arm_path(given):
+        return str(folder / expand_path(given))
+    # as on the command line, a file needs no suffix, but a preset of its name comes first
+    is_file = given not in preset_files() and (folder / given).is_file()
+    return str(folder.absolute() / given) if is_file else given
 
 
 def _refuse_given_twice(top: YamlSection, axes: tuple[Axis, ...]) -> None:

@@ -10,6 +10,8 @@ from flex_planner.base.errors import SingularError, UnreachableError
 from flex_planner.base.validation import Array, vector
 from numpy.typing import ArrayLike
 
+MAX_COORDINATE = 1e6  # of a point [m]
+
 
 def ends_at_points(arm: Arm, start: ArrayLike | None, goal: ArrayLike | None,
                    elbow: int, start_positions: Array | None = None) -> dict[str, Any]:
@@ -55,7 +57,7 @@ def _end(arm: Arm, name: str, point: ArrayLike, elbow: int,
          near: Array | None) -> dict[str, Any]:
     """Return the fields of one end at a point; errors say which."""
     field = f'{name}_point'
-    checked = vector(field, point, 2, unit='m')
+    checked = vector(field, point, 2, at_least=-MAX_COORDINATE, at_most=MAX_COORDINATE, unit='m')
     try:
         return {field: checked, f'{name}_positions': posture_near_point(arm, checked, elbow, near)}
     except (UnreachableError, SingularError) as error:

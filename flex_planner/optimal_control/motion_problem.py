@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationSolution, GaussRule
-from flex_planner.dynamics.statics import natural_modes
+from flex_planner.dynamics.statics import check_inertia, natural_modes
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.boundary_conditions import BoundaryConditions
 from flex_planner.optimal_control.parameters import Parameters
@@ -57,6 +57,8 @@ class MotionProblem:
         If a motor is too weak to hold the arm at a goal where it comes to rest.
     UnreachableError, SingularError
         If the bent arm cannot rest at a point; the message says which.
+    InvalidTaskError
+        See `check_inertia`.
 
     """
 
@@ -135,6 +137,7 @@ class MotionProblem:
         n = arm.n_joints
         travel = np.maximum(np.abs(self.goal - self.start)[:n], 0.1)
         mass = self.model.mass_and_energy(self.start[None], self.parameters.physical)[0][0]
+        check_inertia(mass)
         inertia = np.abs(mass[:, :n]) @ (4 * travel / duration**2)
         bend = np.zeros(0)
         if arm.n_modes:

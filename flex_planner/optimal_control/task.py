@@ -9,16 +9,19 @@ from flex_planner.arms.arm import Arm
 from flex_planner.arms.inverse_kinematics import check_angle_limits
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.validation import Array, number, vector
-from flex_planner.optimal_control.ends_at_points import ends_at_points
+from flex_planner.optimal_control.ends_at_points import ends_at_points, MAX_COORDINATE
 import numpy as np
 from numpy.typing import ArrayLike
 
 MAX_JOINT_ANGLE = 100.0
-MAX_DURATION = 1000.0
+MIN_DURATION, MAX_DURATION = 1e-9, 1000.0
 MAX_PAYLOAD = 1e6
 MAX_VELOCITY = 1e3
 MAX_DISPLACEMENT = 1e2
 MAX_TIME_WEIGHT = 1e9
+MIN_TOLERANCE = 1e-15
+# of effort, where 0 is none; far beyond what searches for weights come to
+MIN_WEIGHT, MAX_WEIGHT = 1e-18, 1e18
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -37,17 +40,17 @@ class Task:
         that of the bent arm is found, see `posture_near_point`.
     start_point, goal_point : array_like, shape (2,)
         Where the tip of the arm is at rest, bent by gravity with its payload, in the base frame
-        [m]; empty where joint angles are given. `MotionProblem` finds the posture.
+        [m], within +-1e6; empty where joint angles are given. `MotionProblem` finds the posture.
     duration : float
-        t_f, > 0 and at most 1000 [s]; a first guess of it if `time_weight` is not 0.
+        t_f, 1e-9 to 1000 [s]; a first guess of it if `time_weight` is not 0.
     payload_mass : float
         m_p, >= 0 and at most 1e6 [kg].
     payload_inertia : float
         Rotary inertia of the payload about the tip, >= 0 and at most 1e6 [kg m^2].
     effort_weights : array_like, shape (n,)
-        Diagonal of R, > 0; empty for ones.
+        Diagonal of R, 1e-18 to 1e18; empty for ones.
     position_weights, velocity_weights : array_like, shape (n,) or (n_t,)
-        Diagonals of W_1 and W_2, >= 0; empty for zeros, n entries for the joints alone.
+        Diagonals of W_1 and W_2, 0 to 1e18; empty for zeros, n entries for the joints alone.
     start_velocities, goal_velocities : array_like, shape (n,) or (n_t,)
         Rates at both ends [rad/s, m/s]; empty for zeros, n entries for the joints alone.
     start_modal_displacements : array_like, shape (n_f,)
@@ -55,13 +58,13 @@ class Task:
         moves, within +-100 m; empty for those of the arm at rest.
     goal_position_weights, goal_velocity_weights : array_like, shape (n,) or (n_t,)
         Diagonals of W_p and W_v of eq. (6): the goal is approached at this price, and is free
-        where the weight is 0. ``inf`` means that it must be met, and is the default; n entries
-        leave it so for the modal coordinates.
+        where the weight is 0; at most 1e18. ``inf`` means that it must be met, and is the default;
+        n entries leave it so for the modal coordinates.
     time_weight : float
         Price of a second, >= 0 [1/s]: if not 0, the duration is free and this times t_f is
         added to eq. (6). The larger it is, the nearer the motion comes to minimum time.
     tolerance : float
-        eps of eq. (17) with W_p = W_v = 1, > 0 and at most 1.
+        eps of eq. (17) with W_p = W_v = 1, 1e-15 to 1.
     allow_large_bending : bool
         Whether a plan may bend links by more than 0.3 of their length, though they are linear
         beams.
@@ -164,19 +167,25 @@ class Task:
             self._set(name, vector(name, getattr(self, name), n, at_least=-MAX_JOINT_ANGLE,
                                    at_most=MAX_JOINT_ANGLE, unit='rad'))
             point = name.replace('positions', 'point')
-            self._set(point, vector(point, getattr(self, point), (0, 2), unit='m'))
+            self._set(point, vector(point, getattr(self, point), (0, 2), at_least=-MAX_COORDINATE,
+                                    at_most=MAX_COORDINATE, unit='m'))
             if not (getattr(self, point).size and self.arm.bends_at_rest):
                 check_angle_limits(self.arm, name, getattr(self, name))
         number('duration', self.duration, above=0, at_most=MAX_DURATION, unit='s')
+        number('duration', self.duration, at_least=MIN_DURATION, unit='s')
         number('payload_mass', self.payload_mass, at_least=0, at_most=MAX_PAYLOAD, unit='kg')
         number('payload_inertia', self.payload_inertia, at_least=0, at_most=MAX_PAYLOAD,
                unit='kg m^2')
         number('tolerance', self.tolerance, above=0, at_most=1)
+        number('tolerance', self.tolerance, at_least=MIN_TOLERANCE)
         number('time_weight', self.time_weight, at_least=0, at_most=MAX_TIME_WEIGHT, unit='1/s')
-        effort = vector('effort_weights', self.effort_weights, (0, n), above=0)
+        effort = vector('effort_weights', self.effort_weights, (0, n), above=0,
+                        at_most=MAX_WEIGHT)
+        vector('effort_weights', effort, effort.size, at_least=MIN_WEIGHT)
         self._set('effort_weights', effort if effort.size else vector('', np.ones(n), n))
         for name in ('position_weights', 'velocity_weights'):
-            self._set(name, _pad(name, getattr(self, name), n, n_t, 0.0, at_least=0))
+            self._set(name, _pad(name, getattr(self, name), n, n_t, 0.0, at_least=0,
+                                 at_most=MAX_WEIGHT))
         for name in ('start_velocities', 'goal_velocities'):
             self._set(name, _pad(name, getattr(self, name), n, n_t, 0.0,
                                  at_least=-MAX_VELOCITY, at_most=MAX_VELOCITY))
@@ -231,11 +240,12 @@ def _goal_weights(name: str, values: ArrayLike, n: int, n_t: int) -> Array:
         given = np.zeros(0)
     hard = np.isposinf(given)
     if given.ndim == 1 and hard.any():
-        checked = _pad(name, np.where(hard, 0.0, given), n, n_t, np.inf, at_least=0)
+        checked = _pad(name, np.where(hard, 0.0, given), n, n_t, np.inf, at_least=0,
+                       at_most=MAX_WEIGHT)
         padded = np.where(np.pad(hard, (0, n_t - hard.size)), np.inf, checked)
         padded.setflags(write=False)
         return padded
-    return _pad(name, values, n, n_t, np.inf, at_least=0)
+    return _pad(name, values, n, n_t, np.inf, at_least=0, at_most=MAX_WEIGHT)
 
 
 def postures_from_points(arm: Arm, start: ArrayLike, goal: ArrayLike,

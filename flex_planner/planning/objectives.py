@@ -28,6 +28,7 @@ from numpy.typing import ArrayLike
 
 _MIN_TOLERANCE, _MAX_TOLERANCE = 1e-4, 1.0
 _MAX_WEIGHT = 1e12
+_LEAST_LIMIT, _MOST_LIMIT = 1e-9, 1e9
 _BOUND = '> 0, or inf for no limit'
 # points in an interval of the mesh at which peaks are looked for
 _POINTS = np.linspace(0, 1, 129, dtype=np.float64)
@@ -45,6 +46,8 @@ class Objective(Enum):
 class Objectives:
     """
     Largest values that a motion may have; empty, or ``inf`` at an entry, for no limit.
+
+    Limits are within 1e-9 to 1e9.
 
     Parameters
     ----------
@@ -150,6 +153,8 @@ def _limits(name: str, values: ArrayLike) -> Array:
             raise NotFiniteError(f'{name}[{i}]', float(limit), _BOUND)
         if not limit > 0:
             raise InvalidValueError(f'{name}[{i}]', float(limit), _BOUND)
+        if np.isfinite(limit):
+            number(f'{name}[{i}]', limit, at_least=_LEAST_LIMIT, at_most=_MOST_LIMIT)
     limits.setflags(write=False)
     return limits
 

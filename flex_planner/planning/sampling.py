@@ -119,7 +119,8 @@ class SamplingSettings:
 
     def __post_init__(self) -> None:
         number('longest_step', self.longest_step, at_least=SMALLEST_STEP, at_most=1, unit='s')
-        number('torque_tolerance', self.torque_tolerance, above=0, unit='N m')
+        number('torque_tolerance', self.torque_tolerance, at_least=1e-9, at_most=1e9,
+               unit='N m')
         if self.controller_period is not None:
             number('controller_period', self.controller_period, at_least=0, at_most=MAX_PERIOD,
                    unit='s')

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 import secrets
 
+from flex_planner.base.paths import expand_path
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -35,6 +36,7 @@ def save(figure: Figure, path: Path) -> None:
         If it cannot be written, naming the path.
 
     """
+    path = expand_path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     stage = path.with_name(f'.{secrets.token_hex(8)}.{path.name}')
     try:

@@ -9,6 +9,7 @@ import re
 from typing import Final
 
 from flex_planner.base.errors import RecordingError
+from flex_planner.base.paths import expand_path
 from flex_planner.recording.topics import parse_yaml
 
 PART: Final = re.compile(r'(.+)_(\d+)\.mcap')
@@ -37,7 +38,7 @@ def recording_files(path: Path | str, *, complete: bool = True) -> list[Path]:
         If a folder has none, or some that are not the parts of one recording.
 
     """
-    path = Path(path)
+    path = expand_path(path)
     if not path.is_dir():
         return [path]
     try:

@@ -19,6 +19,7 @@ import re
 from typing import Final
 
 from flex_planner.base.errors import InvalidValueError, RecordingError
+from flex_planner.base.paths import expand_path
 from flex_planner.recording.channels import ChannelTable
 from flex_planner.recording.decoding import check_encoding, Decoder
 from flex_planner.recording.definitions import MessageTypes
@@ -62,7 +63,7 @@ def recover_recording(path: Path | str, types: MessageTypes,
         cannot be written.
 
     """
-    path = Path(path)
+    path = expand_path(path)
     files, target = recording_files(path, complete=False), _target(path)
     _refuse_unfinished_work(files[-1])
     found = _Complete(types)

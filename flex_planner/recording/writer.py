@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from flex_planner.base.errors import InvalidValueError, RecordingError
+from flex_planner.base.paths import expand_path
 from flex_planner.recording.definitions import MessageTypes
 from flex_planner.recording.mcap_file import RecordingFile
 from flex_planner.recording.metadata import check_custom_data, RecordingMetadata
@@ -100,7 +101,7 @@ class Recording:
                                     '. or -')
         if max_bytes is not None and max_bytes < 1:
             raise InvalidValueError('max_bytes', max_bytes, 'at least 1')
-        path = Path(folder) / name
+        path = expand_path(folder) / name
         custom_data = check_custom_data(custom_data or {})
         with staged_folder(path) as stage:
             recording = cls(stage, path, types, custom_data, max_bytes)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from flex_planner.base.sentences import say_reason
 from flex_planner.planning.plan import Plan
 from flex_planner.reports.motion import columns, planning_row, Row, warning_rows
 from flex_planner.simulation.comparison import Comparison
@@ -47,7 +48,7 @@ def _planning(plan: Plan) -> str:
     if plan.solved:
         return planning_row(plan.planning_time, plan.strategy,
                             f'{plan.iterations} iterations')[1]
-    return ': '.join(dict.fromkeys([plan.status.value, plan.message]))
+    return say_reason(plan.status.value, plan.message)
 
 
 def _cells(result: ExecutionResult) -> list[str]:

@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
-from pathlib import Path
 import time
 from typing import Any
 
 from flex_planner.base.errors import FlexPlannerError, InvalidValueError, RecordingError
+from flex_planner.base.paths import expand_path
 from flex_planner.recording import (
     check_encoding,
     Decoder,
@@ -81,7 +81,7 @@ class Replay(Node):  # type: ignore[misc]
     def __init__(self, settings: ReplaySettings) -> None:
         super().__init__('replay')
         self._settings = declare(self, settings)
-        self._path = Path(self._settings.recording)
+        self._path = expand_path(self._settings.recording)
         metadata = read_metadata(self._path)
         self._first_ns = metadata.start_ns + round(self._settings.start * 1e9)
         if self._first_ns > metadata.end_ns:

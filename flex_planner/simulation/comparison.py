@@ -18,7 +18,7 @@ from flex_planner.control.default_gains import default_gains
 from flex_planner.control.joint_controller import Gains, JointController
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.optimal_control.arm_model import ArmModel
-from flex_planner.optimal_control.task import Task
+from flex_planner.optimal_control.task import MAX_PAYLOAD, Task
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.point_times import MAX_SAMPLES
@@ -27,6 +27,7 @@ from flex_planner.planning.strategies.initial_guesses import rigid_problem
 from flex_planner.simulation.execution import execute_plan, ExecutionMode, ExecutionResult, Setting
 from flex_planner.simulation.mismatch import Mismatch
 from flex_planner.simulation.plant import Control
+from flex_planner.simulation.settling import MAX_SETTLING, MIN_SETTLING
 
 _STIFFNESS, _DAMPING = 100.0, 10.0
 # closer than a controller needs it, so that what is compared is the plans
@@ -94,7 +95,7 @@ def compare(task: Task, *, model: ArmModel | None = None, mismatch: Mismatch | N
     rate : float
         Of the controller, 10 to 100000 [Hz].
     settling : float
-        For how long to watch the arm after its arrival, > 0 and at most 1000 [s].
+        For how long to watch the arm after its arrival, 0.001 to 1000 [s].
     monitor : Monitor, optional
         Receives progress, and may stop it.
 
@@ -117,9 +118,9 @@ def compare(task: Task, *, model: ArmModel | None = None, mismatch: Mismatch | N
     simulated = (mismatch or Mismatch()).apply(task.arm)
     chosen = gains or Gains.of(task.arm.n_joints, _STIFFNESS, _DAMPING)
     Control(gains=chosen, rate=rate).check(task.arm.n_joints)
-    number('settling', settling, above=0, at_most=1000, unit='s')
+    number('settling', settling, at_least=MIN_SETTLING, at_most=MAX_SETTLING, unit='s')
     carried = number('payload_mass', task.payload_mass if payload_mass is None else payload_mass,
-                     at_least=0, unit='kg')
+                     at_least=0, at_most=MAX_PAYLOAD, unit='kg')
     flexible = plan_path(task, model=model, monitor=watch)
     again = Monitor(time_limit=watch.time_limit - watch.elapsed, canceled=watch.canceled,
                     report=watch.report)

@@ -19,6 +19,7 @@ from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.integration import HeldTorqueIntegrator
 from flex_planner.dynamics.physical_parameters import PhysicalParameters
 from flex_planner.dynamics.statics import equilibrium
+from flex_planner.optimal_control.task import MAX_PAYLOAD
 from flex_planner.optimal_control.torque_limits import TorqueLimits
 from flex_planner.simulation.joint_control import Disturbance, Encoder, JointSensor
 import numpy as np
@@ -111,8 +112,9 @@ class Plant:
         n = model.arm.n_joints
         control.check(n)
         self.model, self.control, self.period = model, control, 1 / control.rate
-        mass = number('payload_mass', payload_mass, at_least=0, unit='kg')
-        inertia = number('payload_inertia', payload_inertia, at_least=0, unit='kg m^2')
+        mass = number('payload_mass', payload_mass, at_least=0, at_most=MAX_PAYLOAD, unit='kg')
+        inertia = number('payload_inertia', payload_inertia, at_least=0, at_most=MAX_PAYLOAD,
+                         unit='kg m^2')
         parameters = PhysicalParameters.of_arm(model.arm, payload_mass=mass,
                                                payload_inertia=inertia)
         rest, self.torque = equilibrium(model, vector('positions', positions, n, unit='rad'),

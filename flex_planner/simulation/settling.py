@@ -9,6 +9,7 @@ from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.validation import Array
 import numpy as np
 
+MIN_SETTLING, MAX_SETTLING = 1e-3, 1000.0  # [s], that an arm may be watched after its arrival
 _STATIONS = 41
 _DIRECTIONS = 180
 

@@ -65,9 +65,9 @@ VECTORS = [
     # task field, its length, a bad entry, the bound in the message
     ('start_positions', 2, 100.1, '>= -100 and <= 100 rad'),
     ('goal_positions', 2, -100.1, '>= -100 and <= 100 rad'),
-    ('effort_weights', 2, 0.0, '> 0'),
-    ('position_weights', 3, -1.0, '>= 0'),
-    ('velocity_weights', 3, -1.0, '>= 0'),
+    ('effort_weights', 2, 0.0, '> 0 and <= 1e+18'),
+    ('position_weights', 3, -1.0, '>= 0 and <= 1e+18'),
+    ('velocity_weights', 3, -1.0, '>= 0 and <= 1e+18'),
 ]
 
 
@@ -127,7 +127,7 @@ def test_task_vector_refuses_entries_that_are_not_finite(field: str, size: int,
 
 
 @pytest.mark.parametrize(('entries', 'given'), [
-    ([1.0], '1 numbers'), ([1.0] * 4, '4 numbers'), ([[1.0, 1.0]], 'shape (1, 2)'),
+    ([1.0], '1 number'), ([1.0] * 4, '4 numbers'), ([[1.0, 1.0]], 'shape (1, 2)'),
     (1.0, 'shape ()')])
 @pytest.mark.parametrize('field', [entry[0] for entry in VECTORS])
 def test_task_vector_of_the_wrong_size_is_refused(field: str, entries: object,
@@ -173,7 +173,7 @@ def test_speed_limit_needs_a_torque_limit() -> None:
     ({'joints': (Joint(),)}, 'number of joints', '2, one per link'),
     ({'nodes': (Node(),) * 2}, 'number of nodes', '0 or 3, one per joint and one for the tip'),
     ({'gravity': [0.0]}, 'gravity', 'a list of 2 numbers'),
-    ({'gravity': [0.0, math.nan]}, 'gravity[1]', 'a finite number m/s^2'),
+    ({'gravity': [0.0, math.nan]}, 'gravity[1]', 'a finite number in m/s^2'),
     ({'gravity': 'down'}, 'gravity', 'a list of 2 numbers')])
 def test_arm_of_parts_that_do_not_fit_is_refused(values: dict[str, Any], field: str,
                                                  bound: str) -> None:
@@ -269,7 +269,7 @@ def test_goal_angle_is_the_one_nearest_to_the_start(rigid_arm: Arm, first: float
     ((0.5, 0.0), (2.0, 0.0), UnreachableError, '^goal_point: the point'),
     ((0.5, 0.0), (1.0, 0.0), SingularError, '^goal_point: the arm is stretched'),
     ((0.5, 0.0), (math.nan, 0.0), NotFiniteError, r'^goal_point\[0\] is nan'),
-    ((0.5,), (0.5, 0.5), InvalidSizeError, '^start_point has 1 numbers')])
+    ((0.5,), (0.5, 0.5), InvalidSizeError, '^start_point has 1 number')])
 def test_point_that_the_arm_cannot_take_is_named(rigid_arm: Arm, start: Any, goal: Any,
                                                  error: type[Exception], message: str) -> None:
     with pytest.raises(error, match=message):

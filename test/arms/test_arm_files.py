@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
+import os
 from pathlib import Path
 from typing import Any
 
@@ -47,7 +48,7 @@ MISTAKES: list[tuple[str, object, str, str]] = [
     ('links/0/length', 0, 'links[0].length', '> 0 m'),
     ('links/0/length', '0.5 m', 'links[0].length', '> 0 m'),
     ('links/0/length', True, 'links[0].length', '> 0 m'),
-    ('links/0/mass', REMOVE, DENSITY, 'is None, but must be given, exactly one of them'),
+    ('links/0/mass', REMOVE, DENSITY, 'is missing, but must be given, exactly one of them'),
     ('links/0/linear_density', 6.0, DENSITY, "is 'linear_density and mass', but must be given, "),
     ('links/0/density', 2700.0, DENSITY,
      "is 'mass and density', but must be given, exactly one of them"),
@@ -60,7 +61,7 @@ MISTAKES: list[tuple[str, object, str, str]] = [
     ('links/1/length', -0.25, 'links[1].length', '> 0 m'),
     ('links/1/linear_density', 0.0, 'links[1].linear_density', '> 0 kg/m'),
     ('links/0/flexural_rigidity', REMOVE, RIGIDITY,
-     'is None, but must be given, exactly one of them'),
+     'is missing, but must be given, exactly one of them'),
     ('links/0/youngs_modulus', 7e10, RIGIDITY, "is 'flexural_rigidity and youngs_modulus'"),
     ('links/1/youngs_modulus', 7e10, SECTION, 'given with youngs_modulus'),
     ('links/1/youngs_modulus', -1.0, 'links[1].youngs_modulus', '> 0 N/m^2'),
@@ -193,11 +194,11 @@ def test_quantities_of_a_beam_combine(fields: dict[str, Any], density: float,
 
 
 @pytest.mark.parametrize(('fields', 'message'), [
-    ({'section': REMOVE}, 'section is None, but must be given with density'),
+    ({'section': REMOVE}, 'section is missing, but must be given with density'),
     ({'section': REMOVE, 'second_moment_of_area': 1e-10},
-     'section is None, but must be given with density'),
+     'section is missing, but must be given with density'),
     ({'section': REMOVE, 'density': REMOVE, 'mass': 1.0},
-     'section or second_moment_of_area is None, but must be given with youngs_modulus'),
+     'section or second_moment_of_area is missing, but must be given with youngs_modulus'),
     ({'second_moment_of_area': 1e-10}, 'second_moment_of_area is 1e-10, but must be left out')])
 def test_combination_that_leaves_the_beam_open_is_named(fields: dict[str, Any],
                                                         message: str) -> None:
@@ -222,7 +223,7 @@ def test_shapes_with_a_load_need_to_be_told_it(field: str) -> None:
     link = {'length': 0.5, 'mass': 3.0, 'flexural_rigidity': 50.0, 'modes': 2,
             'mode_family': 'clamped_mass', 'shape_mass': 1.5, 'shape_inertia': 0.25}
     del link[field]
-    with pytest.raises(InvalidValueError, match=rf'^links\[0\]\.{field} is None'):
+    with pytest.raises(InvalidValueError, match=rf'^links\[0\]\.{field} is missing'):
         arm_from_mapping(changed('links/0', link))
 
 
@@ -268,15 +269,15 @@ def test_mistake_is_named_by_its_path_in_the_file(tmp_path: Path, place: str, va
     assert cause.field == field
 
 
-@pytest.mark.parametrize('content', ['', '3', '[1, 2]', 'text'])
+@pytest.mark.parametrize('content', ['3', '[1, 2]', 'text', '~', '---'])
 def test_file_that_is_no_mapping_is_refused(tmp_path: Path, content: str) -> None:
     with pytest.raises(ArmFileError, match='the file is .* must be a mapping of fields'):
         load_arm(write(tmp_path, content))
 
 
 @pytest.mark.parametrize('content', [
-    'name: [1', 'a: !!python/object:os.system {}', '? [a]\n: 1', 'source: 2001-99-99', '[' * 5000],
-    ids=['broken', 'object', 'list as key', 'no date', 'too deep'])
+    '', ' \n', 'name: [1', 'a: !!python/object:os.system {}', '? [a]\n: 1', '[' * 5000],
+    ids=['empty', 'blank', 'broken', 'object', 'list as key', 'too deep'])
 def test_file_that_is_no_plain_yaml_is_refused(tmp_path: Path, content: str) -> None:
     with pytest.raises(ArmFileError, match='cannot be read'):
         load_arm(write(tmp_path, content))
@@ -300,7 +301,7 @@ def test_huge_file_is_refused_before_it_is_parsed(tmp_path: Path) -> None:
         load_arm(write(tmp_path, '#' * 1_000_001))
 
 
-@pytest.mark.parametrize('name', ['missing.yaml', 'missing.yml', './missing', '/'])
+@pytest.mark.parametrize('name', ['missing.yaml', 'missing.yml', 'missing.YAML', './missing'])
 def test_missing_file_is_named(name: str) -> None:
     with pytest.raises(ArmFileError, match=f"arm file '{name}' does not exist"):
         load_arm(name)
@@ -339,3 +340,83 @@ def test_numbers_may_have_any_usual_form(tmp_path: Path, text: str) -> None:
     path = tmp_path / 'arm.yaml'
     path.write_text(preset.replace('flexural_rigidity: 50.0', f'flexural_rigidity: {text}'))
     assert load_arm(path).flexural_rigidities().tolist() == [50.0, 50.0]
+
+
+@pytest.mark.parametrize('name', ['arm.YAML', 'arm.Yml', 'arm', 'arm.txt', './arm', 'a b.yaml'])
+def test_file_of_any_name_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                   name: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path(write(tmp_path, COMPLETE)).rename(name)
+    assert load_arm(name).name == 'two links'
+
+
+def test_preset_comes_before_a_file_without_suffix(tmp_path: Path,
+                                                   monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    own = load_arm('korayem_rigid').name
+    Path(write(tmp_path, COMPLETE)).rename('korayem_rigid')
+    assert (load_arm('korayem_rigid').name, load_arm('./korayem_rigid').name) == (own, 'two links')
+
+
+def test_home_folder_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv('HOME', str(tmp_path))
+    write(tmp_path, COMPLETE)
+    assert load_arm('~/arm.yaml').name == 'two links'
+    with pytest.raises(ArmFileError, match="there is no home folder of a user 'no-such-user'"):
+        load_arm('~no-such-user/arm.yaml')
+
+
+def test_arm_is_read_from_a_pipe() -> None:
+    # what a shell makes of <(cat arm.yaml)
+    reader, writer = os.pipe()
+    os.write(writer, yaml.safe_dump(COMPLETE).encode())
+    os.close(writer)
+    try:
+        assert load_arm(f'/dev/fd/{reader}').name == 'two links'
+    finally:
+        os.close(reader)
+
+
+@pytest.mark.parametrize('encoding', ['utf-8-sig', 'utf-16'])
+def test_arm_of_another_system_is_read(tmp_path: Path, encoding: str) -> None:
+    text = yaml.safe_dump(changed('name', 'Größe 🦾')).replace('\n', '\r\n')
+    (tmp_path / 'arm.yaml').write_bytes(text.encode(encoding))
+    assert load_arm(tmp_path / 'arm.yaml').name == 'Größe 🦾'
+
+
+@pytest.mark.parametrize('name', ['.', '/', '..', '/dev/zero', '/dev/null', 'folder.yaml'])
+def test_what_is_no_file_is_refused_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                            name: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path('folder.yaml').mkdir()
+    with pytest.raises(ArmFileError, match=f'^{name}: cannot be read: it is'):
+        load_arm(name)
+
+
+@pytest.mark.parametrize('mass', ['010', '1:30', '0x10', '1_000', '1e999'])
+def test_number_that_could_be_misread_is_refused(tmp_path: Path, mass: str) -> None:
+    text = yaml.safe_dump(COMPLETE).replace('mass: 3.0', f'mass: {mass}')
+    with pytest.raises(ArmFileError, match=f'line .*{mass} must be'):
+        load_arm(write(tmp_path, text))
+
+
+@pytest.mark.parametrize(('place', 'value', 'message'), [
+    ('links/0/length', 1e-200, r'links\[0\].length is 1e-200, but must be a number in the range '
+     '1e-05 to 10000 m$'),
+    ('links/0/mass', 5e-324, r'links\[0\].mass is 5e-324, .* range 1e-12 to 1e\+09 kg'),
+    ('links/0/flexural_rigidity', 1e300, 'range 1e-15 to 1e.15 N m.2'),
+    ('links/1/linear_density', 1e-10, r'links\[1\].linear_density is 1e-10'),
+    ('links/0/mass', 1e-10, r'links\[0\].linear_density \(of mass and length\) is 2e-10'),
+    ('joints/0/motor/stall_torque', 1e308, 'range 1e-12 to 1e.09 N m'),
+    ('joints/0/motor/no_load_speed', 1e-300, 'range 1e-06 to 1e.06 rad/s'),
+    ('joints/0/viscous_friction', 1e300, 'range 1e-18 to 1e.09 N m s/rad, or 0'),
+    ('joints/0', {'lower_limit': -1e300}, 'range -1e.06 to 1e.06 rad'),
+    ('joints/0', {'upper_limit': -math.inf}, 'an angle in rad, or left out for no limit'),
+    ('joints/0', {'lower_limit': math.inf, 'upper_limit': math.inf}, 'upper_limit is inf'),
+    ('nodes/0/mass', 1e300, r'nodes\[0\].mass is 1e\+300, .*, or 0$'),
+    ('nodes/0/inertia', 5e-324, r'nodes\[0\].inertia'),
+    ('gravity', [0.0, 1e200], r'gravity\[1\] is 1e\+200, .* range -1000 to 1000 m/s.2')])
+def test_number_far_from_every_arm_is_named_with_its_range(place: str, value: object,
+                                                           message: str) -> None:
+    with pytest.raises(InvalidValueError, match=message):
+        arm_from_mapping(changed(place, value))

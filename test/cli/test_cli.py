@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 import re
 import struct
@@ -9,6 +10,7 @@ import struct
 from flex_planner import __version__
 from flex_planner.arms.arm_files import load_arm, preset_files
 from flex_planner.cli import main
+from flex_planner.dynamics.library_cache import cache_folder
 import pytest
 
 PRESETS = sorted(preset_files())
@@ -132,11 +134,11 @@ def test_rigid_arm_has_nothing_to_draw(capsys: pytest.CaptureFixture[str], tmp_p
 
 
 @pytest.mark.parametrize(('arguments', 'message'), [
-    (['korayem'], "arm 'korayem' is neither a path ending in .yaml nor one of the presets"),
+    (['korayem'], "arm 'korayem' is neither a file nor one of the presets"),
     (['missing.yaml'], "arm file 'missing.yaml' does not exist"),
-    (['korayem_rigid', '--payload', '-1'], '--payload is -1.0, but must be a number >= 0 kg'),
+    (['korayem_rigid', '--payload', '-1'], '--payload is -1.0, but must be a number >= 0 and'),
     (['korayem_rigid', '--payload', 'nan'], '--payload is nan'),
-    (['korayem_rigid', '--posture', '1'], '--posture has 1 numbers, but must be a list of 2'),
+    (['korayem_rigid', '--posture', '1'], '--posture has 1 number, but must be a list of 2'),
     (['korayem_rigid', '--posture', '1,two'], "--posture is '1,two', but must be numbers"),
     (['korayem_rigid', '--posture', '1,inf'], '--posture[1] is inf')])
 def test_bad_input_is_answered_by_one_line(capsys: pytest.CaptureFixture[str],
@@ -181,3 +183,43 @@ def test_wrong_usage_is_told(capsys: pytest.CaptureFixture[str], arguments: list
         main(arguments)
     assert caught.value.code == 2
     assert 'usage: flex-planner' in capsys.readouterr().err
+
+
+def test_arm_comes_through_a_pipe(capsys: pytest.CaptureFixture[str],
+                                  monkeypatch: pytest.MonkeyPatch) -> None:
+    data = preset_files()['korayem_rigid'].read_bytes()
+    monkeypatch.setattr('sys.stdin', io.TextIOWrapper(io.BytesIO(data)))
+    assert main(['arm', '-', '--no-plot']) == 0
+    assert 'rigid' in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(('arguments', 'message'), [
+    (['arm', 'korayem_ei5', '--plot', '~no-such-user/a.png'], 'no home folder of a user'),
+    (['arm', 'korayem_ei5', '--payload', '010'], "'010' must be a plain decimal number, such as"),
+    (['arm', 'korayem_ei5', '--payload', '1:30'], "'1:30' must be a plain decimal number, with"),
+    (['arm', 'korayem_ei5', '--payload', '1 kg'], "'1 kg' must be a number"),
+    (['arm', 'korayem_ei5', '--payload', '1e999'], 'must be a number below 1e308'),
+    (['paper', '--processes', '1.5'], "'1.5' must be an integer")])
+def test_argument_that_is_not_what_it_should_be_is_named(
+        capsys: pytest.CaptureFixture[str], arguments: list[str], message: str) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(arguments)
+    assert caught.value.code == 2
+    assert message in capsys.readouterr().err.splitlines()[-1]
+
+
+def test_negative_number_with_an_exponent_is_no_option(capsys: pytest.CaptureFixture[str]) -> None:
+    assert '--payload is -1000.0, but' in refused(capsys, 'korayem_rigid', '--payload', '-1e3')
+
+
+@pytest.mark.parametrize('entry', ['010', '1_0', '0x10', '1:30'])
+def test_number_in_a_list_is_plain(capsys: pytest.CaptureFixture[str], entry: str) -> None:
+    assert f"--posture is '{entry}', but must be a plain decimal number" in refused(
+        capsys, 'korayem_rigid', '--posture', f'1,{entry}')
+
+
+def test_picture_goes_to_the_home_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv('XDG_CACHE_HOME', str(cache_folder().parent))  # compiled before
+    monkeypatch.setenv('HOME', str(tmp_path))
+    assert main(['arm', 'korayem_ei5', '--plot=~/modes.png']) == 0
+    assert (tmp_path / 'modes.png').is_file()

@@ -28,7 +28,7 @@ def test_comparison_shows_that_the_flexible_plan_is_worth_it(
 
 @pytest.mark.parametrize(('options', 'text'), [
     (['--rigidity-scale', '0'], '--rigidity-scale is 0.0, but must be a number >= 0.001'),
-    (['--added-friction', '1'], '--added-friction has 1 numbers'),
+    (['--added-friction', '1'], '--added-friction has 1 number'),
     (['--plant-modes', '99'], 'but must be'),
     (['--settling', '0'], '--settling is 0.0, but must be'),
     (['--time-limit', '1e-9'], 'time limit')])

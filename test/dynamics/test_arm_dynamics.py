@@ -12,7 +12,7 @@ import time
 from typing import Any
 
 from flex_planner.arms.arm import Arm, Joint, Link
-from flex_planner.dynamics import arm_dynamics, compiled_functions
+from flex_planner.dynamics import arm_dynamics, compiled_functions, compiler
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.cache_key import cache_key
 from flex_planner.dynamics.physical_parameters import PhysicalParameters
@@ -32,7 +32,7 @@ def no_optimality(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         raise AssertionError('optimality conditions are derived')
 
     monkeypatch.setenv('XDG_CACHE_HOME', str(tmp_path))
-    monkeypatch.setattr(compiled_functions.shutil, 'which', lambda name: None)
+    monkeypatch.setattr(compiler.shutil, 'which', lambda name: None)
     monkeypatch.setattr(pontryagin, 'build_optimality_functions', refuse)
 
 

@@ -7,6 +7,7 @@ import logging
 import os
 from pathlib import Path
 import platform
+import shutil
 import subprocess
 import sys
 import threading
@@ -16,7 +17,8 @@ from typing import Any
 import flex_planner
 from flex_planner.arms.arm import Arm
 from flex_planner.dynamics import compiled_functions
-from flex_planner.dynamics.compiled_functions import cache_folder, content_key, load_functions
+from flex_planner.dynamics.compiled_functions import content_key, load_functions
+from flex_planner.dynamics.library_cache import cache_folder, warn_once
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.parameters import Parameters
 import numpy as np
@@ -49,6 +51,12 @@ def check_tiny(functions: dict[str, compiled_functions.BatchFunction]) -> None:
     assert np.array_equal(matrix, expected)
 
 
+@pytest.fixture(autouse=True)
+def warnings_are_new() -> None:
+    """Let a warning be logged that an earlier test has had."""
+    warn_once.cache_clear()
+
+
 @pytest.fixture
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return an empty cache folder, which only this test uses."""
@@ -58,7 +66,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def no_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compiled_functions.shutil, 'which', lambda name: None)
+    monkeypatch.setattr(shutil, 'which', lambda name: None)
 
 
 def warnings_of(caplog: pytest.LogCaptureFixture) -> list[str]:

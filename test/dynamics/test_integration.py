@@ -12,7 +12,7 @@ from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import load_arm
 from flex_planner.base.progress import Monitor, StoppedError, StopReason
 from flex_planner.base.validation import Array
-from flex_planner.dynamics import compiled_functions
+from flex_planner.dynamics import compiler
 from flex_planner.dynamics.arm_dynamics import RUNGE_KUTTA_STAGES
 from flex_planner.dynamics.integration import integrate, PiecewisePolynomial, simulate
 from flex_planner.optimal_control.arm_model import ArmModel
@@ -125,7 +125,7 @@ def test_interpreted_functions_lead_to_the_same_end(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch, plan_of: PlanFactory,
         rigid_arm: Arm) -> None:
     monkeypatch.setenv('XDG_CACHE_HOME', str(tmp_path))
-    monkeypatch.setattr(compiled_functions.shutil, 'which', lambda name: None)
+    monkeypatch.setattr(compiler.shutil, 'which', lambda name: None)
     plan, interpreted = plan_of('rigid', 5.5), ArmModel(rigid_arm)
     torque = torque_of(plan)
     # rounding: the C compiler may fuse a multiplication and an addition

@@ -7,12 +7,13 @@ import copy
 from dataclasses import replace
 from itertools import product
 import math
+import os
 from pathlib import Path
 import pickle
 from typing import Any
 
 from flex_planner.arms.arm import Arm
-from flex_planner.arms.arm_files import load_arm
+from flex_planner.arms.arm_files import load_arm, preset_files
 from flex_planner.base.errors import (
     FlexPlannerError,
     InvalidValueError,
@@ -51,26 +52,26 @@ SEARCH: dict[str, Any] = {
     'start': [0.5, 0.0], 'goal': [0.5, 0.5], 'axes': {'goal_y': [0.2, 0.5]}}
 MISTAKES: list[tuple[str, object, str]] = [
     # place in COMPLETE, value put there, start of the message
-    ('name', REMOVE, 'name is None, but must be given'),
+    ('name', REMOVE, 'name is missing, but must be given'),
     ('nam', 'a', "nam is 'a', but must be left out: there is no such field"),
-    ('arm', REMOVE, 'arm is None, but must be given'),
-    ('arm', 'korayem', "arm: arm 'korayem' is neither a path"),
+    ('arm', REMOVE, 'arm is missing, but must be given'),
+    ('arm', 'korayem', "arm: arm 'korayem' is neither a file"),
     ('arm', 'arms/mine.yaml', 'arm: arm file '),
     ('arm', {'name': 'x', 'links': [{'length': -1}], 'joints': [{}]}, 'arm.links[0].length is -1'),
     ('arm', 3, 'arm is 3, but must be a mapping of fields'),
     ('modes', 9, 'modes is 9, but must be an integer from 0 to 8'),
     ('quantity', 'payload', "quantity is 'payload', but must be one of ['max_payload', "),
     ('quantity', 'min_effort', "mismatch is {'payload_mass': 1.5, "),
-    ('start', REMOVE, 'start or start_angles is None, but must be given, exactly one of them'),
+    ('start', REMOVE, 'start or start_angles is missing, but must be given, exactly one of them'),
     ('start', [0.5], 'start is [0.5], but must be a point [x, y] in m'),
     ('start', 'there', "start is 'there', but must be a list of numbers"),
     ('start', [0.5, math.nan], 'start is nan, but must be a finite number'),
     ('start', [1.5, 0.0], 'start: the point (1.5, 0) m is 1.5 m from the base; the arm reaches'),
     ('start', [1.0, 0.0], 'start: the arm is stretched out or folded'),
     ('start_angles', [0.0, 1.0], 'start_angles is [0.0, 1.0], but must be left out where start'),
-    ('goal', REMOVE, 'goal or goal_angles is None'),
+    ('goal', REMOVE, 'goal or goal_angles is missing'),
     ('elbow', 0, 'elbow is 0, but must be +1 or -1'),
-    ('duration', REMOVE, 'duration is None, but must be given'),
+    ('duration', REMOVE, 'duration is missing, but must be given'),
     ('duration', 0.0, 'duration is 0.0, but must be a number > 0 and <= 1000 s'),
     ('payload_mass', 1.0, 'payload_mass is 1.0, but must be left out: the axis payload_mass'),
     ('effort_weights', [1.0, 1.0, 1.0], 'effort_weights has 3 numbers'),
@@ -80,7 +81,7 @@ MISTAKES: list[tuple[str, object, str]] = [
     ('accuracy', 0.1, 'accuracy is 0.1, but must be left out: residual_vibration is computed'),
     ('cell_time_limit', 0, 'cell_time_limit is 0.0, but must be a number > 0 and <= 3600 s'),
     ('settling', -1.0, 'settling is -1.0'),
-    ('axes', REMOVE, 'axes is None, but must be given'),
+    ('axes', REMOVE, 'axes is missing, but must be given'),
     ('axes', [1, 2], 'axes is [1, 2], but must be a mapping of fields'),
     ('axes', {}, 'number of axes is 0, but must be an integer from 1 to 4'),
     ('axes', dict.fromkeys(list(AXES)[:5], [1]), 'number of axes is 5'),
@@ -93,7 +94,7 @@ MISTAKES: list[tuple[str, object, str]] = [
     ('axes/goal_x', [0.1, math.nan], 'axes.goal_x[1] is nan, but must be a finite number'),
     ('axes/goal_x', {'from': 1, 'to': 1, 'count': 2}, 'axes.goal_x.to is 1.0, but must be'),
     ('axes/goal_x', {'from': 0, 'to': 1, 'count': 1}, 'axes.goal_x.count is 1, but must be'),
-    ('axes/goal_x', {'from': 0, 'count': 5}, 'axes.goal_x.to is None, but must be given'),
+    ('axes/goal_x', {'from': 0, 'count': 5}, 'axes.goal_x.to is missing, but must be given'),
     ('axes/goal_x', {'from': 0, 'to': 1, 'count': 5, 'by': 1}, 'axes.goal_x.by is 1'),
     ('axes/goal_x', {'from': 0, 'to': 1, 'count': 1e8}, 'axes.goal_x.count is 100000000.0, but'),
     ('axes/duration', {'from': 1, 'to': 2, 'count': 10_000_000}, 'number of cells is 150000000'),
@@ -106,10 +107,10 @@ MISTAKES: list[tuple[str, object, str]] = [
     ('block', {'goal_x': 6}, 'block.goal_x is 6, but must be an integer from 1 to 5'),
     ('mismatch/payload_mass', -1, 'mismatch.payload_mass is -1.0'),
     ('mismatch/rigidity_scale', 0, 'mismatch.rigidity_scale is 0.0'),
-    ('mismatch/added_friction', [1], 'mismatch.added_friction has 1 numbers'),
+    ('mismatch/added_friction', [1], 'mismatch.added_friction has 1 number'),
     ('mismatch/modes', -2, 'mismatch.modes is -2'),
     ('mismatch/mass', 1, 'mismatch.mass is 1, but must be left out'),
-    ('gains/damping', REMOVE, 'gains.damping is None, but must be given'),
+    ('gains/damping', REMOVE, 'gains.damping is missing, but must be given'),
     ('gains/stiffness', 'stiff', "gains.stiffness is 'stiff', but must be a number"),
     ('gains/stiffness', -1, 'gains.stiffness[0] is -1.0'),
 ]
@@ -130,7 +131,7 @@ SENSELESS: list[tuple[dict[str, Any], str]] = [
     ({'accuracy': 0.0}, r'accuracy is 0.0, but must be a number >= 1e-06 and <= 1000 kg'),
     ({'gains': {}}, 'gains is {}, but must be left out: only residual_vibration'),
     ({'goal': REMOVE, 'goal_angles': [0.0, 1.0]}, 'axes.goal_y is .* goal_angles gives the goal'),
-    ({'start': REMOVE, 'start_angles': [0.0]}, 'start_angles has 1 numbers'),
+    ({'start': REMOVE, 'start_angles': [0.0]}, 'start_angles has 1 number'),
 ]
 
 
@@ -443,3 +444,50 @@ def test_one_compiled_model_does_for_every_cell() -> None:
     assert shared.certificate.tip_error == own.certificate.tip_error
     assert shared.saturation.tolist() == own.saturation.tolist()
     assert shared.cost != plan_path(replace(task, arm=study.arm)).cost
+
+
+@pytest.mark.parametrize(('place', 'value', 'message'), [
+    ('goal', [math.inf, 0.5], 'goal is inf'),  # also where an axis gives that coordinate
+    ('goal', [1e308, 0.5], 'goal is 1e+308, but must be a number >= -1000 and <= 1000 m'),
+    ('axes/goal_x', {'from': -1e308, 'to': 1e308, 'count': 5}, 'axes.goal_x.from is -1e+308'),
+    ('axes/payload_mass', {'from': 0, 'to': 1e308, 'count': 5}, 'axes.payload_mass.to is 1e+308'),
+    ('duration', 1e-300, 'duration is 1e-300, but must be a number >= 1e-09 s'),
+    ('effort_weights', [1e-300, 1.0], 'effort_weights[0] is 1e-300'),
+    ('settling', 5e-324, 'settling is 5e-324, but must be a number >= 0.001'),
+    ('mismatch/payload_mass', 1e308, 'mismatch.payload_mass is 1e+308')])
+def test_extreme_number_is_named_with_its_range(tmp_path: Path, place: str, value: object,
+                                                message: str) -> None:
+    with pytest.raises(StudyError) as caught:
+        study_of(tmp_path, changed(place, value))
+    assert message in str(caught.value)
+
+
+def test_study_and_its_arm_are_found_below_the_home_folder(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv('HOME', str(tmp_path))
+    (tmp_path / 'arm').write_bytes(preset_files()['korayem_ei50'].read_bytes())
+    for arm in ('~/arm', './arm', 'arm'):
+        study_of(tmp_path, changed('arm', arm))
+        assert load_study('~/study.yaml').arm.name == load_arm('korayem_ei50').name
+    with pytest.raises(StudyError, match="no home folder of a user 'no-such-user'"):
+        study_of(tmp_path, changed('arm', '~no-such-user/arm.yaml'))
+
+
+def test_study_comes_through_a_pipe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    reader, writer = os.pipe()
+    os.write(writer, yaml.safe_dump(COMPLETE).encode())
+    os.close(writer)
+    try:
+        assert load_study(f'/dev/fd/{reader}').name == 'a map'
+    finally:
+        os.close(reader)
+
+
+@pytest.mark.parametrize('text', ['duration: 010', 'duration: 1:30', 'duration: 1_0'])
+def test_number_that_could_be_misread_is_refused(tmp_path: Path, text: str) -> None:
+    content = yaml.safe_dump(changed('duration', REMOVE))
+    file = tmp_path / 'study.yaml'
+    file.write_text(f'{content}{text}\n')
+    with pytest.raises(StudyError, match=r'cannot be read: line \d+, column 11: .* must be'):
+        load_study(file)

@@ -314,7 +314,7 @@ def test_derivative_of_the_cost_by_the_payload_is_the_integral_of_its_share(
 
 @pytest.mark.parametrize(('changes', 'error', 'message'), [
     ({'start_velocities': [0.0]}, InvalidSizeError,
-     'start_velocities has 1 numbers, but must be a list of 0 or 2 or 6 numbers'),
+     'start_velocities has 1 number, but must be a list of 0 or 2 or 6 numbers'),
     ({'start_velocities': [0.0, 1001.0]}, InvalidValueError,
      'start_velocities[1] is 1001.0, but must be a number >= -1000 and <= 1000'),
     ({'start_modal_displacements': [0.0] * 3}, InvalidSizeError,
@@ -322,9 +322,9 @@ def test_derivative_of_the_cost_by_the_payload_is_the_integral_of_its_share(
     ({'start_modal_displacements': [0.0, 0.0, -101.0, 0.0]}, InvalidValueError,
      'start_modal_displacements[2] is -101.0, but must be a number >= -100 and <= 100 m'),
     ({'start_point': [0.5]}, InvalidSizeError,
-     'start_point has 1 numbers, but must be a list of 0 or 2 numbers'),
+     'start_point has 1 number, but must be a list of 0 or 2 numbers'),
     ({'goal_point': [0.5, math.nan]}, NotFiniteError,
-     'goal_point[1] is nan, but must be a finite number m'),
+     'goal_point[1] is nan, but must be a finite number >= -1e+06 and <= 1e+06 m'),
     ({'goal_velocities': [-1001.0, 0.0]}, InvalidValueError,
      'goal_velocities[0] is -1001.0, but must be a number >= -1000 and <= 1000'),
     ({'goal_velocities': [math.nan, 0.0]}, NotFiniteError,
@@ -332,13 +332,13 @@ def test_derivative_of_the_cost_by_the_payload_is_the_integral_of_its_share(
     ({'goal_velocities': [[0.0, 0.0]]}, InvalidSizeError,
      'goal_velocities has shape (1, 2), but must be a list of 0 or 2 or 6 numbers'),
     ({'goal_position_weights': [1.0, -1e-9]}, InvalidValueError,
-     'goal_position_weights[1] is -1e-09, but must be a number >= 0'),
+     'goal_position_weights[1] is -1e-09, but must be a number >= 0 and <= 1e+18'),
     ({'goal_position_weights': [inf, -1.0]}, InvalidValueError,
-     'goal_position_weights[1] is -1.0, but must be a number >= 0'),
+     'goal_position_weights[1] is -1.0, but must be a number >= 0 and <= 1e+18'),
     ({'goal_velocity_weights': [math.nan, inf]}, NotFiniteError,
-     'goal_velocity_weights[0] is nan, but must be a finite number >= 0'),
+     'goal_velocity_weights[0] is nan, but must be a finite number >= 0 and <= 1e+18'),
     ({'goal_velocity_weights': [1.0, -inf]}, NotFiniteError,
-     'goal_velocity_weights[1] is -inf, but must be a finite number >= 0'),
+     'goal_velocity_weights[1] is -inf, but must be a finite number >= 0 and <= 1e+18'),
     ({'goal_velocity_weights': [1.0, inf, 2.0]}, InvalidSizeError,
      'goal_velocity_weights has 3 numbers, but must be a list of 0 or 2 or 6 numbers'),
     ({'goal_velocity_weights': [inf] * 7}, InvalidSizeError,
@@ -352,7 +352,7 @@ def test_derivative_of_the_cost_by_the_payload_is_the_integral_of_its_share(
     ({'time_weight': inf}, NotFiniteError,
      'time_weight is inf, but must be a finite number >= 0 and <= 1e+09 1/s'),
     ({'time_weight': None}, InvalidValueError,
-     'time_weight is None, but must be a number >= 0 and <= 1e+09 1/s')], ids=str)
+     'time_weight is missing, but must be a number >= 0 and <= 1e+09 1/s')], ids=str)
 def test_value_out_of_bounds_is_named_with_its_bound(
         ei5_arm: Arm, paper_task: TaskFactory, changes: dict[str, Any],
         error: type[InvalidValueError], message: str) -> None:

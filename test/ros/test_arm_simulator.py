@@ -201,11 +201,11 @@ def test_simulator_that_is_too_slow_says_so_and_goes_on(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(('changes', 'text'), [
-    ({'initial_positions': [0.1]}, 'initial_positions has 1 numbers'),
+    ({'initial_positions': [0.1]}, 'initial_positions has 1 number'),
     ({'stiffness': [1.0, -1.0]}, r'stiffness\[1\] is -1.0'),
-    ({'damping': [1.0]}, 'damping has 1 numbers'),
+    ({'damping': [1.0]}, 'damping has 1 number'),
     ({'added_friction': [0.0, -0.1]}, r'added_friction\[1\] is -0.1'),
-    ({'added_friction': [0.1]}, 'added_friction has 1 numbers'),
+    ({'added_friction': [0.1]}, 'added_friction has 1 number'),
     ({'modes': 9}, 'modes is 9'),
     ({'rigidity_scale': 0.0}, 'rigidity_scale is 0.0'),
     ({'encoder_rate': np.nan}, 'encoder_rate is nan'),

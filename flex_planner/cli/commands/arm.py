@@ -6,9 +6,17 @@ import argparse
 from pathlib import Path
 
 from flex_planner.arms.arm_files import load_arm
+from flex_planner.base.paths import file_stem
 from flex_planner.base.validation import number
-from flex_planner.cli.options import add_arm, angles, Commands
+from flex_planner.cli.options import (
+    add_arm,
+    angles,
+    Commands,
+    number_argument,
+    path_argument,
+)
 from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.task import MAX_PAYLOAD
 from flex_planner.reports.arm import describe_arm, standard_postures
 
 
@@ -17,12 +25,12 @@ def add_command(commands: Commands) -> None:
     parser = commands.add_parser('arm',
                                  help='print the properties of an arm, draw its mode shapes')
     add_arm(parser)
-    parser.add_argument('--payload', type=float, default=0.0, metavar='KG',
+    parser.add_argument('--payload', type=number_argument, default=0.0, metavar='KG',
                         help='mass at the tip (default: 0)')
     parser.add_argument('--posture', action='append', metavar='DEG,DEG,...',
                         help='joint angles for frequencies and deflections; may be repeated '
                         '(default: stretched, and bent by 90 degrees)')
-    parser.add_argument('--plot', type=Path, metavar='PNG',
+    parser.add_argument('--plot', type=path_argument, metavar='PNG',
                         help='picture of the mode shapes (default: <arm>_modes.png)')
     parser.add_argument('--no-plot', action='store_true', help='draw nothing')
     parser.set_defaults(run=_run)
@@ -31,7 +39,7 @@ def add_command(commands: Commands) -> None:
 def _run(options: argparse.Namespace) -> int:
     """Print an arm's properties and draw its mode shapes."""
     arm = load_arm(options.arm)
-    payload = number('--payload', options.payload, at_least=0, unit='kg')
+    payload = number('--payload', options.payload, at_least=0, at_most=MAX_PAYLOAD, unit='kg')
     postures = ([angles('--posture', text, arm.n_joints) for text in options.posture]
                 if options.posture else standard_postures(arm))
     model = ArmModel(arm)
@@ -41,7 +49,7 @@ def _run(options: argparse.Namespace) -> int:
         return 0
     from flex_planner.plotting import draw_mode_shapes
 
-    path = options.plot or Path(f'{Path(options.arm).stem}_modes.png')
+    path = options.plot or Path(f'{file_stem(options.arm)}_modes.png')
     draw_mode_shapes(path, model, postures[-1], payload)
     print(f'{text}\n\nmode shapes: {path}')
     return 0

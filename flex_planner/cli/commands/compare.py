@@ -6,11 +6,18 @@ import argparse
 from pathlib import Path
 import sys
 
+from flex_planner.base.paths import file_stem
 from flex_planner.base.progress import Monitor
-from flex_planner.cli.options import Commands, numbers
+from flex_planner.cli.options import (
+    Commands,
+    integer_argument,
+    number_argument,
+    numbers,
+    path_argument,
+)
 from flex_planner.cli.outputs import check_folder
 from flex_planner.cli.progress_line import run_with_progress
-from flex_planner.cli.request import add_task, Request, translate_errors
+from flex_planner.cli.request import add_task, Request, say_failure, translate_errors
 from flex_planner.control.joint_controller import Gains
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.reports.comparison import comparison_rows, comparison_table
@@ -30,23 +37,23 @@ def add_command(commands: Commands) -> None:
         'simulated flexible arm, with and without a joint controller.')
     add_task(parser, payload='mass at the tip (default: 0)')
     add = parser.add_argument
-    add('--plant-payload', type=float, metavar='KG', help='mass at the tip of the simulated arm '
-        '(default: that of the task)')
-    add('--plant-modes', type=int, default=-1, metavar='N',
+    add('--plant-payload', type=number_argument, metavar='KG',
+        help='mass at the tip of the simulated arm (default: that of the task)')
+    add('--plant-modes', type=integer_argument, default=-1, metavar='N',
         help='modes of each link of the simulated arm (default: as planned)')
-    add('--rigidity-scale', type=float, default=1.0, metavar='FACTOR',
+    add('--rigidity-scale', type=number_argument, default=1.0, metavar='FACTOR',
         help='factor on the rigidity of its links (default: 1)')
     add('--added-friction', metavar='D,D,...',
         help='viscous friction added to its joints [N m s/rad] (default: none)')
-    add('--stiffness', type=float, default=_STIFFNESS, metavar='P',
+    add('--stiffness', type=number_argument, default=_STIFFNESS, metavar='P',
         help='proportional gain of the joint controller [N m/rad] (default: %(default)g)')
-    add('--damping', type=float, default=_DAMPING, metavar='D',
+    add('--damping', type=number_argument, default=_DAMPING, metavar='D',
         help='derivative gain of the joint controller [N m s/rad] (default: %(default)g)')
-    add('--rate', type=float, default=1000.0, metavar='HZ',
+    add('--rate', type=number_argument, default=1000.0, metavar='HZ',
         help='rate of the joint controller (default: %(default)g)')
-    add('--settling', type=float, default=1.0, metavar='S',
+    add('--settling', type=number_argument, default=1.0, metavar='S',
         help='time to watch the arm after its arrival (default: %(default)g)')
-    add('--output', type=Path, default=Path('output'), metavar='DIR',
+    add('--output', type=path_argument, default=Path('output'), metavar='DIR',
         help='folder for the picture (default: output)')
     add('--no-plot', action='store_true', help='draw nothing')
     parser.set_defaults(run=_compare)
@@ -73,12 +80,13 @@ def _compare(options: argparse.Namespace) -> int:
     if not options.no_plot and found.results:
         from flex_planner.plotting import draw_comparison
 
-        path = options.output / f'{Path(options.arm).stem}_comparison.png'
+        path = options.output / f'{file_stem(options.arm)}_comparison.png'
         draw_comparison(path, found)
         print(table([('picture', str(path))]))
     if not found.solved:
         failed = found.rigid if found.flexible.solved else found.flexible
-        print(f'flex-planner: {failed.arm.name}: {failed.status.value}', file=sys.stderr)
+        print(f'flex-planner: {failed.arm.name}: '
+              f'{say_failure(failed, request.time_limit)}', file=sys.stderr)
     return 0 if found.solved else 1
 
 

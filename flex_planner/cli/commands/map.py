@@ -8,9 +8,10 @@ import sys
 from typing import TYPE_CHECKING
 
 from flex_planner.base.errors import InvalidValueError
+from flex_planner.base.paths import file_stem
 from flex_planner.base.validation import integer
 from flex_planner.cli.map_progress import MapDisplay, outcome_rows
-from flex_planner.cli.options import Commands
+from flex_planner.cli.options import Commands, integer_argument, path_argument
 from flex_planner.cli.progress_line import CanceledError, interruptible
 from flex_planner.maps.cell_results import CellCode
 from flex_planner.reports.motion import table
@@ -31,10 +32,11 @@ def add_command(commands: Commands) -> None:
         description='Compute the maximum payload, or another quantity, for every cell of a grid, '
         'and draw it. Cells that are computed already are kept.')
     add = parser.add_argument
-    add('study', type=Path, metavar='STUDY', help='study file; with --draw also a store')
-    add('--output', type=Path, default=Path('output/maps'), metavar='PATH',
+    add('study', type=path_argument, metavar='STUDY', help='study file; with --draw also a store')
+    add('--output', type=path_argument, default=Path('output/maps'), metavar='PATH',
         help='folder for store and pictures, or a store that ends in .zarr (default: %(default)s)')
-    add('--workers', type=int, metavar='N', help='worker processes (default: one per processor)')
+    add('--workers', type=integer_argument, metavar='N',
+        help='worker processes (default: one per processor)')
     add('--scheduler', default='', metavar='ADDRESS',
         help='compute on the Dask cluster with this scheduler, such as tcp://host:8786')
     add('--draw', action='store_true', help='draw the stored cells, compute nothing')
@@ -60,7 +62,7 @@ def _place(options: argparse.Namespace) -> Path:
     study, output = options.study, options.output
     if options.draw and study.suffix == _SUFFIX:
         return Path(study)
-    return Path(output if output.suffix == _SUFFIX else output / f'{study.stem}{_SUFFIX}')
+    return Path(output if output.suffix == _SUFFIX else output / f'{file_stem(study)}{_SUFFIX}')
 
 
 def _draw(path: Path) -> int:

@@ -10,7 +10,7 @@ import sys
 
 from flex_planner.base.validation import integer
 from flex_planner.base.version import VERSION
-from flex_planner.cli.options import Commands
+from flex_planner.cli.options import Commands, integer_argument, path_argument
 from flex_planner.cli.outputs import check_folder
 from flex_planner.cli.progress_line import Display, interruptible
 
@@ -24,12 +24,12 @@ def add_command(commands: Commands) -> None:
         description='Compute every simulation of Korayem et al. 2009, compare it with what the '
         'paper says, and write a page with tables and pictures.')
     add = parser.add_argument
-    add('--output', type=Path, default=Path('output/paper'), metavar='DIR',
+    add('--output', type=path_argument, default=Path('output/paper'), metavar='DIR',
         help=f'folder for {_PAGE} and {_PICTURES} (default: %(default)s)')
     add('--section', action='append', metavar='N.N', help='compute this section only; may be '
         'repeated')
     add('--reduced', action='store_true', help='leave out the parts that take long')
-    add('--processes', type=int, default=os.cpu_count() or 1, metavar='N',
+    add('--processes', type=integer_argument, default=os.cpu_count() or 1, metavar='N',
         help='sections computed at a time (default: one per processor, %(default)s)')
     add('--no-plot', action='store_true', help='draw nothing')
     parser.set_defaults(run=_paper)

@@ -8,16 +8,24 @@ from dataclasses import replace
 import sys
 
 from flex_planner.base.progress import Monitor
+from flex_planner.base.validation import integer
 from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.capacity.results import MaxPayload, PayloadMethod
 from flex_planner.cli.controller_options import add_controller
-from flex_planner.cli.options import Commands
+from flex_planner.cli.options import Commands, integer_argument, number_argument
 from flex_planner.cli.outputs import add_outputs, Outputs
 from flex_planner.cli.progress_line import run_with_progress
-from flex_planner.cli.request import add_objectives, add_task, Request, translate_errors
+from flex_planner.cli.request import (
+    add_objectives,
+    add_task,
+    Request,
+    say_failure,
+    translate_errors,
+)
 from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.planning.kinds.clusters import MOST_KINDS
 from flex_planner.planning.kinds.effort import SearchEffort
-from flex_planner.planning.plan import peaks, Plan, PlanStatus
+from flex_planner.planning.plan import peaks, Plan
 from flex_planner.planning.plan_path import plan_kind
 from flex_planner.planning.robustness import assess_robustness, robustness_warnings
 from flex_planner.planning.sampling import judge_execution, sample_plan, SampledPlan
@@ -42,7 +50,7 @@ def add_commands(commands: Commands) -> None:
     add_task(plan, payload='mass at the tip (default: 0)')
     add_objectives(plan)
     _add_kinds(plan)
-    plan.add_argument('--kind', type=int, default=1, metavar='N',
+    plan.add_argument('--kind', type=integer_argument, default=1, metavar='N',
                       help='plan the N-th of the kinds of motion that are listed, 1 to 4 '
                       '(default: 1, the best)')
     add_controller(plan)
@@ -65,9 +73,9 @@ def _add_search(parser: argparse.ArgumentParser) -> None:
                         default='direct', help='direct: the payload is an unknown (default); '
                         'incremental: it is raised step by step as in the paper, which takes '
                         'longer')
-    parser.add_argument('--accuracy', type=float, default=1e-3, metavar='KG',
+    parser.add_argument('--accuracy', type=number_argument, default=1e-3, metavar='KG',
                         help='accuracy of the largest payload (default: 0.001)')
-    parser.add_argument('--step', type=float, metavar='KG',
+    parser.add_argument('--step', type=number_argument, metavar='KG',
                         help='first step of the incremental method (default: 1)')
 
 
@@ -81,12 +89,13 @@ def _add_kinds(parser: argparse.ArgumentParser) -> None:
 
 def _plan(options: argparse.Namespace) -> int:
     """Plan a motion; print, draw and record it."""
+    number = integer('--kind', options.kind, at_least=1, at_most=MOST_KINDS)
     request = Request.of(options)
     outputs = Outputs.of(options, request)
 
     def work(model: ArmModel, monitor: Monitor) -> Plan:
         with translate_errors():
-            return plan_kind(request.task, options.kind, model=model, monitor=monitor,
+            return plan_kind(request.task, number, model=model, monitor=monitor,
                              objectives=request.objectives, search=options.search)
 
     plan = run_with_progress(request.task.arm, request.time_limit, work)
@@ -158,8 +167,5 @@ def _exit_code(request: Request, outcome: Plan | MaxPayload) -> int:
     """Return the exit code of a result; print the reason of a failure."""
     if outcome.solved:
         return 0
-    reasons = [outcome.status.value, outcome.message]
-    if outcome.status is PlanStatus.TIMEOUT:
-        reasons[1] = f'--time-limit is {request.time_limit:g} s'
-    print(f'flex-planner: {": ".join(dict.fromkeys(reasons))}', file=sys.stderr)
+    print(f'flex-planner: {say_failure(outcome, request.time_limit)}', file=sys.stderr)
     return 1

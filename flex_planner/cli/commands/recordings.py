@@ -11,7 +11,7 @@ import sys
 from flex_planner.base.errors import FlexPlannerError, RecordingError
 from flex_planner.base.progress import Monitor, StoppedError
 from flex_planner.base.validation import number
-from flex_planner.cli.options import Commands
+from flex_planner.cli.options import Commands, number_argument, path_argument
 from flex_planner.cli.progress_line import run_with_progress
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.recording import (
@@ -46,12 +46,12 @@ def _add_replay(commands: Commands) -> None:
         commands, 'replay', _replay, 'publish a recording again (needs ROS 2)',
         'Publish a recording on its topics, at its times and with its quality of service, then '
         'end; Ctrl-C ends it earlier.')
-    parser.add_argument('--rate', type=float, default=1.0, metavar='FACTOR',
+    parser.add_argument('--rate', type=number_argument, default=1.0, metavar='FACTOR',
                         help='speed of the playback, 2 is twice as fast (default: 1)')
-    parser.add_argument('--start', type=float, default=0.0, metavar='S',
+    parser.add_argument('--start', type=number_argument, default=0.0, metavar='S',
                         help='time to leave out at the beginning (default: 0); latched messages '
                         'from before it are sent all the same')
-    parser.add_argument('--delay', type=float, default=1.0, metavar='S',
+    parser.add_argument('--delay', type=number_argument, default=1.0, metavar='S',
                         help='time before the first message, in which subscribers find the '
                         'publishers (default: 1)')
     parser.add_argument('--loop', action='store_true', help='begin again at the end')
@@ -63,7 +63,7 @@ def _add_report(commands: Commands) -> None:
         'make an HTML page of a recorded plan, check it against the model',
         'Make one HTML file of a recorded request: task, outcome, certificate, and plots to zoom '
         'into. It needs neither ROS nor a network.')
-    parser.add_argument('--output', type=Path, metavar='HTML',
+    parser.add_argument('--output', type=path_argument, metavar='HTML',
                         help='the file (default: <recording>.html)')
     parser.add_argument('--check', action='store_true',
                         help='apply the recorded torques to the recorded arm, compare with the '
@@ -81,7 +81,7 @@ def _add_command(commands: Commands, name: str, run: Callable[[argparse.Namespac
                  summary: str, description: str) -> argparse.ArgumentParser:
     """Add a command that is about one recording."""
     parser = commands.add_parser(name, help=summary, description=description)
-    parser.add_argument('recording', type=Path, metavar='RECORDING',
+    parser.add_argument('recording', type=path_argument, metavar='RECORDING',
                         help='folder of a recording, or its .mcap file')
     parser.set_defaults(run=run)
     return parser

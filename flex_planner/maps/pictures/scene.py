@@ -13,6 +13,7 @@ from flex_planner.arms.inverse_kinematics import workspace
 from flex_planner.arms.kinematics import link_points
 from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.validation import Array
+from flex_planner.base.yaml_text import parse_yaml
 from flex_planner.maps.axes import Axis
 from flex_planner.maps.cell_results import CellCode
 from flex_planner.maps.end_points import End
@@ -31,7 +32,6 @@ from matplotlib.patheffects import withStroke
 import numpy as np
 from numpy.typing import NDArray
 import xarray as xr
-import yaml
 
 _ARM = '#202020'
 _TIPS = {'o': '#2f9bff', '*': '#ff5a36'}
@@ -84,18 +84,17 @@ def study_of(dataset: xr.Dataset) -> Study | None:
 
     """
     try:
-        content = yaml.safe_load(dataset.attrs['study'])
+        content = parse_yaml(dataset.attrs['study'])
         quantity = Quantity[str(dataset.attrs['quantity']).upper()]
         return Study(
             name=str(dataset.attrs['title']), quantity=quantity, text=dataset.attrs['study'],
-            arm=_arm(yaml.safe_load(dataset.attrs['arm'])),
+            arm=_arm(parse_yaml(dataset.attrs['arm'])),
             axes=tuple(Axis(name=str(name), values=dataset[name].values)
                        for name in dataset['code'].dims),
             motion=StudyMotion(start=_end('start', content), goal=_end('goal', content),
                                elbow=content.get('elbow', -1), payload_mass=_PAYLOAD),
             accuracy=_ACCURACY if quantity.is_searched else math.nan)
-    except (FlexPlannerError, KeyError, TypeError, ValueError, AttributeError,
-            yaml.YAMLError) as error:
+    except (FlexPlannerError, KeyError, TypeError, ValueError, AttributeError) as error:
         _log.warning('the arm is not drawn, because the study of the map cannot be read: %s',
                      error)
         return None

@@ -9,7 +9,9 @@ from typing import Any
 
 from flex_planner.arms.arm import Arm, Joint, Link, Motor, Node
 from flex_planner.base.errors import FlexPlannerError, RecordingError
+from flex_planner.base.paths import expand_path
 from flex_planner.base.validation import Array
+from flex_planner.base.yaml_text import parse_yaml, YamlTextError
 from flex_planner.control.joint_reference import JointReference
 from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.recording import (
@@ -18,7 +20,6 @@ from flex_planner.recording import (
     definition_folder,
     ForeignChannel,
     MessageTypes,
-    parse_yaml,
     read_attachments,
     read_metadata,
     read_recording,
@@ -181,7 +182,8 @@ class RecordedRequest:
             if motion is not None:
                 _check_sizes(arm, motion)
             request = cls(
-                path=Path(path), arm=arm, settings=settings, task=found.messages['MotionTask'],
+                path=expand_path(path), arm=arm, settings=settings,
+                task=found.messages['MotionTask'],
                 report=found.messages['PlanReport'], search=found.messages.get('PayloadSearch'),
                 motion=motion, joint_names=_joint_names(settings, arm), left_out=found.left_out)
             request._check()
@@ -248,7 +250,10 @@ def _scenario(path: Path | str) -> Mapping[str, Any]:
     attached = read_attachments(path).get('scenario.yaml')
     if attached is None:
         raise RecordingError(f'{path} is not the recording of a request: it has no scenario.yaml')
-    scenario = parse_yaml(attached)
+    try:
+        scenario = parse_yaml(attached.decode('utf-8'))
+    except (UnicodeDecodeError, YamlTextError) as error:
+        raise RecordingError(f'{path} has a scenario.yaml that is not YAML: {error}') from error
     if not isinstance(scenario, Mapping):
         raise RecordingError(f'{path} has a scenario.yaml that is no YAML with arm and parameters')
     return scenario

@@ -18,6 +18,7 @@ from string import Template
 from typing import Any
 
 from flex_planner.base.errors import RecordingError
+from flex_planner.base.paths import expand_path
 from flex_planner.base.validation import Array
 from flex_planner.base.version import VERSION
 from flex_planner.recording import shown_path
@@ -57,6 +58,7 @@ def write_report(path: Path, request: RecordedRequest, check: MotionCheck | None
         If the system refuses.
 
     """
+    path = expand_path(path)
     draft = path.with_name(f'.{path.name}.{os.getpid()}')
     try:
         draft.write_text(report_page(request, check), encoding='utf-8')

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from flex_planner.base.errors import InvalidValueError
+from flex_planner.base.sentences import say_reason
 from flex_planner.base.validation import number
 from flex_planner.capacity.results import MaxPayload, PayloadMethod
 from flex_planner.optimal_control.task import MAX_PAYLOAD
@@ -99,7 +100,7 @@ def report_from_search(found: MaxPayload) -> PlanReport:
         report.strategy = f'{found.method.value}; {found.plan.strategy}'
     else:
         report = failure_report(STATUS_CODES[found.status],
-                                f'{found.status.value}: {found.message}')
+                                say_reason(found.status.value, found.message))
         report.strategy = found.method.value
         add_warnings(report, found.warnings)
     report.iterations = found.iterations

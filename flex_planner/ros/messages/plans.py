@@ -16,6 +16,7 @@ from flex_planner.base.errors import (
     UnreachableError,
 )
 from flex_planner.base.progress import StopReason
+from flex_planner.base.sentences import say_reason
 from flex_planner.base.validation import number, vector
 from flex_planner.optimal_control.ends_at_points import ends_at_points
 from flex_planner.optimal_control.task import Task
@@ -158,7 +159,7 @@ def failure_report(code: int, sentence: str) -> PlanReport:
 
 def report_from_plan(plan: Plan) -> PlanReport:
     """Return the report of a plan, solved or not."""
-    sentence = '' if plan.solved else f'{plan.status.value}: {plan.message}'
+    sentence = '' if plan.solved else say_reason(plan.status.value, plan.message)
     report = failure_report(STATUS_CODES[plan.status], sentence)
     report.strategy = plan.strategy
     report.iterations, report.mesh_intervals = plan.iterations, plan.mesh_intervals

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import logging
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flex_planner.arms.arm import Arm
 from flex_planner.base.errors import FlexPlannerError
+from flex_planner.base.paths import expand_path
 from flex_planner.optimal_control.task import Task
 
 if TYPE_CHECKING:
@@ -59,6 +59,6 @@ def _load_map(store: str, arm: Arm) -> MapStarts:
         raise FlexPlannerError(f'map_store is {store!r}, but the packages that read maps are '
                                f"missing: pip install 'flex_planner[maps]' ({error})") from error
     try:
-        return MapStarts(Path(store), arm)
+        return MapStarts(expand_path(store), arm)
     except FlexPlannerError as error:
         raise FlexPlannerError(f'map_store is {store!r}, but {error}') from error

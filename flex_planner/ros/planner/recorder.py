@@ -14,6 +14,7 @@ from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import plain_arm
 from flex_planner.base.errors import RecordingError
 from flex_planner.base.version import VERSION
+from flex_planner.base.yaml_text import format_yaml
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.sampling import SampledPlan
 from flex_planner.recording import (
@@ -30,7 +31,6 @@ from flex_planner.ros.planner.outcome import Outcome
 from flex_planner.ros.planner.request_state import RequestState
 from flex_planner.ros.settings.fields import as_mapping
 from flex_planner.ros.settings.planner import PlannerSettings
-import yaml
 
 # the groups sort by the time of the request
 NAME: Final = re.compile(r'(?:plan_path|find_max_payload)_(\d{8}T\d{6}_\d{9})_(\d{4,})')
@@ -134,9 +134,8 @@ class OutcomeRecorder:
 
     def _scenario(self, settings: PlannerSettings) -> str:
         """Return arm and parameters as YAML."""
-        text: str = yaml.safe_dump({'arm': plain_arm(self._arm),
-                                    'parameters': dict(as_mapping(settings))}, sort_keys=False)
-        return text
+        return format_yaml({'arm': plain_arm(self._arm),
+                            'parameters': dict(as_mapping(settings))})
 
 
 def _remove_old(settings: PlannerSettings, newest: Path) -> None:

@@ -10,6 +10,7 @@ import shutil
 
 from flex_planner.base.errors import FlexPlannerError, InvalidTaskError
 from flex_planner.base.progress import Monitor, StoppedError, StopReason
+from flex_planner.base.sentences import say_reason
 from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.task import Task
@@ -153,10 +154,12 @@ class RequestPlanner:
             monitor = Monitor(time_limit=planning_time_limit(message, state.settings),
                               canceled=state.is_canceled, report=state.report)
             outcome = work(task, monitor)
+            _name_limit(outcome.report, monitor)
         except FlexPlannerError as error:
             outcome = failure_outcome(error_code(error), str(error))
         except StoppedError as error:
             outcome = failure_outcome(STOP_CODES[error.reason], error.reason.value)
+            _name_limit(outcome.report, monitor)
         except Exception as error:
             _LOG.exception('planning failed')
             outcome = unknown_failure(error)
@@ -196,6 +199,12 @@ def _say_not_recorded(report: PlanReport, error: Exception, state: RequestState)
     report.warnings = [*report.warnings, f'the request could not be recorded: {error}']
 
 
+def _name_limit(report: PlanReport, monitor: Monitor) -> None:
+    """Say which time limit was reached, if one was."""
+    if report.error_code == PlanReport.TIMEOUT:
+        report.error_msg += f'; allowed_planning_time is {monitor.time_limit:g} s'
+
+
 def _outcome(report: PlanReport, plan: Plan | None, settings: PlannerSettings,
              monitor: Monitor) -> Outcome:
     """Return the outcome that a report tells of, with a trajectory if it is a success."""
@@ -206,7 +215,7 @@ def _outcome(report: PlanReport, plan: Plan | None, settings: PlannerSettings,
     if not judged.solved:
         add_execution(report, reference)
         report.error_code = STATUS_CODES[judged.status]
-        report.error_msg = f'{judged.status.value}: {judged.message}'
+        report.error_msg = say_reason(judged.status.value, judged.message)
         return Outcome(report=report, trajectory=FlexibleTrajectory(), plan=judged)
     reference = replace(reference, robustness=assess_robustness(plan, reference, monitor))
     trajectory = report_trajectory(report, plan, reference, settings)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-import os
 from pathlib import Path
 
 from flex_planner.arms.arm import Arm
 from flex_planner.base.errors import InvalidSizeError, InvalidValueError
+from flex_planner.base.paths import expand_path, folder_from_environment
 from flex_planner.base.validation import vector
 from flex_planner.collocation import Solver, SolverSettings
 from flex_planner.control.default_gains import default_gains
@@ -138,6 +138,7 @@ class PlannerSettings:
             if 0 < getattr(self, name) < MIN_RECORDING_SIZE:
                 raise InvalidValueError(name, getattr(self, name),
                                         f'0 or at least {MIN_RECORDING_SIZE} bytes')
+        expand_path(self.recording_folder)  # refuses what is no path
         SearchEffort.of(self.search)
         self.solver()
         self.sampling()
@@ -186,6 +187,5 @@ class PlannerSettings:
     def output_folder(self) -> Path:
         """Return the folder of the recordings."""
         if self.recording_folder:
-            return Path(self.recording_folder)
-        home = os.environ.get('ROS_HOME') or os.path.join(os.path.expanduser('~'), '.ros')
-        return Path(home) / 'flex_planner'
+            return expand_path(self.recording_folder)
+        return folder_from_environment('ROS_HOME', '~/.ros') / 'flex_planner'

@@ -36,7 +36,8 @@ def test_stop_after_the_solve_is_reported_without_a_trajectory(
 
     monkeypatch.setattr(request_planner, 'sample_plan', stopped)
     outcome = worker.plan(task(), RequestState(settings=settings))
-    assert (outcome.report.error_code, outcome.report.error_msg) == (code, reason.value)
+    limit = '; allowed_planning_time is 30 s' if reason is StopReason.TIMEOUT else ''
+    assert (outcome.report.error_code, outcome.report.error_msg) == (code, reason.value + limit)
     assert not outcome.trajectory.points
     assert not outcome.publishable
 
@@ -242,7 +243,7 @@ def test_search_from_more_than_the_maximum_finds_nothing(worker: RequestPlanner,
     ({'payload_step': 1e-4}, PlanReport.OUT_OF_RANGE, 'payload_step is 0.0001, but must be'),
     ({'payload_step': math.inf}, PlanReport.NOT_FINITE, 'payload_step is inf, but must be'),
     ({'payload_mass': math.nan}, PlanReport.NOT_FINITE, 'payload_mass is nan, but must be'),
-    ({'effort_weights': [1.0]}, PlanReport.INVALID_SIZE, 'effort_weights has 1 numbers, but'),
+    ({'effort_weights': [1.0]}, PlanReport.INVALID_SIZE, 'effort_weights has 1 number, but'),
     ({'allowed_planning_time': 1e-9}, PlanReport.TIMEOUT, 'time limit reached'),
 ])
 def test_search_that_cannot_be_done_says_why(worker: RequestPlanner, settings: PlannerSettings,
