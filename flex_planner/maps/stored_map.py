@@ -71,8 +71,8 @@ class StoredMap:
         if layout != LAYOUT:
             raise MapStoreError(
                 f'the map {path} was written by another version of flex_planner (layout '
-                f'{layout or 1} of the store, this one has {LAYOUT}): xarray reads its numbers; to '
-                'go on with it, or to draw it, compute it anew with --reset')
+                f'{layout or 1} of the store, this one has {LAYOUT}): xarray reads its numbers; '
+                'to go on with it, or to draw it, compute it anew with --reset')
         code = self._array('code')
         self.shape, self.block_shape = tuple(code.shape), tuple(code.chunks)
         self.axes = tuple(str(name) for name in code.attrs[DIMENSIONS])

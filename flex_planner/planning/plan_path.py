@@ -24,7 +24,13 @@ from flex_planner.planning.kinds.kinds_strategy import as_guess
 from flex_planner.planning.objectives import Objectives
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_problem import plan_problem
-from flex_planner.planning.proofs import find_proof, Proof, prove_not_held
+from flex_planner.planning.proofs import (
+    check_duration,
+    find_doubt,
+    find_proof,
+    Proof,
+    prove_not_held,
+)
 from flex_planner.planning.strategies.catalogue import CATALOGUE
 from flex_planner.planning.strategies.initial_guesses import warm_start
 from flex_planner.planning.strategies.strategy import Strategy
@@ -72,7 +78,8 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
     Raises
     ------
     InvalidTaskError
-        If an objective or the model does not go with the task, or the links buckle at rest.
+        If an objective or the model does not go with the task, the links buckle at rest, or the
+        duration is absurdly short.
     UnreachableError, SingularError
         If the arm, bent by gravity, cannot rest at a point of the task.
     ValueError
@@ -95,6 +102,10 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
     proof = find_proof(problem)
     if proof is not None:
         return _impossible(problem, proof)
+    check_duration(problem)
+    doubt = find_doubt(problem)
+    if doubt is not None:
+        return _not_found(problem, doubt)
     plan = plan_problem(problem, solver, (*_given(start_from, problem, solver), *strategies),
                         effort)
     if plan.status in (PlanStatus.NOT_FOUND, PlanStatus.NOT_CONVERGED):
@@ -144,6 +155,12 @@ def plan_kind(task: Task, number: int, **options: Any) -> Plan:
 def _impossible(problem: MotionProblem, proof: Proof) -> Plan:
     """Return the plan of a task that no motion does."""
     return Plan(task=problem.task, status=PlanStatus.INFEASIBLE, message=str(proof), strategy='',
+                problem=problem, solution=None, warnings=find_arm_warnings(problem.model.arm))
+
+
+def _not_found(problem: MotionProblem, reason: str) -> Plan:
+    """Return the plan of a task for which no motion was found."""
+    return Plan(task=problem.task, status=PlanStatus.NOT_FOUND, message=reason, strategy='',
                 problem=problem, solution=None, warnings=find_arm_warnings(problem.model.arm))
 
 
