@@ -31,6 +31,7 @@ from flex_planner.planning.proofs import (
     Proof,
     prove_not_held,
 )
+from flex_planner.planning.stiff_links import find_stiff_links
 from flex_planner.planning.strategies.catalogue import CATALOGUE
 from flex_planner.planning.strategies.initial_guesses import warm_start
 from flex_planner.planning.strategies.strategy import Strategy
@@ -106,6 +107,9 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
     doubt = find_doubt(problem)
     if doubt is not None:
         return _not_found(problem, doubt)
+    plan = _plan_as_rigid(problem, solver, start_from, objectives, strategies, effort)
+    if plan is not None:
+        return plan
     plan = plan_problem(problem, solver, (*_given(start_from, problem, solver), *strategies),
                         effort)
     if plan.status in (PlanStatus.NOT_FOUND, PlanStatus.NOT_CONVERGED):
@@ -156,6 +160,22 @@ def _impossible(problem: MotionProblem, proof: Proof) -> Plan:
     """Return the plan of a task that no motion does."""
     return Plan(task=problem.task, status=PlanStatus.INFEASIBLE, message=str(proof), strategy='',
                 problem=problem, solution=None, warnings=find_arm_warnings(problem.model.arm))
+
+
+def _plan_as_rigid(problem: MotionProblem, solver: Solver,
+                   start: Plan | KindOfMotion | CollocationSolution | None,
+                   objectives: Objectives | None, strategies: Sequence[Strategy],
+                   effort: SearchEffort) -> Plan | None:
+    """Return the plan of an arm whose stiff links are taken as rigid; None without any."""
+    stiff = find_stiff_links(problem, solver)
+    if stiff is None or (objectives is not None and objectives.max_modal_rates.size):
+        return None
+    solution = start.solution if isinstance(start, Plan) else start
+    if isinstance(solution, CollocationSolution):
+        solution = stiff.restrict(solution)
+    plan = plan_path(stiff.task(), solver=solver, start_from=solution, objectives=objectives,
+                     strategies=strategies, search=effort)
+    return stiff.lift(plan, solver)
 
 
 def _not_found(problem: MotionProblem, reason: str) -> Plan:
