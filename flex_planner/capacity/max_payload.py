@@ -17,7 +17,9 @@ from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import number
 from flex_planner.capacity.extrapolation import Neighbours
 from flex_planner.capacity.payload_methods import search_directly
+from flex_planner.capacity.payload_outcome import with_bound
 from flex_planner.capacity.results import MaxPayload, PayloadMethod
+from flex_planner.capacity.rigid_search import search_as_rigid
 from flex_planner.capacity.step_search import search_in_steps
 from flex_planner.collocation import Solver
 from flex_planner.optimal_control.arm_model import ArmModel
@@ -111,6 +113,11 @@ def find_max_payload(task: Task, *, model: ArmModel | None = None, solver: Solve
     doubt = find_doubt(problem)
     if doubt is not None:
         return MaxPayload(task=task, method=method, status=PlanStatus.NOT_FOUND, message=doubt)
+    rigid = search_as_rigid(problem, solver, lambda stiff: find_max_payload(
+        stiff, solver=solver, method=method, accuracy=accuracy, step=step, start_from=start_from,
+        search=effort))
+    if rigid is not None:
+        return with_bound(rigid, problem)
     if method is PayloadMethod.DIRECT:
         found = search_directly(problem, solver, accuracy, effort, start_from)
     else:

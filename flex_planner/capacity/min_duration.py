@@ -17,6 +17,7 @@ from flex_planner.capacity.extrapolation import Neighbours, step_ratio
 from flex_planner.capacity.limit_search import LimitSearch
 from flex_planner.capacity.max_payload import find_max_payload, stays
 from flex_planner.capacity.results import describe_kinds, MaxPayload, MinDuration, say_lost_weights
+from flex_planner.capacity.rigid_search import search_as_rigid
 from flex_planner.collocation import Solver
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
@@ -89,6 +90,10 @@ def find_min_duration(task: Task, *, model: ArmModel | None = None,
         return MinDuration(task=task, status=PlanStatus.INFEASIBLE, proved_lower=np.inf,
                            message=str(prove_not_held(error, task.payload_mass)))
     problem = problem.with_changes(duration=guess_duration(problem))
+    rigid = search_as_rigid(problem, solver, lambda stiff: find_min_duration(
+        stiff, solver=solver, accuracy=accuracy, start_from=start_from, search=effort))
+    if rigid is not None:
+        return replace(rigid, task=task, proved_lower=bound_duration(problem))
     neighbours = start_from if isinstance(start_from, Neighbours) else Neighbours(
         near=start_from)
     limits = LimitSearch(DURATION, problem, solver, accuracy, effort)

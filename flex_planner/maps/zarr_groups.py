@@ -36,8 +36,10 @@ def add_bytes(group: Any, name: str, dimensions: list[str], *, shape: tuple[int,
               chunks: tuple[int, ...]) -> None:
     """Make an array of bytes of any length, compressed well."""
     if _IS_NEW:
+        from zarr.dtype import VariableLengthBytes
+
         made = group.create_array(
-            name, shape=shape, chunks=chunks, dtype=zarr.core.dtype.VariableLengthBytes(),
+            name, shape=shape, chunks=chunks, dtype=VariableLengthBytes(),
             fill_value=b'', compressors=numcodecs.Blosc('zstd', 5, 0))
     else:
         made = group.create_dataset(
