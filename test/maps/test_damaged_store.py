@@ -115,8 +115,8 @@ def test_every_file_that_is_damaged_is_noticed_or_does_not_matter(
 
 @pytest.mark.parametrize('name', ['max_payload', 'message', 'code', 'goal_x', 'blocks', 'motions',
                                   'motions/signature', 'blocks/checksum'])
-def test_a_store_without_one_of_its_arrays_is_refused_and_can_be_reset(copy: Path,
-                                                                      name: str) -> None:
+def test_a_store_without_one_of_its_arrays_is_refused_and_can_be_reset(
+        copy: Path, name: str) -> None:
     shutil.rmtree(copy / name)
     with pytest.raises(MapStoreError) as refused:
         complete(copy)
