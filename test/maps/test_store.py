@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import json
 from pathlib import Path
 from typing import Any
 
@@ -152,3 +153,22 @@ def test_a_disk_that_is_full_from_the_beginning_leaves_nothing(path: Path) -> No
 def test_there_is_no_map_to_open(tmp_path: Path) -> None:
     with pytest.raises(MapStoreError, match='there is no map'):
         open_map(tmp_path / 'none.zarr')
+
+
+def test_files_hold_nothing_that_only_one_generation_of_zarr_reads(path: Path) -> None:
+    with MapStore.of(path, small_study()) as store:
+        fill(store, 1)
+    summary = json.loads((path / '.zmetadata').read_text())['metadata']
+    arrays = {name.rpartition('/')[0]: entry for name, entry in summary.items()
+              if name.endswith('.zarray')}
+    assert {'code', 'motions/motion', 'motions/signature', 'blocks/checksum'} <= set(arrays)
+    for name, entry in arrays.items():
+        assert json.loads((path / name / '.zarray').read_text()) == entry
+        filters = [one['id'] for one in entry['filters'] or []]
+        assert filters in ([], ['vlen-utf8'], ['vlen-bytes'])
+        assert (entry['dtype'] == '|O') is bool(filters)
+        assert entry['zarr_format'] == 2
+    assert arrays['code']['fill_value'] == CellCode.PENDING
+    motions = xr.open_zarr(path, group='motions', chunks=None).load()
+    assert motions.motion.dims == ('goal_x', 'goal_y')
+    assert motions.signature.dims == ('goal_x', 'goal_y', 'quantity')
