@@ -41,8 +41,8 @@ setup(
         'zstandard>=0.22',
     ],
     # for flex-planner map
-    extras_require={'maps': ['dask>=2024.1', 'distributed>=2024.1', 'numcodecs>=0.12,<0.16',
-                             'xarray>=2024.1', 'zarr>=2.16,<3'],
+    extras_require={'maps': ['dask>=2024.1', 'distributed>=2024.1', 'numcodecs>=0.12',
+                             'xarray>=2024.10', 'zarr>=2.18,!=3.0.*'],
                     'test': ['autograd', 'hypothesis', 'mcap-ros2-support', 'mpmath', 'pytest',
                              'pytest-timeout']},
     zip_safe=False,

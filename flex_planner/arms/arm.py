@@ -8,6 +8,7 @@ computes a motion.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 import math
 from typing import TYPE_CHECKING
@@ -303,7 +304,12 @@ class Arm:
 
     def rigid(self) -> Arm:
         """Return the same arm with every link rigid."""
-        links = tuple(Link(length=link.length, linear_density=link.linear_density)
-                      for link in self.links)
-        return Arm(name=f'{self.name} (rigid)', links=links, joints=self.joints,
+        return self.with_rigid_links(range(self.n_joints), f'{self.name} (rigid)')
+
+    def with_rigid_links(self, indices: Iterable[int], name: str = '') -> Arm:
+        """Return the same arm with some links rigid, counted from 0."""
+        links = list(self.links)
+        for i in indices:
+            links[i] = Link(length=links[i].length, linear_density=links[i].linear_density)
+        return Arm(name=name or self.name, links=tuple(links), joints=self.joints,
                    nodes=self.nodes, gravity=self.gravity, source=self.source)

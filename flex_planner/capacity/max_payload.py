@@ -18,7 +18,9 @@ from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import number
 from flex_planner.capacity.extrapolation import Neighbours
 from flex_planner.capacity.payload_methods import search_directly
+from flex_planner.capacity.payload_outcome import with_bound
 from flex_planner.capacity.results import MaxPayload, PayloadMethod
+from flex_planner.capacity.rigid_search import search_as_rigid
 from flex_planner.capacity.step_search import search_in_steps
 from flex_planner.collocation import Solver
 from flex_planner.optimal_control.arm_model import ArmModel
@@ -26,12 +28,21 @@ from flex_planner.optimal_control.motion_problem import MotionProblem, task_para
 from flex_planner.optimal_control.task import MAX_PAYLOAD, Task
 from flex_planner.planning.kinds.effort import SearchEffort
 from flex_planner.planning.plan import PlanStatus
-from flex_planner.planning.proofs import bound_payload, find_proof, Proof, prove_not_held
+from flex_planner.planning.proofs import (
+    bound_payload,
+    check_duration,
+    find_doubt,
+    find_proof,
+    Proof,
+    prove_not_held,
+)
 from flex_planner.planning.strategies.extremals import SearchStart
 import numpy as np
 
 _MIN_ACCURACY, _MAX_ACCURACY = 1e-6, 1e3
 _STEP = 1.0
+# joint angles that differ by less are the same [rad]
+_SAME = 1e-9
 
 
 def find_max_payload(task: Task, *, model: ArmModel | None = None, solver: Solver | None = None,
@@ -77,8 +88,8 @@ def find_max_payload(task: Task, *, model: ArmModel | None = None, solver: Solve
     Raises
     ------
     InvalidTaskError
-        If no motor has a limit, if the goal is the start, if the duration is free, or if the arm
-        need not come to rest at the goal.
+        If no motor has a limit, if the goal is the start, if the duration is free or absurdly
+        short, or if the arm need not come to rest at the goal.
     InvalidValueError
         If accuracy or step breaks its bound.
 
@@ -100,12 +111,27 @@ def find_max_payload(task: Task, *, model: ArmModel | None = None, solver: Solve
     proof = find_proof(problem)
     if proof is not None:
         return _impossible(problem, method, proof)
+    check_duration(problem)
+    doubt = find_doubt(problem)
+    if doubt is not None:
+        return MaxPayload(task=task, method=method, status=PlanStatus.NOT_FOUND, message=doubt)
+    rigid = search_as_rigid(problem, solver, lambda stiff: find_max_payload(
+        stiff, solver=solver, method=method, accuracy=accuracy, step=step, start_from=start_from,
+        search=effort))
+    if rigid is not None:
+        return with_bound(rigid, problem)
     if method is PayloadMethod.DIRECT:
         found = search_directly(problem, solver, accuracy, effort, start_from)
     else:
         found = search_in_steps(problem, solver, step, accuracy)
     return replace(found, iterations=solver.monitor.iteration - began[0],
                    planning_time=solver.monitor.elapsed - began[1])
+
+
+def stays(task: Task) -> bool:
+    """Return whether a task begins where it ends, at rest, but for what rounding may add."""
+    apart = np.abs(task.goal_positions - task.start_positions).max()
+    return task.starts_at_rest and bool(apart <= _SAME)
 
 
 def _check(task: Task) -> None:
@@ -116,8 +142,7 @@ def _check(task: Task) -> None:
     if task.time_weight:
         raise InvalidTaskError(f'time_weight is {task.time_weight:g}, but must be 0: the largest '
                                'payload is that of a given duration')
-    if (not task.arm.gravity.any() and not task.start_velocities.any()
-            and (task.start_positions == task.goal_positions).all()):
+    if not task.arm.gravity.any() and stays(task):
         raise InvalidTaskError('goal_positions are start_positions: no payload is too large for '
                                'an arm that stays where it is')
     if not task.ends_at_rest:

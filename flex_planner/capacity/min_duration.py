@@ -16,8 +16,9 @@ from flex_planner.base.progress import Monitor, StoppedError
 from flex_planner.base.validation import number, vector
 from flex_planner.capacity.extrapolation import Neighbours, step_ratio
 from flex_planner.capacity.limit_search import LimitSearch
-from flex_planner.capacity.max_payload import find_max_payload
+from flex_planner.capacity.max_payload import find_max_payload, stays
 from flex_planner.capacity.results import describe_kinds, MaxPayload, MinDuration, say_lost_weights
+from flex_planner.capacity.rigid_search import search_as_rigid
 from flex_planner.collocation import Solver
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
@@ -26,7 +27,7 @@ from flex_planner.planning.kinds.clusters import MOST_KINDS
 from flex_planner.planning.kinds.effort import SearchEffort
 from flex_planner.planning.plan import PlanStatus
 from flex_planner.planning.plan_problem import STOP_STATUS
-from flex_planner.planning.proofs import bound_duration, prove_not_held
+from flex_planner.planning.proofs import bound_duration, guess_duration, prove_not_held
 from flex_planner.planning.strategies.extremals import SearchStart
 from flex_planner.planning.strategies.free_parameters import DURATION
 import numpy as np
@@ -78,7 +79,7 @@ def find_min_duration(task: Task, *, model: ArmModel | None = None,
                                'shortest')
     if not task.ends_at_rest:
         raise InvalidTaskError('the shortest duration is that of a motion which ends at rest')
-    if task.starts_at_rest and (task.start_positions == task.goal_positions).all():
+    if stays(task):
         raise InvalidTaskError('goal_positions are start_positions: an arm that stays where it is '
                                'needs no time')
     model = ArmModel.for_arm(task.arm, model)  # before a clock starts
@@ -90,6 +91,11 @@ def find_min_duration(task: Task, *, model: ArmModel | None = None,
     except HoldingError as error:
         return MinDuration(task=task, status=PlanStatus.INFEASIBLE, proved_lower=np.inf,
                            message=str(prove_not_held(error, task.payload_mass)))
+    problem = problem.with_changes(duration=guess_duration(problem))
+    rigid = search_as_rigid(problem, solver, lambda stiff: find_min_duration(
+        stiff, solver=solver, accuracy=accuracy, start_from=start_from, search=effort))
+    if rigid is not None:
+        return replace(rigid, task=task, proved_lower=bound_duration(problem))
     neighbours = start_from if isinstance(start_from, Neighbours) else Neighbours(
         near=start_from)
     limits = LimitSearch(DURATION, problem, solver, accuracy, effort)

@@ -19,11 +19,13 @@ from flex_planner.capacity.results import MaxPayload, PayloadFront, PayloadMetho
 from flex_planner.collocation import Solver
 from flex_planner.optimal_control.holding import holding_limit
 from flex_planner.optimal_control.motion_problem import MotionProblem
+from flex_planner.optimal_control.task import MAX_PAYLOAD
 from flex_planner.optimal_control.totals import integrate_totals
 from flex_planner.planning.kinds.clusters import MOST_KINDS
 from flex_planner.planning.kinds.effort import SearchEffort
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_problem import INTERRUPTED_STATUS, plan_problem, STOP_STATUS
+from flex_planner.planning.proofs import bound_payload
 from flex_planner.planning.strategies.catalogue import QUICK
 from flex_planner.planning.strategies.extremals import Extremal, SearchStart
 from flex_planner.planning.strategies.free_parameters import PAYLOAD
@@ -41,7 +43,10 @@ def search_directly(problem: MotionProblem, solver: Solver, accuracy: float,
     """Follow the price to the limit, then plan there."""
     search = LimitSearch(PAYLOAD, problem, solver, accuracy, effort)
     try:
-        held = None if start is not None else _hold_at_once(problem, solver)
+        held = None if start is not None else (
+            _hold_at_once(problem, solver) or _carry_the_most(problem, solver))
+        if held is not None and not held.held:
+            return with_bound(held, problem)
         found = held or _follow(search, problem, solver, start)
     except StoppedError as error:
         found = _certified_so_far(search, _result(
@@ -91,6 +96,25 @@ def _hold_at_once(problem: MotionProblem, solver: Solver) -> MaxPayload | None:
     return _held(plan, limit, joint, MaxPayload(
         task=problem.task, method=PayloadMethod.DIRECT, status=plan.status,
         message=plan.message))
+
+
+def _carry_the_most(problem: MotionProblem, solver: Solver) -> MaxPayload | None:
+    """Return the outcome if the most that a task may carry is no limit, and is carried."""
+    if np.isfinite(bound_payload(problem).payload):
+        return None
+    solver.monitor.phase = 'the largest payload of all tasks'
+    try:
+        plan = plan_problem(PAYLOAD.with_value(problem, MAX_PAYLOAD), solver.patient(_FIRST_TRY),
+                            QUICK[:2])
+    except FlexPlannerError:  # too heavy to hold
+        return None
+    if not plan.solved:
+        return None
+    return MaxPayload(
+        task=problem.task, method=PayloadMethod.DIRECT, status=plan.status, plan=plan,
+        payload=MAX_PAYLOAD, limiting_joint=int(plan.saturation.argmax()), message=(
+            f'{MAX_PAYLOAD:g} kg can be carried, certified: a task may have no more, and the '
+            'motors are not the limit'))
 
 
 def _hold(problem: MotionProblem, last: Extremal, found: MaxPayload,

@@ -20,7 +20,7 @@ from flex_planner.maps.pictures.panels import (
 )
 from flex_planner.maps.pictures.scene import draw_arm, find_scene, frame, study_of
 from flex_planner.maps.pictures.slices import draw_slices, lines_along, lines_through_points
-from flex_planner.maps.store import MapStoreError, open_map
+from flex_planner.maps.store import open_map
 from flex_planner.maps.study import Study
 from flex_planner.plotting.figures import save
 from matplotlib.artist import Artist
@@ -75,12 +75,9 @@ def draw_map(store: Path, folder: Path) -> list[Path]:
 
 def _read(store: Path) -> tuple[MapData, Study | None]:
     """Return a map, and its study where the arm is to be drawn."""
-    with open_map(store) as dataset:
-        try:
-            data = MapData.of(dataset)
-        except (ValueError, RuntimeError) as error:  # what zarr says of damaged chunks
-            raise MapStoreError(f'{store} cannot be read: {error}') from error
-        return data, study_of(dataset) if _is_workspace(data, _plane(data) or ()) else None
+    dataset = open_map(store)
+    data = MapData.of(dataset)
+    return data, study_of(dataset) if _is_workspace(data, _plane(data) or ()) else None
 
 
 def _figures(data: MapData, study: Study | None) -> dict[str, Figure]:

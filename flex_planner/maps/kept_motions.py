@@ -19,8 +19,6 @@ from flex_planner.planning.strategies.extremals import SearchStart
 import numpy as np
 from numpy.typing import NDArray
 
-Packed = NDArray[np.float32]
-
 # how far apart the entries of a signature may be: at all, and as a share of the larger one
 _REACH = {
     'start_positions': (0.2, 0.0), 'goal_positions': (0.2, 0.0), 'duration': (0.0, 0.1),
@@ -32,6 +30,7 @@ _SAME = (1e-6, 1e-6)  # single precision
 # what the largest payload is, or does not depend on
 _NOT_SEARCHED = ('payload_mass', 'position_weights', 'velocity_weights')
 _HEAD = 3  # payload, price, number of nodes
+_TYPE = '<f4'
 
 
 def signature_fields(task: Task) -> list[str]:
@@ -109,16 +108,17 @@ class KeptMotion:
                    payload=problem.parameters.payload_mass, mesh=solution.mesh,
                    nodes=solution.nodes)
 
-    def pack(self) -> Packed:
+    def pack(self) -> bytes:
         """Return payload, price, mesh and nodes; single precision is plenty for a start."""
         mesh, kept = np.unique(self.mesh.astype(np.float32), return_index=True)
         return np.concatenate([[self.payload, self.price, mesh.size], mesh,
-                               self.nodes[kept].ravel()], dtype=np.float32)
+                               self.nodes[kept].ravel()], dtype=np.float32).astype(_TYPE).tobytes()
 
     @classmethod
-    def unpack(cls, own: Array, packed: Packed) -> KeptMotion:
+    def unpack(cls, own: Array, packed: bytes) -> KeptMotion:
         """Return the motion of a signature and what `pack` made of it."""
-        head, values = packed[:_HEAD].tolist(), packed[_HEAD:].astype(np.float64)
+        numbers = np.frombuffer(packed, _TYPE)
+        head, values = numbers[:_HEAD].tolist(), numbers[_HEAD:].astype(np.float64)
         payload, price, count = head[0], head[1], int(head[2])
         return cls(signature=own, payload=payload, price=price, mesh=values[:count],
                    nodes=values[count:].reshape(count, -1))

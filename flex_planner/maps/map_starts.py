@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import plain_arm
-from flex_planner.base.yaml_text import format_yaml, parse_yaml
+from flex_planner.base.yaml_text import format_yaml, parse_yaml, YamlTextError
 from flex_planner.maps.cell_results import CellCode
 from flex_planner.maps.kept_motions import distances, KeptMotion, signature
 from flex_planner.maps.quantities import Quantity
-from flex_planner.maps.store import MapStoreError, open_group
+from flex_planner.maps.store_layout import MOTIONS, SIGNATURES
+from flex_planner.maps.stored_map import MapStoreError, StoredMap
 from flex_planner.optimal_control.task import Task
 import numpy as np
 
@@ -58,16 +58,17 @@ class MapStarts:
     """
 
     def __init__(self, path: Path, arm: Arm) -> None:
-        group = open_group(path, 'r')
-        if 'motions' not in group:
+        self._stored = StoredMap(path)
+        group = self._stored.group
+        if not self._stored.keeps_motions:
             raise MapStoreError(f'the map {path} keeps no motions to start from: compute one '
                                 'with keep_motions: true')
         _check_arm(path, group.attrs['arm'], arm)
-        self._path, self._group = path, group
-        self._names: list[str] = list(group['motions'].attrs['signature'])
-        self._cells = np.argwhere(np.asarray(group['code'][:]) == CellCode.SOLVED)
-        signatures = np.asarray(group['motions/signature'][:], dtype=np.float32)
-        self._signatures = signatures[tuple(self._cells.T)]
+        self._path, self._coordinates = path, self._stored.coordinates()
+        self._names: list[str] = list(group[MOTIONS].attrs[SIGNATURES])
+        self._cells = np.argwhere(self._stored.read()['code'] == CellCode.SOLVED)
+        with np.errstate(over='ignore'):  # damaged ones may be anything
+            self._signatures = self._stored.signatures()[tuple(self._cells.T)].astype(np.float32)
         self._of_payloads = group.attrs['quantity'] == Quantity.MAX_PAYLOAD.key
 
     def __len__(self) -> int:
@@ -90,31 +91,48 @@ class MapStarts:
             return None
         own = signature(task)
         apart = distances(self._signatures, own, self._names, searched=searched)
-        nearest = int(apart.argmin())
-        if not apart[nearest] <= 1:
+        for nearest in np.argsort(apart):
+            if not apart[nearest] <= 1:
+                return None
+            known = self._known(tuple(int(k) for k in self._cells[nearest]))
+            if known is not None:
+                return known
+        return None
+
+    def _known(self, index: tuple[int, ...]) -> KnownCell | None:
+        """Return a cell with its motion; None if that is damaged, or was not kept."""
+        sides = self._stored.block_shape
+        found = self._stored.motions_of(tuple(
+            slice(k - k % side, min(k - k % side + side, size))
+            for k, side, size in zip(index, sides, self._stored.shape, strict=True)))
+        inside = tuple(k % side for k, side in zip(index, sides, strict=True))
+        if found is None or not found[1][inside]:
             return None
-        index = tuple(int(k) for k in self._cells[nearest])
-        there = np.asarray(self._group['motions/signature'][index])
-        packed = self._group['motions/motion'][index]
-        return KnownCell(place=self._place(index), motion=KeptMotion.unpack(there, packed))
+        return KnownCell(place=self._place(index), motion=KeptMotion.unpack(
+            found[0][inside], found[1][inside]))
 
     def _place(self, index: tuple[int, ...]) -> str:
         """Return a cell in words."""
-        axes: list[str] = self._group['code'].attrs['_ARRAY_DIMENSIONS']
-        values = ', '.join(f'{name} = {_value(self._group[name], k)}'
-                           for name, k in zip(axes, index, strict=True))
+        values = ', '.join(f'{name} = {self._value(name, k)}'
+                           for name, k in zip(self._stored.axes, index, strict=True))
         return f'{values} of {self._path.name}'
 
-
-def _value(axis: Any, k: int) -> str:
-    """Return a value of an axis with its unit."""
-    unit = str(axis.attrs['units'])
-    return f'{float(axis[k]):.6g}' + ('' if unit == '1' else f' {unit}')
+    def _value(self, name: str, k: int) -> str:
+        """Return a value of an axis with its unit."""
+        unit = str(self._stored.group[name].attrs.get('units', '1'))
+        return f'{self._coordinates[name][k]:.6g}' + ('' if unit == '1' else f' {unit}')
 
 
 def _check_arm(path: Path, there: str, arm: Arm) -> None:
     """Refuse a map of another arm; its name and source do not matter."""
-    found, own = parse_yaml(there), parse_yaml(format_yaml(plain_arm(arm)))
+    try:
+        found = parse_yaml(there)
+    except YamlTextError:
+        found = None
+    if not isinstance(found, dict):
+        raise MapStoreError(f'the map {path} is damaged, its arm cannot be read: restore it from '
+                            'a copy, or compute the map anew with --reset')
+    own = parse_yaml(format_yaml(plain_arm(arm)))
     differing = [name for name in own if name not in ('name', 'source')
                  and own[name] != found.get(name)]
     if differing:

@@ -1,8 +1,8 @@
 """
 A map on disk: a Zarr store that xarray opens, written block by block.
 
-Chunks are the blocks, and the codes of a block are written last: a block counts as complete once
-all its codes are there, whatever ended the program.
+Chunks are the blocks, and the checksums of a block are written last: it counts as complete only if
+they fit, whatever ended the program, or happened to the files since.
 
 """
 
@@ -13,27 +13,29 @@ import fcntl
 import itertools
 import os
 from pathlib import Path
-import shutil
 import tempfile
 from types import TracebackType
 from typing import Any, NoReturn, TYPE_CHECKING
 
-from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.paths import expand_path
 from flex_planner.maps.axes import Block
 from flex_planner.maps.cell_results import CellCode, CellResult
-from flex_planner.maps.store_layout import BESIDE, differences, metadata, MOTIONS, write_empty
+from flex_planner.maps.checksums import checksum
+from flex_planner.maps.store_layout import (
+    BESIDE,
+    differences,
+    metadata,
+    MOTIONS,
+    SUMS,
+    write_empty,
+)
+from flex_planner.maps.stored_map import MapStoreError, open_group, StoredMap
 import numpy as np
 from numpy.typing import NDArray
 import xarray as xr
-import zarr
 
 if TYPE_CHECKING:
     from flex_planner.maps.study import Study
-
-
-class MapStoreError(FlexPlannerError):
-    """A store is no map, belongs to another study, or is in use."""
 
 
 class MapStore:
@@ -45,19 +47,34 @@ class MapStore:
     path : Path
         Of an existing store.
 
+    Attributes
+    ----------
+    path : Path
+        As given.
+    codes : numpy.ndarray
+        A `CellCode` for each cell; those of damaged blocks are pending.
+    damaged : int
+        How many blocks were written, and are not whole.
+
     Raises
     ------
     MapStoreError
-        If it is no map, or another process writes it.
+        If it is no map, is damaged beyond its blocks, or another process writes it.
 
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path = expand_path(path)
-        self._group = open_group(path, 'r+')
-        self._key: str = self._group.attrs['quantity']
         self._lock = _lock_store(path)
-        self.codes = _readable_codes(self._group['code'])
+        try:
+            self._stored = StoredMap(path, 'r+')
+            self.codes = self._stored.whole_codes()
+            self.damaged = self._stored.count_written() - sum(
+                self.is_complete(block) for block in self._stored.blocks())
+        except BaseException:
+            self.close()
+            raise
+        self._group, self._key = self._stored.group, self._stored.key
 
     @classmethod
     def create(cls, path: Path, study: Study) -> MapStore:
@@ -105,15 +122,9 @@ class MapStore:
         """
         path = expand_path(path)
         if os.path.lexists(path):
-            store = cls(path)
             if not reset:
-                return store.check(study)
-            try:
-                shutil.rmtree(path)
-            except OSError as error:
-                _raise_named(error, path, 'it cannot be removed')
-            finally:
-                store.close()
+                return cls(path).check(study)
+            _remove_map(path)
         return cls.create(path, study)
 
     def check(self, study: Study) -> MapStore:
@@ -126,15 +137,29 @@ class MapStore:
             Naming what differs.
 
         """
-        found = differences(self._group.attrs.asdict(), metadata(study))
-        if not found and self.codes.shape != study.shape:
-            found = [f'shape: {study.shape}, there {self.codes.shape}']
+        found = differences(dict(self._group.attrs), metadata(study))
+        for name, own, there in (('shape', study.shape, self.codes.shape),
+                                 ('block', study.block_shape, self._stored.block_shape),
+                                 ('keep_motions', study.keeps_motions,
+                                  self._stored.keeps_motions)):
+            if not found and own != there:
+                found = [f'{name}: {own}, there {there}']
         if found:
             self.close()
             raise MapStoreError(f'{self.path} holds the map of another study or version ('
                                 f'{"; ".join(found)}); choose another --output, or start '
                                 'anew with --reset')
+        self._restore_axes(study)
         return self
+
+    def _restore_axes(self, study: Study) -> None:
+        """Write the values of the axes again if they are damaged."""
+        try:
+            self._stored.coordinates()
+        except MapStoreError:
+            for axis in study.axes:
+                self._group[axis.name][...] = axis.values
+            self._group.attrs['axes_checksum'] = checksum(axis.values for axis in study.axes)
 
     def is_complete(self, block: Block) -> bool:
         """Return whether every cell of a block is done."""
@@ -156,33 +181,34 @@ class MapStore:
             raise ValueError(f'{len(results)} results are not those of the block {block}')
         shape = tuple(part.stop - part.start for part in block)
         ordered = sorted(results, key=lambda result: result.index)
+        columns = {name: _column(ordered, 'value' if name == self._key else name, shape,
+                                 self._group[name].dtype) for name in (self._key, *BESIDE)}
         try:
-            self._write_motions(block, ordered, shape)
-            for name in (self._key, *BESIDE):
-                target = self._group[name]
-                values = np.empty(len(ordered), dtype=target.dtype)
-                values[:] = [getattr(result, 'value' if name == self._key else name)
-                             for result in ordered]
-                target[block] = values.reshape(shape)
-        except OSError as error:
+            sum_of_motions = self._write_motions(block, ordered, shape)
+            for name, values in columns.items():
+                self._group[name][block] = values
+            place = self._stored.place(block)
+            self._group[SUMS][place] = [checksum(columns.values()), sum_of_motions]
+        except (OSError, KeyError) as error:
             _raise_named(error, self.path, 'finished blocks are kept')
-        self.codes[block] = values.reshape(shape)
+        self.codes[block] = columns['code']
 
     def _write_motions(self, block: Block, ordered: Sequence[CellResult],
-                       shape: tuple[int, ...]) -> None:
-        """Write what other motions may start from."""
+                       shape: tuple[int, ...]) -> int:
+        """Write what other motions may start from; return the checksum."""
         if MOTIONS not in self._group:
-            return
+            return 0
         kept = self._group[MOTIONS]
         signatures = np.full((len(ordered), kept['signature'].shape[-1]), np.nan)
         motions = np.empty(len(ordered), dtype=object)
         for k, result in enumerate(ordered):
             motion = result.motion
-            motions[k] = np.zeros(0, np.float32) if motion is None else motion.pack()
+            motions[k] = b'' if motion is None else motion.pack()
             if motion is not None:
                 signatures[k] = motion.signature
         kept['signature'][block] = signatures.reshape(*shape, -1)
         kept['motion'][block] = motions.reshape(shape)
+        return checksum((signatures, motions))
 
     def dataset(self) -> xr.Dataset:
         """Return the present contents, opened; read them before the next block is written."""
@@ -204,40 +230,41 @@ class MapStore:
 
 def open_map(path: Path) -> xr.Dataset:
     """
-    Return a map as a dataset, its values read when they are used.
+    Return a map as a dataset in memory; cells of damaged blocks are as if they were pending.
 
     Raises
     ------
     MapStoreError
-        If there is none.
+        If there is none, or it is damaged beyond its blocks.
 
     """
-    path = expand_path(path)
-    open_group(path, 'r')
-    opened: xr.Dataset = xr.open_zarr(str(path), chunks=None)
-    return opened
+    stored = StoredMap(expand_path(path))
+    coordinates, group = stored.coordinates(), stored.group
+    variables = {name: (stored.axes, _decoded(name, values), _attributes(group[name]))
+                 for name, values in stored.read().items()}
+    return xr.Dataset(variables, {name: (name, values, _attributes(group[name]))
+                                  for name, values in coordinates.items()}, dict(group.attrs))
 
 
-def open_group(path: Path, mode: str) -> Any:
-    """
-    Return the Zarr group of a map.
+def _decoded(name: str, values: NDArray[Any]) -> NDArray[Any]:
+    """Return values with NaN for none, but whole numbers for codes: pending is one of them."""
+    filler = BESIDE[name][1] if name in BESIDE else None
+    if name == 'code' or filler is None or values.dtype.kind != 'i':
+        return values
+    return np.where(values == filler, np.nan, values)
 
-    Raises
-    ------
-    MapStoreError
-        If there is none.
 
-    """
-    path = expand_path(path)
-    if not path.exists():
-        raise MapStoreError(f'there is no map {path}')
-    try:
-        group = zarr.open_group(str(path), mode=mode)
-        if {'quantity', 'study', 'flex_planner_version'} <= set(group.attrs) and 'code' in group:
-            return group
-    except (ValueError, KeyError, FileNotFoundError, NotADirectoryError):
-        pass  # what zarr says of a folder that is none of its own
-    raise MapStoreError(f'{path} exists, but is not a map')
+def _attributes(array: Any) -> dict[str, Any]:
+    """Return what an array says of itself to people."""
+    return {name: value for name, value in dict(array.attrs).items() if not name.startswith('_')}
+
+
+def _column(ordered: Sequence[CellResult], name: str, shape: tuple[int, ...],
+            dtype: np.dtype[Any]) -> NDArray[Any]:
+    """Return one field of results."""
+    values = np.empty(len(ordered), dtype=dtype if dtype.kind in 'if' else object)
+    values[:] = [getattr(result, name) for result in ordered]
+    return values.reshape(shape)
 
 
 def cells(block: Block) -> list[tuple[int, ...]]:
@@ -247,6 +274,7 @@ def cells(block: Block) -> list[tuple[int, ...]]:
 
 def _lock_store(path: Path) -> int:
     """Return a descriptor that keeps other writers out while it is open."""
+    open_group(path, 'r')
     descriptor = os.open(path, os.O_RDONLY)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -258,21 +286,17 @@ def _lock_store(path: Path) -> int:
     return descriptor
 
 
-def _readable_codes(stored: Any) -> NDArray[np.int8]:
-    """Return the codes; those of a damaged block as pending, so that it is computed again."""
+def _remove_map(path: Path) -> None:
+    """Remove a map that nobody writes, whatever state it is in: all of it, or nothing."""
+    lock = _lock_store(path)  # nothing but a map is removed
     try:
-        return np.asarray(stored[:])
-    except (ValueError, RuntimeError):
-        codes = np.zeros(stored.shape, dtype=np.int8)
-    starts = (range(0, size, step) for size, step in zip(stored.shape, stored.chunks, strict=True))
-    for corner in itertools.product(*starts):
-        place = tuple(slice(start, start + step)
-                      for start, step in zip(corner, stored.chunks, strict=True))
-        try:
-            codes[place] = stored[place]
-        except (ValueError, RuntimeError):
-            continue
-    return codes
+        with tempfile.TemporaryDirectory(dir=path.parent, prefix=f'.{path.name}-') as scratch:
+            os.rename(path, Path(scratch, 'old'))
+    except OSError as error:
+        _raise_named(error, path, 'it cannot be removed')
+    finally:
+        if lock >= 0:
+            os.close(lock)
 
 
 def _raise_named(error: Exception, path: Path, consequence: str) -> NoReturn:

@@ -11,14 +11,14 @@ from typing import Any, TYPE_CHECKING
 from dask import array
 from flex_planner.arms.arm_files import plain_arm
 from flex_planner.base.version import VERSION
-from flex_planner.base.yaml_text import format_yaml, parse_yaml
+from flex_planner.base.yaml_text import format_yaml, parse_yaml, YamlTextError
 from flex_planner.maps.cell_results import CellCode
+from flex_planner.maps.checksums import checksum
 from flex_planner.maps.kept_motions import signature_fields
+from flex_planner.maps.zarr_groups import add_array, add_bytes, open_folder, summarize
 from flex_planner.optimal_control.task import Task
-from numcodecs import Blosc, VLenArray
 import numpy as np
 import xarray as xr
-import zarr
 
 if TYPE_CHECKING:
     from flex_planner.maps.study import Study
@@ -26,7 +26,11 @@ if TYPE_CHECKING:
 _CONVENTIONS = 'CF-1.11'
 _LIBRARIES = ('casadi', 'numpy', 'scipy', 'xarray', 'zarr')
 _TEXT = np.dtype('O', metadata={'element_type': str})  # how xarray marks text of any length
-MOTIONS = 'motions'  # a group of its own, which xarray leaves alone
+LAYOUT = 2  # of stores; 1 had no checksums
+# groups of their own, which xarray leaves alone
+MOTIONS, SIGNATURES = 'motions', 'signature'
+SUMS = 'blocks/checksum'
+TEXTS = ('message',)
 # type, what stands where nothing is written, metadata; the quantity itself comes first
 BESIDE: dict[str, tuple[Any, float | None, dict[str, str]]] = {
     'bound': (float, np.nan, {'long_name': 'bound of the true value'}),
@@ -36,8 +40,8 @@ BESIDE: dict[str, tuple[Any, float | None, dict[str, str]]] = {
     'seconds': (float, np.nan, {'long_name': 'computing time', 'units': 's'}),
     'warm': (np.int8, -1, {'long_name': 'started from a neighbor: 1, otherwise 0'}),
     'message': (_TEXT, None, {'long_name': 'what became of the cell'}),
-    # without a filler, which would have xarray turn the numbers into floats
-    'code': (np.int8, None, {'long_name': 'kind of outcome'}),
+    # what is lost is not computed yet; xarray shows it as NaN
+    'code': (np.int8, CellCode.PENDING, {'long_name': 'kind of outcome'}),
 }
 
 
@@ -57,16 +61,31 @@ def write_empty(path: Path, study: Study) -> None:
     encoding: dict[str, dict[str, Any]] = {
         name: {'_FillValue': filler, **chunks} for name, (_, filler, _) in kinds.items()}
     encoding['message'] = chunks  # text has no filler
-    dataset = xr.Dataset(variables, coordinates, metadata(study))
+    about = {**metadata(study), 'layout': LAYOUT,
+             'axes_checksum': checksum(axis.values for axis in study.axes)}
+    dataset = xr.Dataset(variables, coordinates, about)
     dataset['bound'].attrs |= unit
     dataset['code'].attrs |= _flags()
-    dataset.to_zarr(path, mode='w-', compute=False, consolidated=True, zarr_format=2,
+    dataset.to_zarr(path, mode='w-', compute=False, consolidated=False, zarr_format=2,
                     safe_chunks=False,
-                    encoding={**encoding, **{name: {'_FillValue': None} for name in names}})
-    group = zarr.open_group(str(path), mode='r+')
-    group['code'][...] = CellCode.PENDING
+                    encoding={**encoding, **{name: {'_FillValue': np.nan} for name in names}})
+    group = open_folder(path, 'r+')
+    _add_sums(group, study)
     if study.keeps_motions:
         _add_motions(group, study)
+    summarize(path)
+
+
+def _add_sums(group: Any, study: Study) -> None:
+    """Make room for the checksums of the blocks."""
+    name, names = SUMS.split('/')
+    blocks = tuple(-(-size // side)
+                   for size, side in zip(study.shape, study.block_shape, strict=True))
+    sums = group.create_group(name)
+    sums.attrs['comment'] = ('CRC-32 of the values of each block, written last: of the variables, '
+                             'of the motions; -1 where there is none')
+    add_array(sums, names, [*(f'{axis.name}_block' for axis in study.axes), 'part'],
+              shape=(*blocks, 2), chunks=(*(1 for _ in blocks), 2), dtype='<i8', fill=-1)
 
 
 def _add_motions(group: Any, study: Study) -> None:
@@ -75,14 +94,14 @@ def _add_motions(group: Any, study: Study) -> None:
     names = signature_fields(Task(arm=arm, start_positions=np.zeros(arm.n_joints),
                                   goal_positions=np.zeros(arm.n_joints), duration=1.0))
     motions = group.create_group(MOTIONS)
-    motions.attrs.update({'signature': names, 'comment': (
-        'motion: payload [kg], price dJ/dm_p [1/kg], number of nodes, their times [s], and '
-        'z = (q, dq/dt, psi_1, psi_2) at each of them; signature: what it solves')})
-    motions.create_dataset('signature', shape=(*study.shape, len(names)), dtype='f8',
-                           chunks=(*study.block_shape, len(names)), fill_value=np.nan)
-    motions.create_dataset('motion', shape=study.shape, chunks=study.block_shape, dtype=object,
-                           object_codec=VLenArray('<f4'), compressor=Blosc('zstd', 5, 0),
-                           fill_value=None)
+    motions.attrs.update({SIGNATURES: names, 'comment': (
+        'motion: 4-byte floats, least byte first: payload [kg], price dJ/dm_p [1/kg], number of '
+        'nodes, their times [s], and z = (q, dq/dt, psi_1, psi_2) at each of them; signature: '
+        'what it solves')})
+    axes = [axis.name for axis in study.axes]
+    add_array(motions, 'signature', [*axes, 'quantity'], shape=(*study.shape, len(names)),
+              chunks=(*study.block_shape, len(names)), dtype='<f8', fill=np.nan)
+    add_bytes(motions, 'motion', axes, shape=study.shape, chunks=study.block_shape)
 
 
 def _flags() -> dict[str, Any]:
@@ -107,7 +126,7 @@ def differences(there: dict[str, Any], wanted: dict[str, str]) -> list[str]:
     found = [f'{name.replace("_", " ")}: {wanted[name]}, there {there.get(name)}'
              for name in ('flex_planner_version', 'quantity') if wanted[name] != there.get(name)]
     for name in ('study', 'arm'):
-        old, new = parse_yaml(str(there.get(name))), parse_yaml(wanted[name])
+        old, new = _loaded(there.get(name)), parse_yaml(wanted[name])
         if old == new:
             continue
         if not isinstance(old, dict) or not isinstance(new, dict):
@@ -117,3 +136,11 @@ def differences(there: dict[str, Any], wanted: dict[str, str]) -> list[str]:
                   f'{reprlib.repr(old.get(key))}'
                   for key in dict.fromkeys([*new, *old]) if new.get(key) != old.get(key)]
     return found
+
+
+def _loaded(text: object) -> object:
+    """Return what a text of YAML says, None if it is damaged."""
+    try:
+        return parse_yaml(str(text))
+    except YamlTextError:
+        return None

@@ -25,7 +25,14 @@ from flex_planner.planning.kinds.kinds_strategy import as_guess
 from flex_planner.planning.objectives import Objectives
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_problem import plan_problem
-from flex_planner.planning.proofs import find_proof, Proof, prove_not_held
+from flex_planner.planning.proofs import (
+    check_duration,
+    find_doubt,
+    find_proof,
+    Proof,
+    prove_not_held,
+)
+from flex_planner.planning.stiff_links import find_stiff_links
 from flex_planner.planning.strategies.catalogue import CATALOGUE
 from flex_planner.planning.strategies.initial_guesses import warm_start
 from flex_planner.planning.strategies.strategy import Strategy
@@ -73,7 +80,8 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
     Raises
     ------
     InvalidTaskError
-        If an objective or the model does not go with the task, or the links buckle at rest.
+        If an objective or the model does not go with the task, the links buckle at rest, or the
+        duration is absurdly short.
     UnreachableError, SingularError
         If the arm, bent by gravity, cannot rest at a point of the task.
     ValueError
@@ -97,6 +105,13 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
     proof = find_proof(problem)
     if proof is not None:
         return _impossible(problem, proof)
+    check_duration(problem)
+    doubt = find_doubt(problem)
+    if doubt is not None:
+        return _not_found(problem, doubt)
+    plan = _plan_as_rigid(problem, solver, start_from, objectives, strategies, effort)
+    if plan is not None:
+        return plan
     plan = plan_problem(problem, solver, (*_given(start_from, problem, solver), *strategies),
                         effort)
     if plan.status in (PlanStatus.NOT_FOUND, PlanStatus.NOT_CONVERGED):
@@ -146,6 +161,28 @@ def plan_kind(task: Task, number: int, **options: Any) -> Plan:
 def _impossible(problem: MotionProblem, proof: Proof) -> Plan:
     """Return the plan of a task that no motion does."""
     return Plan(task=problem.task, status=PlanStatus.INFEASIBLE, message=str(proof), strategy='',
+                problem=problem, solution=None, warnings=find_arm_warnings(problem.model.arm))
+
+
+def _plan_as_rigid(problem: MotionProblem, solver: Solver,
+                   start: Plan | KindOfMotion | CollocationSolution | None,
+                   objectives: Objectives | None, strategies: Sequence[Strategy],
+                   effort: SearchEffort) -> Plan | None:
+    """Return the plan of an arm whose stiff links are taken as rigid; None without any."""
+    stiff = find_stiff_links(problem, solver)
+    if stiff is None or (objectives is not None and objectives.max_modal_rates.size):
+        return None
+    solution = start.solution if isinstance(start, Plan) else start
+    if isinstance(solution, CollocationSolution):
+        solution = stiff.restrict(solution)
+    plan = plan_path(stiff.task(), solver=solver, start_from=solution, objectives=objectives,
+                     strategies=strategies, search=effort)
+    return stiff.lift(plan, solver)
+
+
+def _not_found(problem: MotionProblem, reason: str) -> Plan:
+    """Return the plan of a task for which no motion was found."""
+    return Plan(task=problem.task, status=PlanStatus.NOT_FOUND, message=reason, strategy='',
                 problem=problem, solution=None, warnings=find_arm_warnings(problem.model.arm))
 
 

@@ -61,7 +61,8 @@ def plan_problem(problem: MotionProblem, solver: Solver,
             strategy, attempt = _solve_first(problem, solver, strategies)
         plan = _conclude(problem, strategy, attempt, solver)
         if (effort.explores and strategy != WARM_START and plan.solution is not None
-                and plan.status not in STOP_STATUS.values()):
+                and plan.status not in STOP_STATUS.values()
+                and plan.cost > 0):  # nothing is cheaper than nothing
             plan = _look_for_cheaper(plan, attempt, solver, effort)
     except StoppedError as error:
         plan = Plan(task=problem.task, status=STOP_STATUS[error.reason], message=str(error),

@@ -45,6 +45,7 @@ class WarningKind(Enum):
     SPEED_ABOVE_NO_LOAD = 'faster than the no-load speed'
     TIP_NEAR_BASE = 'the tip comes near the base'
     LINKS_OVERLAP = 'links overlap'
+    STIFF_LINKS = 'links so stiff that they are planned as rigid'
     JOINT_WITHOUT_INERTIA = 'clamped link on a joint without inertia'
     TOO_FEW_MODES = 'too few modes'
     ARRIVES_ELSEWHERE = 'the controller leads the arm elsewhere'
@@ -68,8 +69,8 @@ class PlanWarning:
     sentence : str
         For people.
     value : float or None
-        The figure that the sentence tells: a share [-], or a length [m] for `TIP_NEAR_BASE` and
-        `TOO_FEW_MODES`.
+        The figure that the sentence tells: a share [-], or a length [m] for `TIP_NEAR_BASE`,
+        `TOO_FEW_MODES` and `STIFF_LINKS`.
     time : float or None
         When, where there is one moment [s].
 

@@ -13,7 +13,7 @@ from flex_planner.maps import draw_map as drawing
 from flex_planner.maps.cell_results import CellCode, CellResult
 from flex_planner.maps.draw_map import draw_map
 from flex_planner.maps.pictures import panels
-from flex_planner.maps.store import cells, MapStore
+from flex_planner.maps.store import cells, MapStore, open_map
 from flex_planner.maps.study import load_study, Study
 from matplotlib import image
 from matplotlib.axes import Axes
@@ -280,11 +280,18 @@ def test_values_of_contours_keep_away_from_the_arm(tmp_path: Path,
     assert np.linalg.norm(texts[:, None] - arms, axis=-1).min() > 0.1
 
 
-def test_damaged_map_is_named(tmp_path: Path) -> None:
+def test_map_whose_values_are_damaged_is_drawn_as_pending(tmp_path: Path) -> None:
     store = written(tmp_path, study(tmp_path, {'duration': [1, 2]}, **GOAL))
     for chunk in (store / 'max_payload').glob('[0-9]*'):
         chunk.write_bytes(b'damaged')
-    with pytest.raises(FlexPlannerError, match='map.zarr cannot be read'):
+    assert draw_map(store, tmp_path)
+    assert (open_map(store).code == CellCode.PENDING).all()
+
+
+def test_map_that_is_damaged_beyond_its_blocks_is_named(tmp_path: Path) -> None:
+    store = written(tmp_path, study(tmp_path, {'duration': [1, 2]}, **GOAL))
+    (store / 'max_payload' / '.zarray').write_text('{')
+    with pytest.raises(FlexPlannerError, match=r'map.zarr is damaged, .* max_payload'):
         draw_map(store, tmp_path)
 
 

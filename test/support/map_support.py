@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+import errno
 import os
 from pathlib import Path
 import signal
@@ -18,6 +21,7 @@ from flex_planner.maps.store import cells, MapStore
 from flex_planner.maps.study import load_study, Study
 from flex_planner.maps.study_motion import StudyMotion
 import numpy as np
+import pytest
 
 SUPPORT = Path(__file__).parent
 STUDY = """
@@ -48,6 +52,27 @@ def small_study(columns: int = 6, rows: int = 4, text: str = TEXT,
 
 def value_of(index: tuple[int, ...]) -> float:
     return 10.0 * index[0] + index[1]
+
+
+@contextmanager
+def full_disk(store: Path, blocks: int, files: int) -> Iterator[None]:
+    """Let a store be written until so many blocks are whole, and so many files more."""
+    replace, left = os.replace, {'blocks': blocks, 'files': files}
+
+    def limited(source: str, target: str) -> None:
+        """Put a file in its place, or half of it."""
+        inside = str(store) in str(target)
+        if inside and not left['blocks']:
+            left['files'] -= 1
+            if left['files'] < 0:
+                Path(target).write_bytes(Path(source).read_bytes()[:7])
+                raise OSError(errno.ENOSPC, 'No space left on device')
+        replace(source, target)
+        left['blocks'] -= inside and 'checksum' in str(target) and bool(left['blocks'])
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, 'replace', limited)
+        yield
 
 
 def solve(study: Study, block: Block, monitor: Monitor) -> list[CellResult]:

@@ -107,6 +107,9 @@ def _run(options: argparse.Namespace, study: Study, store: MapStore) -> Tally:
 
     done = int((store.codes != CellCode.PENDING).sum())
     display = MapDisplay(sys.stderr)
+    if store.damaged:
+        blocks = 'block is' if store.damaged == 1 else 'blocks are'
+        print(f'{store.path}: {store.damaged} {blocks} not whole and computed again')
     if done:
         print(f'{store.path}: {done} of {store.codes.size} cells are computed already')
     try:

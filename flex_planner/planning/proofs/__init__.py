@@ -14,6 +14,12 @@ from flex_planner.planning.proofs.proof import (
     ProofName,
     prove_not_held,
 )
+from flex_planner.planning.proofs.short_durations import (
+    check_duration,
+    find_doubt,
+    guess_duration,
+)
 
-__all__ = ['PayloadBound', 'Proof', 'ProofName', 'bound_duration', 'bound_payload', 'find_proof',
+__all__ = ['PayloadBound', 'Proof', 'ProofName', 'bound_duration', 'bound_payload',
+           'check_duration', 'find_doubt', 'find_proof', 'guess_duration',
            'prove_not_held']

@@ -26,6 +26,8 @@ import numpy as np
 
 # share of the duration from which on the bound by power calls for the closer one
 _NEAR = 0.5
+# square of a duration, in units of that of a constant acceleration over half of the way
+_HASTY = 40.0
 
 
 class ProofName(Enum):
@@ -103,12 +105,23 @@ def find_proof(problem: MotionProblem, *, thorough: bool = False) -> Proof | Non
     if power.seconds > asked:
         return Proof(name=ProofName.POWER, sentence=(
             f'the motors give at most {facts.power:.4g} W: {_too_short(power, asked)}'))
-    if thorough or power.seconds > _NEAR * asked:
+    if thorough or power.seconds > _NEAR * asked or _is_hasty(facts):
         energy = bound_by_energy(facts)
         if energy.seconds > asked:
             return Proof(name=ProofName.ENERGY, sentence=(
                 f'within the torque of the motors {_too_short(energy, asked)}'))
     return None
+
+
+def _is_hasty(facts: MotionFacts) -> bool:
+    """Return whether motors with nothing but their joint to turn would be late, roughly."""
+    if not (facts.rigid and facts.limited):
+        return False
+    payload = facts.problem.parameters.payload_mass
+    mobilities = facts.inertia(payload).joint_mobilities
+    hurry = facts.strokes()[0] / (mobilities * facts.stall.sum())
+    return bool(_HASTY * hurry[facts.hard_joints].max(initial=0.0)
+                > facts.problem.task.duration**2)
 
 
 def bound_duration(problem: MotionProblem) -> float:

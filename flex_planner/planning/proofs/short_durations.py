@@ -1,0 +1,83 @@
+"""
+Durations that are out of all proportion to the motion, told before anything is solved.
+
+Other than the bounds of `duration_bounds` these are no proofs of the arm as it is.
+
+"""
+
+from __future__ import annotations
+
+from flex_planner.base.errors import InvalidTaskError
+from flex_planner.base.validation import Array
+from flex_planner.optimal_control.motion_problem import MotionProblem
+from flex_planner.optimal_control.task import MAX_DURATION, MAX_VELOCITY
+from flex_planner.planning.proofs.duration_bounds import bound_by_energy, bound_by_power
+from flex_planner.planning.proofs.motion_facts import MotionFacts
+from flex_planner.planning.strategies.initial_guesses import rigid_problem
+import numpy as np
+
+# by so much the links may bend to make an arm faster than it is when they are rigid
+_FASTER = 3.0
+# a first guess of a shortest duration, in units of what is known to be too short
+_LEAST_GUESS, _LONGEST_GUESS = 3.0, 30.0
+
+
+def check_duration(problem: MotionProblem) -> None:
+    """
+    Refuse a task whose joints would have to be faster than any speed that a task may have.
+
+    Raises
+    ------
+    InvalidTaskError
+        Naming the duration, its bound and the joint.
+
+    """
+    if problem.task.time_weight:  # it is only a guess
+        return
+    strokes = _strokes(problem)
+    joint, asked = int(strokes.argmax()), problem.task.duration
+    least = float(strokes[joint]) / MAX_VELOCITY
+    if asked < least:
+        raise InvalidTaskError(
+            f'duration is {asked:g} s, but must be at least {least:.4g} s: joint {joint + 1} '
+            f'turns by {strokes[joint]:.4g} rad, and at {MAX_VELOCITY:g} rad/s at most')
+
+
+def find_doubt(problem: MotionProblem) -> str | None:
+    """Return why a motion of an arm that bends is not worth looking for; None if it is."""
+    if not problem.model.arm.n_modes or problem.task.time_weight:
+        return None
+    asked, needed = problem.task.duration, rigid_bound(problem)
+    if asked * _FASTER >= needed:
+        return None
+    return (f'not looked for: with rigid links the motion takes at least {needed:.4g} s, which '
+            f'is proved, and bending does not make an arm {_FASTER:g} times as fast, which '
+            f'is not; {asked:g} s were asked for')
+
+
+def rigid_bound(problem: MotionProblem) -> float:
+    """Return a duration [s] that the arm made rigid does not undercut; 0 if none is proved."""
+    try:
+        rigid = problem if not problem.model.arm.n_modes else rigid_problem(problem)
+    except InvalidTaskError:  # motors that hold the bent arm may be too weak for the straight one
+        return 0.0
+    facts = MotionFacts(rigid)
+    return max(bound(facts).seconds for bound in (bound_by_power, bound_by_energy))
+
+
+def guess_duration(problem: MotionProblem) -> float:
+    """Return a duration [s] near that of a task with which a search may begin."""
+    given, least = problem.task.duration, float(_strokes(problem).max()) / MAX_VELOCITY
+    needed = rigid_bound(problem)
+    if given < needed or given > _LONGEST_GUESS * needed > 0:
+        given = _LEAST_GUESS * needed
+    return float(min(max(given, least), MAX_DURATION))
+
+
+def _strokes(problem: MotionProblem) -> Array:
+    """Return by how much each joint must turn, (n,) [rad]."""
+    n = problem.model.arm.n_joints
+    hard = np.isinf(problem.goal_weights[:n])
+    found: Array = np.where(
+        hard, np.abs(problem.goal - problem.start)[:n], 0.0)
+    return found
