@@ -23,7 +23,7 @@ from flex_planner.recording import (
     Reliability,
     TopicSummary,
 )
-from flex_planner.ros.runtime.parameters import declare, parameter_field
+from flex_planner.ros.runtime.parameters import declare, parameter_field, warn_of_unknown
 from flex_planner.ros.runtime.running import CannotGoOnError, run_node
 import rclpy
 from rclpy.clock import Clock, ClockType
@@ -75,6 +75,7 @@ class Replay(Node):  # type: ignore[misc]
 
     def __init__(self, settings: ReplaySettings) -> None:
         super().__init__('replay')
+        warn_of_unknown(self, ReplaySettings)
         self._settings = declare(self, settings)
         self._path = Path(self._settings.recording)
         metadata = read_metadata(self._path)

@@ -22,6 +22,7 @@ from flex_planner.ros.runtime.parameters import (
     declare,
     declare_arm,
     judge_changes,
+    warn_of_unknown,
 )
 from flex_planner.ros.runtime.running import run_node
 from flex_planner.ros.settings.planner import PlannerSettings
@@ -67,6 +68,7 @@ class PlannerNode(Node):  # type: ignore[misc]
 
     def __init__(self) -> None:
         super().__init__('flex_planner')
+        warn_of_unknown(self, PlannerSettings, ['arm'])
         arm = declare_arm(self)
         self._settings = declare(self, PlannerSettings.for_arm(arm))
         self._settings.check_joints(arm.n_joints)

@@ -25,6 +25,8 @@ from flex_planner.planning.sampling import MAX_PERIOD, SamplingSettings
 from flex_planner.ros.runtime.parameters import parameter_field
 import numpy as np
 
+# of a joint [N m/rad], [N m s/rad]
+MAX_GAIN = 1e9
 # of the largest payload [kg]
 MIN_ACCURACY, MAX_ACCURACY = 1e-6, 1e3
 # of a file of a recording [bytes]: a slip in the unit must not make a file of every message
@@ -118,7 +120,7 @@ class PlannerSettings:
         count = len(self.joint_names)
         vector('effort_weights', self.effort_weights, count, above=0)
         for name in ('controller_stiffness', 'controller_damping'):
-            vector(name, getattr(self, name), count, at_least=0)
+            vector(name, getattr(self, name), count, at_least=0, at_most=MAX_GAIN)
         if len(set(self.joint_names)) != len(self.joint_names) or '' in self.joint_names:
             raise InvalidValueError('joint_names', self.joint_names, 'different names')
         if -1 < self.controller_period < 0:

@@ -9,7 +9,9 @@ from flex_planner.base.validation import vector
 from flex_planner.control.default_gains import default_gains
 from flex_planner.control.joint_controller import EffortHold, Gains, MAX_RATE, MIN_RATE
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
+from flex_planner.optimal_control.task import MAX_JOINT_ANGLE
 from flex_planner.ros.runtime.parameters import parameter_field
+from flex_planner.ros.settings.planner import MAX_GAIN
 from flex_planner.simulation.joint_control import Disturbance, Encoder
 from flex_planner.simulation.mismatch import AS_GIVEN, Mismatch
 from flex_planner.simulation.plant import Control
@@ -96,8 +98,10 @@ class SimulatorSettings:
 
     def __post_init__(self) -> None:
         count = len(self.joint_names)
-        for name in ('initial_positions', 'stiffness', 'damping', 'added_friction'):
-            vector(name, getattr(self, name), count)
+        for name in ('stiffness', 'damping', 'added_friction'):
+            vector(name, getattr(self, name), count, at_least=0, at_most=MAX_GAIN)
+        vector('initial_positions', self.initial_positions, count, at_least=-MAX_JOINT_ANGLE,
+               at_most=MAX_JOINT_ANGLE, unit='rad')
         self.control.check(count)
         self.mismatch  # noqa: B018 - refuses what is out of bounds
 
