@@ -57,7 +57,7 @@ class StreamedPlan:
     by_clock : bool
         Whether the clock of the planner is ``/clock``, which the states follow then.
     times_ns : numpy.ndarray of int64, shape (k,)
-        Of the samples, from 0 [ns].
+        Of the samples, from 0, or later where the arm is held before [ns].
     coordinates, rates, accelerations : numpy.ndarray, shape (k, n_t)
         Joints [rad], then modes [m].
     torques : numpy.ndarray, shape (k, n)
@@ -95,7 +95,8 @@ class ReferenceStates:
         self.plan, times = plan, np.multiply(plan.times_ns, 1e-9, dtype=np.float64)
         self._reference = JointReference(
             times=times, positions=plan.coordinates, velocities=plan.rates,
-            accelerations=plan.accelerations, torques=plan.torques)
+            accelerations=plan.accelerations, torques=plan.torques,
+        ).after(plan.coordinates[0], plan.rates[0], plan.torques[0])
         # the last period may be up to half a period longer or shorter than the others
         count = max(int(np.floor(times[-1] * plan.rate + 0.5)), 1)
         grid = np.round(np.arange(count) / plan.rate * 1e9).astype(np.int64)

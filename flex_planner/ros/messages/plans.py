@@ -218,6 +218,7 @@ def add_execution(report: PlanReport, reference: SampledPlan) -> None:
     report.controller_stiffness = controller.gains.stiffness.tolist()
     report.controller_damping = controller.gains.damping.tolist()
     report.controller_period = reference.controller_period
+    report.start_hold = reference.start_hold
 
 
 def duration_message(nanoseconds: int) -> Duration:

@@ -21,7 +21,7 @@ from flex_planner.control.joint_controller import (
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.optimal_control.task import MAX_PAYLOAD
 from flex_planner.planning.kinds.effort import SearchEffort
-from flex_planner.planning.sampling import MAX_PERIOD, SamplingSettings
+from flex_planner.planning.sampling import MAX_PERIOD, MAX_START_HOLD, SamplingSettings
 from flex_planner.ros.runtime.parameters import parameter_field
 import numpy as np
 
@@ -98,6 +98,10 @@ class PlannerSettings:
         -1.0, 'Efforts are shifted by half this time, so that their mean is right where they are '
         'held for it; -1: 1 / controller_rate, 0: not at all [s].', lowest=-1.0,
         highest=MAX_PERIOD)
+    start_hold: float = parameter_field(
+        0.0, 'How long a trajectory holds the arm before a motion that starts at rest, with the '
+        'torque that this takes; at least four periods of the controller. A controller leads the '
+        'arm there first. 0: not at all [s].', lowest=0.0, highest=MAX_START_HOLD)
     reference_rate: float = parameter_field(
         100.0, 'Rate of the states that are streamed along a published plan [Hz].', lowest=1.0,
         highest=1000.0)
@@ -159,7 +163,8 @@ class PlannerSettings:
         period = None if self.controller_period < 0 else self.controller_period
         return SamplingSettings(
             longest_step=self.sampling_step, torque_tolerance=self.torque_tolerance,
-            controller=self.controller(), controller_period=period)
+            controller=self.controller(), controller_period=period,
+            start_hold=self.start_hold)
 
     def with_controller(self, controller: JointController) -> PlannerSettings:
         """Return the settings for another joint controller."""
