@@ -144,6 +144,10 @@ class SamplingSettings:
         """Return the controller that a plan is for."""
         return self.controller or JointController(gains=default_gains(plan.model))
 
+    def begin_of(self, plan: Plan) -> float:
+        """Return how long to hold the arm of a plan: not if it moves at the start [s]."""
+        return self.start_hold if plan.task.starts_at_rest else 0.0
+
 
 def sample_plan(plan: Plan, settings: SamplingSettings,
                 monitor: Monitor | None = None) -> SampledPlan:
@@ -185,8 +189,7 @@ def sample_plan(plan: Plan, settings: SamplingSettings,
             f'a motion of {duration:g} s sampled every {settings.longest_step:g} s has {count} '
             f'samples, but may have {MAX_SAMPLES}; the parameter sampling_step must be >= '
             f'{duration / MAX_SAMPLES:g} s')
-    begin = settings.start_hold if plan.task.starts_at_rest else 0.0
-    execution = Execution.of(plan, settings.controller_of(plan), begin)
+    execution = Execution.of(plan, settings.controller_of(plan), settings.begin_of(plan))
     sampled = _close_enough(plan, settings, execution, watch)
     postures = plan.uniform_samples(_POSTURES).coordinates[:, :plan.arm.n_joints]
     certificate = certify_execution(execution, sampled.reference, postures, watch)
@@ -222,7 +225,7 @@ def _close_enough(plan: Plan, settings: SamplingSettings, execution: Execution,
     period = settings.controller_period
     motion = PublishedMotion.of(plan, execution.controller,
                                 execution.controller.period if period is None else period,
-                                execution.duration - plan.task.duration)
+                                settings.begin_of(plan))
     exact = execution.arrive(motion, watch)
     vibration = execution.vibration(exact)
     for refinement in range(_REFINEMENTS + 1):
