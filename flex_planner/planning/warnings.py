@@ -52,6 +52,7 @@ class WarningKind(Enum):
     SENSITIVE_TO_PAYLOAD = 'sensitive to the payload'
     OPEN_LOOP_UNSTABLE = 'unstable under the planned torque alone'
     FEEDBACK_UNSTABLE = 'unstable under the feedback'
+    SPACE_ASSUMED = 'start and goal were taken as joint angles'
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -26,6 +26,7 @@ from flex_planner.planning.plan import peaks, Plan, PlanStatus, Samples
 from flex_planner.planning.robustness import robustness_warnings
 from flex_planner.planning.sampling import SampledPlan
 from flex_planner.planning.warnings import PlanWarning
+from flex_planner.ros.messages.spaces import SPACES
 from flex_planner.ros.settings.planner import PlannerSettings
 from flex_planner_interfaces.msg import (
     FlexiblePoint,
@@ -125,7 +126,7 @@ def _ends(message: MotionTask, arm: Arm, settings: PlannerSettings) -> dict[str,
               for name in ('start_positions', 'goal_positions')}
     if message.space == MotionTask.JOINT:
         return angles
-    if message.space not in (MotionTask.CARTESIAN, MotionTask.CARTESIAN_GOAL):
+    if message.space not in SPACES:
         raise InvalidValueError('space', message.space,
                                 '0 (JOINT), 1 (CARTESIAN) or 2 (CARTESIAN_GOAL)')
     if message.elbow not in (-1, 0, 1):
