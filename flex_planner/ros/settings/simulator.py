@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from flex_planner.arms.arm import Arm
+from flex_planner.arms.arm import Arm, Joint
 from flex_planner.base.validation import vector
 from flex_planner.control.default_gains import default_gains
 from flex_planner.control.joint_controller import EffortHold, Gains, MAX_RATE, MIN_RATE
@@ -110,7 +110,8 @@ class SimulatorSettings:
         """Return the defaults for an arm."""
         n, gains = arm.n_joints, default_gains(ArmDynamics.of(arm))
         return replace(cls(), joint_names=[f'joint{i}' for i in range(1, n + 1)],
-                       initial_positions=[0.0] * n, stiffness=gains.stiffness.tolist(),
+                       initial_positions=[_within_limits(joint) for joint in arm.joints],
+                       stiffness=gains.stiffness.tolist(),
                        damping=gains.damping.tolist(), added_friction=[0.0] * n)
 
     @property
@@ -132,3 +133,8 @@ class SimulatorSettings:
             disturbance=Disturbance(
                 joint=self.disturbance_joint, torque=self.disturbance_torque,
                 start=self.disturbance_start, duration=self.disturbance_duration))
+
+
+def _within_limits(joint: Joint) -> float:
+    """Return the angle nearest to 0 that a joint may have [rad]."""
+    return float(np.clip(0.0, joint.lower_limit, joint.upper_limit))
