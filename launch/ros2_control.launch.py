@@ -1,10 +1,10 @@
 """
 Launch the planner so that a joint_trajectory_controller carries out what it publishes.
 
-The controller needs an effort command interface, version 4.22.0 or later, and the joint names of the
-planner's parameters, as in config/controllers.yaml; a launch file of the robot starts its controller
-manager. Its rate and gains belong into those parameters, too (controller_rate, controller_stiffness,
-controller_damping): trajectories are certified for them.
+The controller needs an effort command interface, version 4.22.0 or later, and the joint names of
+the planner's parameters, as in config/controllers.yaml; a launch file of the robot starts its
+controller manager. Its rate and gains belong into those parameters, too (controller_rate,
+controller_stiffness, controller_damping): trajectories are certified for them.
 
 """
 

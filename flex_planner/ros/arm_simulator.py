@@ -155,8 +155,8 @@ class ArmSimulator(Node):  # type: ignore[misc]
         """Return the time since the start, or since the arm began again [s]."""
         jump = self._passed.look(self.get_clock().now().nanoseconds)
         if jump:
-            self.get_logger().warning(f'the clock has jumped by {jump:.3f} s: the arm goes on from '
-                                      'where it is')
+            self.get_logger().warning(f'the clock has jumped by {jump:.3f} s: the arm goes on '
+                                      'from where it is')
         return self._passed.seconds
 
     def _begin_again(self, reason: RunawayError) -> None:

@@ -17,9 +17,9 @@ def declare_arguments() -> list[DeclareLaunchArgument]:
     return [
         DeclareLaunchArgument('namespace', default_value='', description='Of all nodes'),
         DeclareLaunchArgument(
-            'arm', default_value='', description='Name of an arm in config/arms, or path of an arm '
-            'file; default: that of params_file. What has one entry per joint follows the arm where '
-            'params_file leaves it out'),
+            'arm', default_value='', description='Name of an arm in config/arms, or path of an '
+            'arm file; default: that of params_file. What has one entry per joint follows the arm '
+            'where params_file leaves it out'),
         DeclareLaunchArgument(
             'params_file', default_value='', description='Parameters of the nodes; default: '
             'config/paper.yaml, or none if there is an arm'),

@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 import faulthandler
+from functools import partial
 import logging
 import os
 import pickle
@@ -206,13 +207,17 @@ class Stream:
         for time_ns, message in zip(states.times_ns, states.messages(), strict=True):
             due_ns = int(time_ns)
             with self._changed:
-                self._changed.wait_for(lambda due=due_ns: self._is_interrupted() or (
-                    self._passed.nanoseconds >= due and self._clock_ns > 0))
+                self._changed.wait_for(partial(self._is_due, due_ns))
                 if self._is_interrupted():
                     return
                 start_ns = self._clock_ns - self._passed.nanoseconds
             _set_stamp(message, start_ns + due_ns)
             self._publish(message)
+
+    def _is_due(self, due_ns: int) -> bool:
+        """Return whether so much of the time of the clock has passed [ns], or there is no plan."""
+        begun = self._clock_ns > 0
+        return self._is_interrupted() or (begun and self._passed.nanoseconds >= due_ns)
 
     def _wait(self, due_ns: int) -> bool:
         """Wait until a time of the monotonic clock [ns]; return whether to stop instead."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib.util import find_spec
 from pathlib import Path
 import runpy
+import signal
 import subprocess
 import sys
 from typing import Any
@@ -115,6 +116,6 @@ def test_launch_starts_an_arm_with_three_joints_in_a_namespace(name: str, tmp_pa
                         STARTING)
             client.wait('the planner', lambda: 'robot.flex_planner]: ready' in log.read_text())
         finally:
-            process.terminate()
-            process.wait(30)
+            process.send_signal(signal.SIGINT)  # by others, launch leaves its nodes behind
+            process.wait(STARTING)
     assert 'Traceback' not in log.read_text()

@@ -14,9 +14,9 @@ def add_space(report: PlanReport, message: MotionTask) -> None:
     report.space = SPACES.get(message.space, '')
     if message.space != MotionTask.JOINT or not _means_points(message):
         return
-    sentence = ('space is 0, as in a request without it, so that JOINT was assumed: start_positions '
-                'and goal_positions count, points do not. For points set it to CARTESIAN (1) or '
-                'CARTESIAN_GOAL (2)')
+    sentence = ('space is 0, as in a request without it, so that JOINT was assumed: '
+                'start_positions and goal_positions count, points do not. For points set it to '
+                'CARTESIAN (1) or CARTESIAN_GOAL (2)')
     if report.error_code == PlanReport.NONE:
         report.warning_kinds = [*report.warning_kinds, WarningKind.SPACE_ASSUMED.name]
         report.warnings = [*report.warnings, sentence]

@@ -147,10 +147,11 @@ def _as_floats(value: Any, like: Any) -> float | list[float] | None:
     if not isinstance(like, list) or not like or not isinstance(like[0], float):
         return None
     entries = _list(value) if isinstance(value, str) else _plain(value)
-    numbers = isinstance(entries, list) and all(
-        isinstance(entry, (int, float)) and not isinstance(entry, bool) for entry in entries)
+    if not isinstance(entries, list) or not entries or not all(
+            isinstance(entry, (int, float)) and not isinstance(entry, bool) for entry in entries):
+        return None
     try:
-        return [float(entry) for entry in entries] if numbers and entries else None
+        return [float(entry) for entry in entries]
     except OverflowError:
         return None
 
