@@ -71,7 +71,7 @@ def nodes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Planne
     folder = tmp_path_factory.mktemp('nodes')
     with Planner(folder, 'korayem_rigid', 'rigid_planner', record=False) as rigid, \
             Planner(folder, 'korayem_ei50', parameter_file=PARAMETER_FILE,
-                    queue_length=1) as flexible:
+                    effort_weights=[1 / 8, 1 / 8], queue_length=1) as flexible:
         yield {'rigid': rigid, 'flexible': flexible}
         check_health(rigid)
         check_health(flexible)
