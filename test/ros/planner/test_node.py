@@ -463,7 +463,7 @@ def test_parameter_that_is_set_counts(rigid: Planner) -> None:
 @pytest.mark.parametrize(('name', 'value', 'reason'), [
     ('tolerance', 2.0, 'tolerance'),
     ('tolerance', math.nan, 'tolerance'),
-    ('tolerance', 1, 'DOUBLE'),
+    ('tolerance', 2, 'tolerance'), ('tolerance', 'small', 'DOUBLE'),
     ('intervals', 3, 'intervals'),
     ('elbow', 0, 'elbow is 0, but must be +1 or -1'),
     ('payload_accuracy', 0.0, 'payload_accuracy'),
