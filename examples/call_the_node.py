@@ -3,7 +3,7 @@ Call a planner node by its service, and by its action with progress and cancella
 
 Start a planner in another terminal; this works with any arm of two joints.
 
-    tools/run planner --ros-args --params-file config/planner.yaml
+    tools/run planner --ros-args --params-file config/paper.yaml
     tools/run python examples/call_the_node.py
 
 """

@@ -6,8 +6,8 @@ torques as a JointGroupEffortController takes them. The plan on ~/joint_trajecto
 and their last state, with which this example ends; a real controller goes on to hold it. The
 simulated arm only lends its measurements: it has a controller of its own. In four terminals:
 
-    tools/run planner --ros-args --params-file config/planner.yaml
-    tools/run arm_simulator --ros-args --params-file config/planner.yaml \
+    tools/run planner --ros-args --params-file config/paper.yaml
+    tools/run arm_simulator --ros-args --params-file config/paper.yaml \
         -r joint_trajectory:=/flex_planner/joint_trajectory
     tools/run python examples/controller.py
     tools/run python examples/call_the_node.py    # asks for a plan

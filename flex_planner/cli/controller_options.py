@@ -6,6 +6,7 @@ import argparse
 from dataclasses import replace
 
 from flex_planner.arms.arm import Arm
+from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.validation import number, vector
 from flex_planner.cli.options import number_argument, numbers
 from flex_planner.control.default_gains import default_gains
@@ -38,6 +39,8 @@ def add_controller(parser: argparse.ArgumentParser) -> None:
     add('--controller-period', type=number_argument, metavar='S',
         help='shift the efforts by half this time, in which they are held, so that their mean is '
         'right (default: 1 / rate; 0: not at all)')
+    add('--start-hold', type=number_argument, default=0.0, metavar='S',
+        help='hold the arm for this time before the motion, so that the controller can lead it to the start (default: not at all)')
 
 
 def sampling_settings(options: argparse.Namespace, arm: Arm) -> SamplingSettings:
@@ -59,7 +62,11 @@ def sampling_settings(options: argparse.Namespace, arm: Arm) -> SamplingSettings
         period = number('--controller-period', period, at_least=0, at_most=MAX_PERIOD, unit='s')
     controller = JointController(gains=_gains(options, arm, rate), rate=rate,
                                  hold=EffortHold.named(options.effort_hold))
-    return SamplingSettings(controller=controller, controller_period=period)
+    try:
+        return SamplingSettings(controller=controller, controller_period=period,
+                                start_hold=options.start_hold)
+    except InvalidValueError as error:
+        raise type(error)('--start-hold', error.value, error.bound) from None
 
 
 def _gains(options: argparse.Namespace, arm: Arm, rate: float) -> Gains:

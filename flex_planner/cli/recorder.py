@@ -69,7 +69,8 @@ class RequestRecorder:
             settings, elbow=request.elbow, tolerance=task.tolerance,
             allowed_planning_time=request.time_limit, recording_folder=str(folder),
             effort_weights=task.effort_weights.tolist(),
-            sampling_step=sampling.longest_step, torque_tolerance=sampling.torque_tolerance)
+            sampling_step=sampling.longest_step, torque_tolerance=sampling.torque_tolerance,
+            start_hold=sampling.start_hold)
         self._recorder = OutcomeRecorder(task.arm, _NODE)
 
     def record_plan(self, plan: Plan, reference: SampledPlan | None) -> Path:

@@ -18,9 +18,8 @@ class EffortHold(Enum):
     """
     Which effort of a trajectory a controller applies from one of its updates to the next.
 
-    joint_trajectory_controller applies the effort of the end of the coming period since pull
-    request 1306 of ros2_controllers, and the effort of its start before that, or where it has
-    the interfaces position and effort.
+    joint_trajectory_controller applies the effort of the end of the coming period where it has the
+    interface effort, and the effort of its start where it has the interfaces position and effort.
 
     """
 

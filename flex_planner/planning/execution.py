@@ -143,7 +143,7 @@ class Execution:
     start : numpy.ndarray, shape (2 n_t,)
         Its state when the motion begins.
     duration : float
-        Of the motion [s].
+        Of the trajectory up to the arrival [s].
     goal : numpy.ndarray, shape (2,)
         Where the tip should arrive [m].
     controller : JointController
@@ -159,11 +159,11 @@ class Execution:
     controller: JointController
 
     @classmethod
-    def of(cls, plan: Plan, controller: JointController) -> Execution:
-        """Return the execution of a plan by the arm that it was made for."""
+    def of(cls, plan: Plan, controller: JointController, begin: float = 0.0) -> Execution:
+        """Return the execution of a plan, held up to a time, by the arm that it was made for."""
         goal = tip_position(plan.arm, plan.problem.goal[None, :plan.arm.n_coordinates])[0]
         return Execution(dynamics=plan.model, parameters=plan.problem.parameters,
-                         start=plan.problem.start, duration=plan.task.duration, goal=goal,
+                         start=plan.problem.start, duration=begin + plan.task.duration, goal=goal,
                          controller=controller)
 
     @property

@@ -37,7 +37,7 @@ def point_times(motion: PublishedMotion, longest_step: float, tolerance: float,
     Returns
     -------
     times : numpy.ndarray, shape (k,)
-        From 0 to the duration of the motion [s].
+        From the begin to the end of the motion [s].
     error : float
         [N m].
 
@@ -75,14 +75,16 @@ def _too_long(steps: Array, errors: Array, tolerance: float) -> NDArray[np.bool_
 
 def _first_times(motion: PublishedMotion, longest: float) -> Array:
     """Return times that are evenly spaced between those where the efforts have kinks."""
-    duration, breaks = motion.duration, [0.0]
-    if np.ceil(duration / longest) + motion.kinks.size <= MAX_SAMPLES:
+    begin, end, breaks = motion.begin, motion.end, [motion.begin]
+    if begin and motion.ramp[1]:
+        breaks.append(begin + motion.ramp[1])
+    if np.ceil((end - begin) / longest) + motion.kinks.size <= MAX_SAMPLES:
         for time in motion.kinks.tolist():
-            if breaks[-1] + SMALLEST_STEP <= time <= duration - SMALLEST_STEP:
+            if breaks[-1] + SMALLEST_STEP <= time <= end - SMALLEST_STEP:
                 breaks.append(time)
     pieces = [np.linspace(first, last, int(np.ceil((last - first) / longest)), endpoint=False)
-              for first, last in pairwise([*breaks, duration])]
-    return np.concatenate([*pieces, [duration]])
+              for first, last in pairwise([*breaks, end])]
+    return np.concatenate([*pieces, [end]])
 
 
 def _interpolation_errors(motion: PublishedMotion, first: Array, last: Array) -> Array:

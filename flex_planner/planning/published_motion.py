@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 from flex_planner.base.validation import Array
 from flex_planner.control.joint_controller import EffortHold, JointController
-from flex_planner.planning.plan import Plan
+from flex_planner.dynamics.statics import equilibrium
+from flex_planner.planning.plan import Plan, Samples
 import numpy as np
 
 # between the last moving point and the holding one: any longer, and the ramp between their
@@ -27,15 +28,26 @@ class PublishedMotion:
         Of the efforts against the planned torques, negative if they come earlier [s].
     hold_delay : float
         From the end of the motion to the effort that holds the arm [s].
+    begin : float
+        Of the motion, up to which the arm is held where it starts [s].
+    ramp : tuple of float
+        From the begin of the motion to the first and the last moment of the way from the effort
+        that holds the arm to those of the motion, if it is held [s].
+    start_torque : numpy.ndarray, shape (n,)
+        That holds the arm then; empty if it is not held [N m].
 
     """
 
     plan: Plan
     delay: float
     hold_delay: float
+    begin: float = 0.0
+    ramp: tuple[float, float] = (0.0, 0.0)
+    start_torque: Array = field(default_factory=lambda: np.zeros(0))
 
     @classmethod
-    def of(cls, plan: Plan, controller: JointController, period: float) -> PublishedMotion:
+    def of(cls, plan: Plan, controller: JointController, period: float,
+           begin: float = 0.0) -> PublishedMotion:
         """
         Return what to publish of a plan.
 
@@ -48,35 +60,61 @@ class PublishedMotion:
         period : float
             For which it holds an effort, whose mean is to be right; 0 for the planned torque
             itself [s].
+        begin : float
+            How long to hold the arm before the motion [s].
 
         """
-        if controller.hold is EffortHold.END:
-            # in the period of the arrival, the ramp gives both torques the time that is theirs
-            return cls(plan=plan, delay=period / 2, hold_delay=controller.period)
-        delay = -period / 2 if controller.hold is EffortHold.START else 0.0
-        return cls(plan=plan, delay=delay, hold_delay=_HOLD_DELAY)
+        delay = {EffortHold.END: period / 2, EffortHold.START: -period / 2}.get(controller.hold)
+        # with END, in the period of the arrival, the ramp gives both torques the time that is
+        # theirs
+        motion = cls(plan=plan, delay=delay or 0.0, hold_delay=(
+            controller.period if controller.hold is EffortHold.END else _HOLD_DELAY))
+        if not begin:
+            return motion
+        start, physical = plan.problem.start[:plan.arm.n_joints], plan.problem.parameters
+        return replace(motion, begin=begin, ramp=start_ramp(controller),
+                       start_torque=equilibrium(plan.model, start, physical)[1])
 
     @property
-    def duration(self) -> float:
-        """Return the duration of the motion [s]."""
-        return self.plan.task.duration
+    def end(self) -> float:
+        """Return when the motion ends [s]."""
+        return self.begin + self.plan.task.duration
 
     @property
     def kinks(self) -> Array:
         """Return when the slope of an effort jumps [s]."""
-        kinks: Array = self.plan.switching_times + self.delay
+        kinks: Array = self.begin + self.plan.switching_times + self.delay
         return kinks
 
     def motion(self, times: Array) -> tuple[Array, Array]:
         """Return positions [rad] and velocities [rad/s] at times (m,), shape (m, n)."""
-        n, samples = self.plan.arm.n_joints, self.plan.sample(np.minimum(times, self.duration))
-        moving = (times < self.duration)[:, None]
-        return samples.coordinates[:, :n], np.where(moving, samples.rates[:, :n], 0.0)
+        n, samples = self.plan.arm.n_joints, self.samples(times)
+        moving = (times < self.end) & ((times > self.begin) | (self.begin == 0))
+        return samples.coordinates[:, :n], np.where(moving[:, None], samples.rates[:, :n], 0.0)
+
+    def samples(self, times: Array) -> Samples:
+        """Return the samples of the plan at times of the trajectory (m,)."""
+        return self.plan.sample(np.clip(times - self.begin, 0, self.plan.task.duration))
 
     def torque(self, times: Array) -> Array:
         """Return the efforts at times (m,), shape (m, n) [N m]."""
-        planned = np.minimum(times, self.duration) - self.delay
-        moving = self.plan.sample(np.clip(planned, 0, self.duration)).torques
-        share = np.clip((times - self.duration) / self.hold_delay, 0, 1)[:, None]
+        moving = self.samples(np.minimum(times, self.end) - self.delay).torques
+        share = np.clip((times - self.end) / self.hold_delay, 0, 1)[:, None]
         efforts: Array = moving + share * (self.plan.problem.holding_torque - moving)
+        if self.begin:
+            first, last = self.ramp
+            share = np.clip((times - self.begin - first) / (last - first), 0, 1)[:, None]
+            efforts = (1 - share) * self.start_torque + share * efforts
         return efforts
+
+
+def start_ramp(controller: JointController) -> tuple[float, float]:
+    """
+    Return when efforts leave the one that holds the arm, and when they are those of the motion.
+
+    The effort that a controller holds over the period in which the motion begins is then the mean
+    of both, each for its time, wherever in that period it begins [s].
+
+    """
+    delay = controller.hold.delay
+    return (delay - 1) * controller.period, delay * controller.period

@@ -63,7 +63,7 @@ def assess_robustness(plan: Plan, sampled: SampledPlan,
         If the monitor stopped it.
 
     """
-    execution = Execution.of(plan, sampled.execution.controller)
+    execution = Execution.of(plan, sampled.execution.controller, sampled.start_hold)
     given = plan.problem.parameters
     payload = given.payload_mass or given.payload_inertia
 

@@ -33,6 +33,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 MAX_PERIOD = 0.1
+# [s]; the least in periods of the controller, so that the points of the hold keep their order
+MAX_START_HOLD, _FEWEST_PERIODS = 60.0, 4
 # smaller tolerances of the efforts, each by the factor, where the arm arrives elsewhere
 _REFINEMENTS, _FACTOR = 6, 0.25
 # along the motion, at which the stability of the PD is looked at
@@ -47,9 +49,10 @@ class SampledPlan:
     Attributes
     ----------
     times_ns : numpy.ndarray of int64, shape (k,)
-        From 0, strictly increasing [ns].
+        From 0, or half the `start_hold`, strictly increasing [ns].
     samples : Samples
-        At these times; at rest, with the holding torque, in the last.
+        At these times; at rest, with the holding torque, in the last, and in the first one or
+        two if there is a `start_hold`.
     efforts : numpy.ndarray, shape (k, n)
         For the controller: the torques of half a `controller_period` before or after [N m].
     torque_error : float
@@ -61,6 +64,8 @@ class SampledPlan:
         What the controller makes of times, joints and efforts.
     robustness : Robustness or None
         What it makes of them on other arms; None unless `assess_robustness` has found out.
+    start_hold : float
+        How long the arm is held before the motion [s].
 
     """
 
@@ -71,15 +76,17 @@ class SampledPlan:
     controller_period: float
     execution: ExecutionCertificate
     robustness: Robustness | None = None
+    start_hold: float = 0.0
 
     @property
     def reference(self) -> JointReference:
-        """Return the trajectory that a controller gets."""
+        """Return the trajectory that a controller gets, led into from rest at its start."""
         samples, n = self.samples, self.efforts.shape[1]
-        return JointReference(
+        reference = JointReference(
             times=np.multiply(self.times_ns, 1e-9, dtype=np.float64),
             positions=samples.coordinates[:, :n], velocities=samples.rates[:, :n],
             accelerations=samples.accelerations[:, :n], torques=self.efforts)
+        return reference.after(samples.coordinates[0, :n], samples.rates[0, :n], self.efforts[0])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,6 +111,10 @@ class SamplingSettings:
         sample, so that their mean is right while a controller of this period holds them, 0 to
         0.1; 0 for the torques at the time of the sample, None for the period of the controller
         [s].
+    start_hold : float
+        How long to hold the arm before a motion that starts at rest, at least four periods of the
+        controller and at most 60; 0 for not at all [s]. The first point is half that time after
+        the start of the trajectory: a controller leads the arm there from where it sags to.
 
     Raises
     ------
@@ -116,6 +127,7 @@ class SamplingSettings:
     torque_tolerance: float = 0.02
     controller: JointController | None = None
     controller_period: float | None = None
+    start_hold: float = 0.0
 
     def __post_init__(self) -> None:
         number('longest_step', self.longest_step, at_least=SMALLEST_STEP, at_most=1, unit='s')
@@ -124,10 +136,18 @@ class SamplingSettings:
         if self.controller_period is not None:
             number('controller_period', self.controller_period, at_least=0, at_most=MAX_PERIOD,
                    unit='s')
+        period = 1e-3 if self.controller is None else self.controller.period
+        if self.start_hold:
+            number('start_hold', self.start_hold, at_least=_FEWEST_PERIODS * period,
+                   at_most=MAX_START_HOLD, unit='s')
 
     def controller_of(self, plan: Plan) -> JointController:
         """Return the controller that a plan is for."""
         return self.controller or JointController(gains=default_gains(plan.model))
+
+    def begin_of(self, plan: Plan) -> float:
+        """Return how long to hold the arm of a plan: not if it moves at the start [s]."""
+        return self.start_hold if plan.task.starts_at_rest else 0.0
 
 
 def sample_plan(plan: Plan, settings: SamplingSettings,
@@ -170,7 +190,7 @@ def sample_plan(plan: Plan, settings: SamplingSettings,
             f'a motion of {duration:g} s sampled every {settings.longest_step:g} s has {count} '
             f'samples, but may have {MAX_SAMPLES}; the parameter sampling_step must be >= '
             f'{duration / MAX_SAMPLES:g} s')
-    execution = Execution.of(plan, settings.controller_of(plan))
+    execution = Execution.of(plan, settings.controller_of(plan), settings.begin_of(plan))
     sampled = _close_enough(plan, settings, execution, watch)
     postures = plan.uniform_samples(_POSTURES).coordinates[:, :plan.arm.n_joints]
     certificate = certify_execution(execution, sampled.reference, postures, watch)
@@ -205,7 +225,8 @@ def _close_enough(plan: Plan, settings: SamplingSettings, execution: Execution,
     limits = CertificateLimits()
     period = settings.controller_period
     motion = PublishedMotion.of(plan, execution.controller,
-                                execution.controller.period if period is None else period)
+                                execution.controller.period if period is None else period,
+                                settings.begin_of(plan))
     exact = execution.arrive(motion, watch)
     vibration = execution.vibration(exact)
     for refinement in range(_REFINEMENTS + 1):
@@ -225,14 +246,36 @@ def _sampled(motion: PublishedMotion, controller: JointController, times: Array,
              error: float) -> SampledPlan:
     """Return the samples at given times, from 0 to the end of the motion."""
     plan, times_ns = motion.plan, np.round(times * 1e9).astype(np.int64)
-    inside = np.minimum(times_ns * 1e-9, motion.duration)
+    inside = np.minimum(times_ns * 1e-9, motion.end)
     hold_ns = round(motion.hold_delay * 1e9)
-    samples = _with_hold(plan, _at_rest_at_the_ends(plan, plan.sample(inside)), hold_ns)
-    efforts = np.vstack([motion.torque(inside), plan.problem.holding_torque])
-    return SampledPlan(times_ns=np.append(times_ns, times_ns[-1] + hold_ns), samples=samples,
-                       efforts=efforts, torque_error=error,
-                       controller_period=2 * abs(motion.delay),
-                       execution=ExecutionCertificate(controller=controller))
+    samples = replace(motion.samples(inside), times=inside)
+    samples = _with_hold(plan, _at_rest_at_the_ends(plan, samples), hold_ns)
+    sampled = SampledPlan(
+        times_ns=np.append(times_ns, times_ns[-1] + hold_ns), samples=samples,
+        efforts=np.vstack([motion.torque(inside), plan.problem.holding_torque]),
+        torque_error=error, controller_period=2 * abs(motion.delay),
+        execution=ExecutionCertificate(controller=controller), start_hold=motion.begin)
+    return _with_start_hold(motion, sampled) if motion.begin else sampled
+
+
+def _with_start_hold(motion: PublishedMotion, sampled: SampledPlan) -> SampledPlan:
+    """Return samples that begin with those that hold the arm, instead of with a motion."""
+    last_ns = round((motion.begin + motion.ramp[0]) * 1e9)
+    holding_ns = np.array([round(motion.begin / 2 * 1e9), last_ns])
+    # where the efforts leave the holding one as the motion begins, its first sample still holds
+    since = 1 if last_ns == sampled.times_ns[0] else 0
+    times_ns = np.append(holding_ns, sampled.times_ns[since:])
+
+    def held(values: Array) -> Array:
+        return np.concatenate([values[:1], values[:1], values[since:]])
+
+    fields = {name: held(getattr(sampled.samples, name)) for name in Samples.__slots__}
+    fields['times'] = times_ns * 1e-9
+    fields['accelerations'][:2] = 0
+    fields['torques'][:2] = motion.start_torque
+    efforts = held(sampled.efforts)
+    efforts[:2] = motion.start_torque
+    return replace(sampled, times_ns=times_ns, samples=Samples(**fields), efforts=efforts)
 
 
 def _at_rest_at_the_ends(plan: Plan, samples: Samples) -> Samples:

@@ -55,6 +55,7 @@ class WarningKind(Enum):
     OPEN_LOOP_UNSTABLE = 'unstable under the planned torque alone'
     FEEDBACK_UNSTABLE = 'unstable under the feedback'
     NOT_RECORDED = 'not recorded'
+    SPACE_ASSUMED = 'start and goal were taken as joint angles'
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,14 +11,16 @@ from flex_planner.base.validation import Array
 from flex_planner.control.joint_reference import JointReference
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.ros.messages.plans import duration_seconds
-from flex_planner.ros.messages.trajectory_rules import trajectory_violations
-from flex_planner.ros.runtime.parameters import declare, declare_arm
+from flex_planner.ros.messages.trajectory_rules import range_violations, trajectory_violations
+from flex_planner.ros.runtime.elapsed import ElapsedTime
+from flex_planner.ros.runtime.parameters import declare, declare_arm, warn_of_unknown
 from flex_planner.ros.runtime.running import run_node
 from flex_planner.ros.settings.simulator import SimulatorSettings
-from flex_planner.simulation.plant import Plant
+from flex_planner.simulation.plant import Plant, RunawayError
 from flex_planner.simulation.settling import ArrivalWatch, ResidualVibration
 from geometry_msgs.msg import PointStamped
 import numpy as np
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
@@ -59,10 +61,11 @@ class ArmSimulator(Node):  # type: ignore[misc]
 
     def __init__(self) -> None:
         super().__init__('arm_simulator')
+        warn_of_unknown(self, SimulatorSettings, ['arm'])
         arm = declare_arm(self)
         self._settings = declare(self, SimulatorSettings.for_arm(arm))
         self._arm = self._settings.mismatch.apply(arm)
-        self._plant = self._new_plant()
+        self._plant, self._passed = self._new_plant(), ElapsedTime()
         self._watch = ArrivalWatch(self._arm, self._settings.vibration_window)
         self._joints = self.create_publisher(JointState, 'joint_states', 10)
         self._modes = self.create_publisher(JointState, '~/modal_states', 10)
@@ -70,8 +73,9 @@ class ArmSimulator(Node):  # type: ignore[misc]
         self._vibration = self.create_publisher(Float64, '~/residual_vibration', _LATCHED)
         self._bending = self.create_publisher(Float64, '~/residual_bending', _LATCHED)
         self.create_subscription(JointTrajectory, 'joint_trajectory', self._on_trajectory, 1)
-        self._began = self.get_clock().now()
         self.create_timer(1 / self._settings.publish_rate, self._on_timer)
+        self.create_timer(_WARNING_PERIOD, self._on_silence, clock=Clock(
+            clock_type=ClockType.STEADY_TIME))
         self.get_logger().info(f'simulating {self._arm.name}')
 
     def _new_plant(self) -> Plant:
@@ -95,7 +99,8 @@ class ArmSimulator(Node):  # type: ignore[misc]
 
     def _refusal(self, trajectory: JointTrajectory) -> str:
         """Return the reason why a trajectory cannot be followed, empty if it can."""
-        broken = trajectory_violations(trajectory, self._settings.joint_names)
+        broken = (trajectory_violations(trajectory, self._settings.joint_names)
+                  or range_violations(trajectory))
         if broken:
             return '; '.join(broken[:3])
         start = _reference(trajectory, self._settings.joint_names).positions[0]
@@ -122,11 +127,22 @@ class ArmSimulator(Node):  # type: ignore[misc]
         tip.point.x, tip.point.y = (float(v) for v in tip_position(self._arm, state[:n_t]))
         self._tip.publish(tip)
 
+    def _on_silence(self) -> None:
+        """Say what the arm waits for, should it be a clock that has not come."""
+        clock = self.get_clock()
+        if clock.ros_time_is_active and not clock.now().nanoseconds:
+            self.get_logger().warning('the arm stands still: use_sim_time is set, but nothing has '
+                                      'come on /clock')
+
     def _advance(self) -> None:
         """Bring the arm up to now, or as far as it may go at once."""
         now, plant, limit = self._now(), self._plant, time.monotonic() + _LONGEST_WORK
-        while plant.time + plant.period <= now and time.monotonic() < limit:
-            plant.advance(plant.time + plant.period, self._see)
+        try:
+            while plant.time + plant.period <= now and time.monotonic() < limit:
+                plant.advance(plant.time + plant.period, self._see)
+        except RunawayError as error:
+            self._begin_again(error)
+            return
         late = self._now() - plant.time
         if late > _TOO_LATE:
             self.get_logger().warning(
@@ -136,8 +152,20 @@ class ArmSimulator(Node):  # type: ignore[misc]
                 throttle_duration_sec=_WARNING_PERIOD)
 
     def _now(self) -> float:
-        """Return the time since the start [s]."""
-        return float((self.get_clock().now() - self._began).nanoseconds) * 1e-9
+        """Return the time since the start, or since the arm began again [s]."""
+        jump = self._passed.look(self.get_clock().now().nanoseconds)
+        if jump:
+            self.get_logger().warning(f'the clock has jumped by {jump:.3f} s: the arm goes on '
+                                      'from where it is')
+        return self._passed.seconds
+
+    def _begin_again(self, reason: RunawayError) -> None:
+        """Put the arm back to where it started."""
+        self._plant, self._passed = self._new_plant(), ElapsedTime()
+        self._watch.expect(np.inf)
+        self.get_logger().error(
+            f'{reason}. The arm is at rest at its initial positions again, and follows nothing',
+            throttle_duration_sec=_WARNING_PERIOD)
 
     def _see(self, plant: Plant) -> None:
         """Look at the arm after a period of the controller."""

@@ -1,5 +1,8 @@
 """
-A published plan as a stream of reference states, in real time, in a process of its own.
+A published plan as a stream of reference states, in a process of its own.
+
+In real time, or in that of ``/clock`` where the planner is to use simulated time.
+
 
 The solver's libraries keep Python's other threads from running for tens of milliseconds: a thread
 of the planner could not keep the times. Run as a program, this module reads plans from its
@@ -14,6 +17,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 import faulthandler
+from functools import partial
 import logging
 import os
 import pickle
@@ -24,6 +28,8 @@ import time
 
 from flex_planner.base.validation import Array
 from flex_planner.control.joint_reference import JointReference
+from flex_planner.ros.runtime.clock_listener import ClockListener
+from flex_planner.ros.runtime.elapsed import ElapsedTime
 import numpy as np
 from numpy.typing import NDArray
 import rclpy
@@ -48,9 +54,11 @@ class StreamedPlan:
     rate : float
         States per second, above 0 [Hz].
     stamp_ns, began_ns : int
-        When the motion starts, since 1970 and by the monotonic clock [ns].
+        When the motion starts, by the clock of the planner and by the monotonic clock [ns].
+    by_clock : bool
+        Whether the clock of the planner is ``/clock``, which the states follow then.
     times_ns : numpy.ndarray of int64, shape (k,)
-        Of the samples, from 0 [ns].
+        Of the samples, from 0, or later where the arm is held before [ns].
     coordinates, rates, accelerations : numpy.ndarray, shape (k, n_t)
         Joints [rad], then modes [m].
     torques : numpy.ndarray, shape (k, n)
@@ -62,6 +70,7 @@ class StreamedPlan:
     rate: float
     stamp_ns: int
     began_ns: int
+    by_clock: bool = False
     times_ns: NDArray[np.int64]
     coordinates: Array
     rates: Array
@@ -87,7 +96,8 @@ class ReferenceStates:
         self.plan, times = plan, np.multiply(plan.times_ns, 1e-9, dtype=np.float64)
         self._reference = JointReference(
             times=times, positions=plan.coordinates, velocities=plan.rates,
-            accelerations=plan.accelerations, torques=plan.torques)
+            accelerations=plan.accelerations, torques=plan.torques,
+        ).after(plan.coordinates[0], plan.rates[0], plan.torques[0])
         # the last period may be up to half a period longer or shorter than the others
         count = max(int(np.floor(times[-1] * plan.rate + 0.5)), 1)
         grid = np.round(np.arange(count) / plan.rate * 1e9).astype(np.int64)
@@ -110,8 +120,7 @@ class ReferenceStates:
                  effort: Array) -> JointState:
         message = JointState(name=self.plan.names, position=position.tolist(),
                              velocity=velocity.tolist(), effort=effort.tolist())
-        stamp = message.header.stamp
-        stamp.sec, stamp.nanosec = divmod(stamp_ns, 10**9)
+        _set_stamp(message, stamp_ns)
         return message
 
 
@@ -132,6 +141,7 @@ class Stream:
         self._next: StreamedPlan | None = None
         self._closed = False
         self._last_ns = 0  # when the last state was due, by the monotonic clock
+        self._passed, self._clock_ns = ElapsedTime(), 0  # of /clock
         self._thread = threading.Thread(target=self._run, name='reference states', daemon=True)
         self._thread.start()
 
@@ -139,6 +149,13 @@ class Stream:
         """Stream a plan, in place of one that is being streamed."""
         with self._changed:
             self._next = plan
+            self._changed.notify()
+
+    def tick(self, now_ns: int) -> None:
+        """Take note of the time of ``/clock`` [ns]."""
+        with self._changed:
+            self._passed.look(now_ns)
+            self._clock_ns = now_ns
             self._changed.notify()
 
     def close(self, timeout: float) -> None:
@@ -160,7 +177,7 @@ class Stream:
                     return
                 plan, self._next = self._next, None
             try:
-                self._play(ReferenceStates(plan))
+                (self._play_by_clock if plan.by_clock else self._play)(ReferenceStates(plan))
             except Exception:
                 _LOG.exception('streaming the reference states failed')
 
@@ -181,6 +198,27 @@ class Stream:
             self._publish(message)
             self._last_ns = due_ns
 
+    def _play_by_clock(self, states: ReferenceStates) -> None:
+        """Publish states at their times of ``/clock``; where that jumps, the motion goes on."""
+        stamp_ns = states.plan.stamp_ns
+        with self._changed:
+            self._passed, self._clock_ns = ElapsedTime(), stamp_ns
+            self._passed.look(stamp_ns)
+        for time_ns, message in zip(states.times_ns, states.messages(), strict=True):
+            due_ns = int(time_ns)
+            with self._changed:
+                self._changed.wait_for(partial(self._is_due, due_ns))
+                if self._is_interrupted():
+                    return
+                start_ns = self._clock_ns - self._passed.nanoseconds
+            _set_stamp(message, start_ns + due_ns)
+            self._publish(message)
+
+    def _is_due(self, due_ns: int) -> bool:
+        """Return whether so much of the time of the clock has passed [ns], or there is no plan."""
+        begun = self._clock_ns > 0
+        return self._is_interrupted() or (begun and self._passed.nanoseconds >= due_ns)
+
     def _wait(self, due_ns: int) -> bool:
         """Wait until a time of the monotonic clock [ns]; return whether to stop instead."""
         with self._changed:
@@ -192,6 +230,12 @@ class Stream:
         return True
 
 
+def _set_stamp(message: JointState, stamp_ns: int) -> None:
+    """Set the time of a message, none before 0 [ns]."""
+    stamp = message.header.stamp
+    stamp.sec, stamp.nanosec = divmod(max(stamp_ns, 0), 10**9)
+
+
 def _hurry() -> None:
     """Let this thread run before others as soon as it is due, where the system allows that."""
     with suppress(OSError):
@@ -199,23 +243,35 @@ def _hurry() -> None:
 
 
 def main() -> None:
-    """Publish plans from the standard input on a topic; arguments: name, namespace, topic."""
-    name, namespace, topic = sys.argv[1:]
+    """
+    Publish plans from the standard input on a topic.
+
+    Arguments: name, namespace, topic, and ``by_clock`` where plans are to follow ``/clock``.
+
+    """
+    name, namespace, topic, *by_clock = sys.argv[1:]
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)  # the planner decides when it ends
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node(name, namespace=namespace, enable_rosout=False,
                              start_parameter_services=False)
     stream = Stream(node.create_publisher(JointState, topic, _DEPTH).publish)
+    clock = ClockListener(node, stream.tick)
+    if by_clock:
+        clock.start()
     try:
         print('ready', flush=True)
     except BrokenPipeError:  # the planner ended while this one started
         os._exit(0)
     try:
         while True:
-            stream.start(pickle.load(sys.stdin.buffer))
+            plan = pickle.load(sys.stdin.buffer)
+            if plan.by_clock:
+                clock.start()
+            stream.start(plan)
     except EOFError:
         stream.close(1.0)
+        clock.close()
     # Fast DDS may spin without end where it leaves while another one does (its issue 6513)
     time.sleep(_AFTER_YOU)
     faulthandler.dump_traceback_later(_LAST_RESORT, exit=True)

@@ -26,7 +26,7 @@ from flex_planner.recording import (
     SerializedMessage,
     TopicSummary,
 )
-from flex_planner.ros.runtime.parameters import declare
+from flex_planner.ros.runtime.parameters import declare, warn_of_unknown
 from flex_planner.ros.runtime.running import CannotGoOnError, run_node
 from flex_planner.ros.settings.fields import parameter_field
 import rclpy
@@ -80,6 +80,7 @@ class Replay(Node):  # type: ignore[misc]
 
     def __init__(self, settings: ReplaySettings) -> None:
         super().__init__('replay')
+        warn_of_unknown(self, ReplaySettings)
         self._settings = declare(self, settings)
         self._path = expand_path(self._settings.recording)
         metadata = read_metadata(self._path)

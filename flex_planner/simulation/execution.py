@@ -157,7 +157,7 @@ def execute_plan(mode: ExecutionMode, plan: Plan, sampled: SampledPlan,
     if not plan.task.starts_at_rest:
         plant.state = _moving_start(plan, plant.state)
     plant.follow(reference)
-    arrival = plan.task.duration
+    arrival = sampled.start_hold + plan.task.duration
     execution, bending = _watch(plant, arrival, setting)
     error = np.linalg.norm(execution.tip - setting.goal, axis=1)
     after = int(np.ceil(arrival * setting.rate - 1e-6))

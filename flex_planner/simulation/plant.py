@@ -19,7 +19,7 @@ from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.integration import HeldTorqueIntegrator
 from flex_planner.dynamics.physical_parameters import PhysicalParameters
 from flex_planner.dynamics.statics import equilibrium
-from flex_planner.optimal_control.task import MAX_PAYLOAD
+from flex_planner.optimal_control.task import MAX_DISPLACEMENT, MAX_PAYLOAD, MAX_VELOCITY
 from flex_planner.optimal_control.torque_limits import TorqueLimits
 from flex_planner.simulation.joint_control import Disturbance, Encoder, JointSensor
 import numpy as np
@@ -29,7 +29,7 @@ _LONGEST_STEP = 1e-3
 
 
 class RunawayError(FlexPlannerError):
-    """The simulated arm moves so wildly that it cannot be integrated."""
+    """The simulated arm moves so wildly that it cannot be integrated, or as no arm does."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -157,7 +157,8 @@ class Plant:
         Raises
         ------
         RunawayError
-            If the arm cannot be integrated further.
+            If the arm cannot be integrated further, a joint turns by more than 1000 rad/s, or a
+            modal displacement is more than 100 m.
 
         """
         while self.time + self.period <= until + 1e-9:
@@ -173,13 +174,20 @@ class Plant:
         if self._moves:
             total = total + self.control.disturbance.mean(begin, begin + self.period, total.size)
         state = self._integrator.advance(self.state, total)
-        if state is None:
+        if state is None or self._is_beyond(state):
             raise RunawayError(f'the simulated arm has run away after {self.time:.3f} s: the '
                                'gains are too high for the rate of the controller, or the '
                                'torques too large')
         self.state = state
         self._ticks += 1
         self.sensor.look(self.time, *self.joint_state)
+
+    def _is_beyond(self, state: Array) -> bool:
+        """Return whether a state is none that an arm could have, though it can be integrated."""
+        n, n_t = self.model.arm.n_joints, self.model.arm.n_coordinates
+        size = np.abs(state)
+        return bool(size[n_t:n_t + n].max() > MAX_VELOCITY
+                    or size[n:n_t].max(initial=0.0) > MAX_DISPLACEMENT)
 
     def _command(self, elapsed: float) -> Array:
         """Return the torques of the motors for the coming period."""

@@ -10,6 +10,7 @@ import signal
 import time
 from typing import Any
 
+from builtin_interfaces.msg import Duration
 from flex_planner.arms.arm import Arm
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.optimal_control.arm_model import ArmModel
@@ -21,7 +22,9 @@ from flex_planner.ros.settings.simulator import SimulatorSettings
 from geometry_msgs.msg import PointStamped
 import numpy as np
 import pytest
+from rclpy.time import Time
 from ros_support import Client, PARAMETER_FILE, STARTING
+from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from trajectory_msgs.msg import JointTrajectory
@@ -126,6 +129,24 @@ def of_another_arm(trajectory: JointTrajectory) -> JointTrajectory:
     return trajectory
 
 
+def huge(trajectory: JointTrajectory) -> JointTrajectory:
+    trajectory.points[1].positions[1] = -1e308
+    return trajectory
+
+
+def infinite(trajectory: JointTrajectory) -> JointTrajectory:
+    trajectory.points[3].effort[0] = np.inf
+    return trajectory
+
+
+def torn(trajectory: JointTrajectory) -> JointTrajectory:
+    """Return a trajectory that begins where another ends, with the torques of a large crane."""
+    last, first = trajectory.points[-1], copy.deepcopy(trajectory.points[-1])
+    first.time_from_start = Duration(sec=0, nanosec=0)
+    first.effort = last.effort = [5e6, -5e6]
+    return JointTrajectory(joint_names=trajectory.joint_names, points=[first, last])
+
+
 def empty(trajectory: JointTrajectory) -> JointTrajectory:
     return JointTrajectory(joint_names=trajectory.joint_names)
 
@@ -135,6 +156,8 @@ def empty(trajectory: JointTrajectory) -> JointTrajectory:
     (moving_at_the_end, 'the last velocities must be 0'),
     (without_effort, 'points[0].effort has 0 entries'),
     (of_another_arm, 'must be a permutation of'),
+    (huge, 'points[1].positions[1] is -1e+308, but must be a number >= -100 and <= 100 rad'),
+    (infinite, 'points[3].effort must be finite'),
     (empty, 'points must not be empty')])
 def test_bad_trajectory_is_refused_and_the_arm_stays(simulator: Simulator, spoil: Any,
                                                      planned: JointTrajectory,
@@ -200,9 +223,55 @@ def test_simulator_that_is_too_slow_says_so_and_goes_on(tmp_path: Path) -> None:
     assert arm.log().count(reason) <= 1 + (time.monotonic() - began) / 5  # one in 5 s
 
 
+class ClockedSimulator(Simulator):
+    """A simulator by ``/clock``, which the test sets."""
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(folder, '/clocked', use_sim_time=True, limit_torques=False)
+        self._clock = self.node.create_publisher(ClockMessage, '/clock', 10)
+
+    def pass_time(self, begin: float, end: float) -> None:
+        """Set the clock and let it go on by steps of 0.1 s, each once the arm has got there."""
+        for seconds in np.arange(begin, end + 0.01, 0.1):
+            stamp = Time(nanoseconds=round(seconds * 1e9)).to_msg()
+            self._clock.publish(ClockMessage(clock=stamp))
+            if seconds == begin:  # where it jumps to, no timer is due
+                self.spin(0.2)
+                continue
+            self.wait(f'the states of {seconds:.1f} s', lambda due=stamp: bool(
+                self.states and self.states[-1].header.stamp == due), 5.0)
+
+
+def test_simulator_follows_a_clock_that_jumps_and_survives_torques_that_no_arm_does(
+        tmp_path: Path, planned: JointTrajectory) -> None:
+    with ClockedSimulator(tmp_path) as arm, arm.process:
+        arm.wait('a word on the clock', lambda: 'nothing has come on /clock' in arm.log())
+        assert not arm.states
+        arm.wait('subscriptions', lambda: arm.node.count_subscribers('/clock') == 1)
+        arm.pass_time(1e6, 1e6 + 0.2)
+        assert 'late' not in arm.log()
+        arm.command(planned, 'following a trajectory')
+        arm.pass_time(1e6 + 0.3, 1e6 + 0.7)
+        arm.spin(0.3)  # the clock stands still
+        moving = arm.states[-1]
+        assert moving.header.stamp.sec == 1_000_000
+        assert np.abs(moving.velocity).max() > 0.1
+        arm.pass_time(3.0, 3.7)
+        assert 'the clock has jumped by -999997' in arm.log()
+        tip = arm.tips[-1].point
+        assert (tip.x, tip.y) == pytest.approx(GOAL, abs=5e-5)
+        arm.command(torn(copy.deepcopy(planned)), 'following a trajectory')
+        arm.pass_time(3.8, 4.5)
+        assert 'The arm is at rest at its initial positions again' in arm.log()
+        assert arm.states[-1].position == pytest.approx(START, abs=1e-9)
+        assert arm.process.stop(signal.SIGINT) == 0
+
+
 @pytest.mark.parametrize(('changes', 'text'), [
     ({'initial_positions': [0.1]}, 'initial_positions has 1 number'),
     ({'stiffness': [1.0, -1.0]}, r'stiffness\[1\] is -1.0'),
+    ({'stiffness': [1.0, 1e308]}, r'stiffness\[1\] is 1e\+308, but must be a number'),
+    ({'initial_positions': [0.0, 1e308]}, r'initial_positions\[1\] is 1e\+308'),
     ({'damping': [1.0]}, 'damping has 1 number'),
     ({'added_friction': [0.0, -0.1]}, r'added_friction\[1\] is -0.1'),
     ({'added_friction': [0.1]}, 'added_friction has 1 number'),

@@ -22,7 +22,7 @@ from flex_planner.ros.reference_states import ReferenceStates, Stream, StreamedP
 from flex_planner.ros.settings.planner import PlannerSettings
 import numpy as np
 import pytest
-from rclpy.clock import Clock
+from rclpy.clock import ROSClock
 from ros_support import PATIENCE, Planner
 from sensor_msgs.msg import JointState
 
@@ -137,8 +137,8 @@ class FakeNode:
     def get_logger(self) -> FakeNode:
         return self
 
-    def get_clock(self) -> Clock:
-        return Clock()
+    def get_clock(self) -> ROSClock:
+        return ROSClock()
 
 
 def gone(pid: int) -> bool:
@@ -262,6 +262,49 @@ def test_states_that_were_due_before_a_plan_came_are_left_out(plan_of: PlanFacto
     steps = np.diff(stamps)
     assert (steps > 0).all()
     assert sorted(set(steps)) == [2_000_000, 10_000_000]
+
+
+def stamps_of(heard: list[JointState]) -> list[int]:
+    return [state.header.stamp.sec * 10**9 + state.header.stamp.nanosec for state in heard]
+
+
+def test_states_follow_a_clock_that_starts_late_stands_still_and_jumps(
+        plan_of: PlanFactory) -> None:
+    plan = replace(streamed(sample_plan(plan_of('ei50'), SamplingSettings()), 10.0),
+                   by_clock=True, stamp_ns=0)
+    heard: list[JointState] = []
+    stream, tenth = Stream(heard.append), 10**8
+    stream.start(plan)
+    time.sleep(0.1)
+    assert not heard  # the clock has not come
+    start = 10**15
+    for count in range(5):
+        stream.tick(start + count * tenth)
+        wait_for(heard, count + 1)
+    time.sleep(0.2)
+    assert stamps_of(heard) == [start + count * tenth for count in range(5)]
+    back = 5 * 10**9
+    for count in range(8):  # it begins anew: the motion goes on from where it is
+        stream.tick(back + count * tenth)
+        wait_for(heard, (5, 6, 7, 8, 9, 10, 10, 11)[count])
+    stream.close(1.0)
+    assert stamps_of(heard)[5:] == pytest.approx([back + count * tenth for count in range(1, 7)],
+                                                 abs=10**6)
+    expected = [state.position for state in ReferenceStates(plan).messages()]
+    np.testing.assert_array_equal([state.position for state in heard], expected)
+
+
+def test_states_of_a_held_arm_begin_with_the_hold(plan_of: PlanFactory) -> None:
+    plan = plan_of('ei50')
+    waited = sample_plan(plan, SamplingSettings(start_hold=0.5))
+    states = list(ReferenceStates(streamed(waited, 10.0)).messages())
+    bare = list(ReferenceStates(streamed(sample_plan(plan, SamplingSettings()), 10.0)).messages())
+    assert len(states) == len(bare) + 5
+    for state in states[:5]:
+        assert state.position == pytest.approx(bare[0].position, abs=1e-12)
+        assert not any(state.velocity) and not any(state.effort)
+    for state, other in zip(states[6:-1], bare[1:-1], strict=True):
+        assert state.position == pytest.approx(other.position, abs=1e-6)
 
 
 def test_all_states_come_while_the_solver_is_at_work(planner: Planner,

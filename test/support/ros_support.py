@@ -196,14 +196,15 @@ class Planner(Client):
     module = 'flex_planner.ros.planner.node'
 
     def __init__(self, folder: Path, arm: str, name: str = 'flex_planner', *,
-                 parameter_file: Path | None = None,
+                 space: str = '', parameter_file: Path | None = None,
                  remappings: Mapping[str, str] | None = None, **parameters: object) -> None:
         super().__init__()
-        self.name, self._log = f'/{name}', folder / f'{name}.log'
+        self.name, self._log = f'{space}/{name}', folder / f'{name}.log'
         self._log.parent.mkdir(parents=True, exist_ok=True)
         self.recordings = folder / 'recordings'
         given = {'arm': arm, 'recording_folder': self.recordings, **parameters}
-        self.process = NodeProcess(self.module, given, {'__node': name, **(remappings or {})},
+        self.process = NodeProcess(self.module, given,
+                                   {'__node': name, '__ns': space or '/', **(remappings or {})},
                                    self._log, parameter_file)
 
     def log(self) -> str:

@@ -22,6 +22,7 @@ from flex_planner.planning.execution import Execution
 from flex_planner.reports.recording.contents import RecordedMotion, RecordedRequest
 from flex_planner.reports.recording.execution import (
     effort_delay,
+    efforts_settled,
     recorded_controller,
     recorded_execution,
 )
@@ -78,6 +79,7 @@ def check_motion(request: RecordedRequest, model: ArmModel | None = None,
         *_deviation_at_ends(request, motion, ends, limits),
         *_deviation_from_request(request, motion, limits),
         *optimality_findings(model, motion, parameters, limits, effort_delay(request),
+                             efforts_settled(request, motion),
                              float(request.report.torque_interpolation_error))))
 
 

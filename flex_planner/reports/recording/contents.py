@@ -29,6 +29,7 @@ import numpy as np
 
 _PACKAGE = 'flex_planner_interfaces'
 _TYPES = f'{_PACKAGE}/msg/'
+_NANOSECOND = 1e-9
 _WANTED = ('MotionTask', 'PlanReport', 'PayloadSearch', 'FlexibleTrajectory')
 
 
@@ -40,7 +41,8 @@ class RecordedMotion:
     Attributes
     ----------
     times : numpy.ndarray, shape (k,)
-        [s]; the last sample holds the arm, shortly after the end of the motion.
+        [s]; the last sample holds the arm, shortly after the end of the motion, and so do the
+        first ones if the arm is held before it.
     coordinates, rates : numpy.ndarray, shape (k, n_t)
         Joints [rad], then modes [m], and their rates.
     accelerations : numpy.ndarray, shape (k, n)
@@ -53,6 +55,8 @@ class RecordedMotion:
         [m].
     payload_mass : float
         Planned for [kg].
+    begin : float
+        Of the motion: the samples before hold the arm [s].
 
     """
 
@@ -65,9 +69,10 @@ class RecordedMotion:
     velocity_costates: Array
     tip: Array
     payload_mass: float
+    begin: float = 0.0
 
     @classmethod
-    def of(cls, message: Any) -> RecordedMotion:
+    def of(cls, message: Any, begin: float) -> RecordedMotion:
         """Return the motion of a FlexibleTrajectory."""
         joints, bends = message.joint_trajectory.points, message.points
         stamps = [point.time_from_start for point in joints]
@@ -80,7 +85,16 @@ class RecordedMotion:
             position_costates=_rows(bends, 'position_costates'),
             velocity_costates=_rows(bends, 'velocity_costates'),
             tip=np.array([(point.x, point.y) for point in message.tip_path]),
-            payload_mass=float(message.payload_mass))
+            payload_mass=float(message.payload_mass), begin=begin)
+
+    @property
+    def moving(self) -> slice:
+        """Return the samples of the motion, without those that hold the arm before and after."""
+        return self.since(self.begin)
+
+    def since(self, time: float) -> slice:
+        """Return the samples of the motion from a time on [s]."""
+        return slice(int(np.searchsorted(self.times, time - _NANOSECOND)), -1)
 
     @property
     def extended_states(self) -> Array:
@@ -90,11 +104,12 @@ class RecordedMotion:
 
     @property
     def reference(self) -> JointReference:
-        """Return the trajectory that the joint controller gets."""
+        """Return the trajectory that the joint controller gets, led into from rest."""
         n = self.torques.shape[1]
-        return JointReference(
+        reference = JointReference(
             times=self.times, positions=self.coordinates[:, :n], velocities=self.rates[:, :n],
             accelerations=self.accelerations, torques=self.torques)
+        return reference.after(self.coordinates[0, :n], self.rates[0, :n], self.torques[0])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -178,7 +193,9 @@ class RecordedRequest:
         try:
             arm = arm_from_scenario(scenario['arm'])
             settings = dict(scenario['parameters'])
-            motion = RecordedMotion.of(trajectory) if trajectory else None
+            # older recordings do not know of it
+            begin = float(getattr(found.messages['PlanReport'], 'start_hold', 0.0))
+            motion = RecordedMotion.of(trajectory, begin) if trajectory else None
             if motion is not None:
                 _check_sizes(arm, motion)
             request = cls(

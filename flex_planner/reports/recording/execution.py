@@ -6,7 +6,8 @@ from flex_planner.control.default_gains import default_gains
 from flex_planner.control.joint_controller import EffortHold, Gains, JointController
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.planning.execution import ExecutionCertificate, Robustness
-from flex_planner.reports.recording.contents import RecordedRequest
+from flex_planner.planning.published_motion import start_ramp
+from flex_planner.reports.recording.contents import RecordedMotion, RecordedRequest
 import numpy as np
 
 
@@ -28,6 +29,13 @@ def effort_delay(request: RecordedRequest) -> float:
         return 0.0
     half = float(request.report.controller_period) / 2
     return -half if request.report.effort_hold == EffortHold.START.value else half
+
+
+def efforts_settled(request: RecordedRequest, motion: RecordedMotion) -> float:
+    """Return from when on efforts are those of the motion, after those that hold the arm [s]."""
+    if not motion.begin:
+        return 0.0
+    return motion.begin + start_ramp(recorded_controller(request))[1]
 
 
 def recorded_execution(request: RecordedRequest) -> ExecutionCertificate | None:

@@ -14,7 +14,7 @@ _TINY = float(np.finfo(float).tiny)
 
 
 def optimality_findings(model: ArmModel, motion: RecordedMotion, parameters: Parameters,
-                        limits: CheckLimits, delay: float,
+                        limits: CheckLimits, delay: float, settled: float,
                         interpolation_error: float) -> list[Finding]:
     """
     Return the violation of the torque bounds, and the errors of efforts and Hamiltonian.
@@ -31,12 +31,16 @@ def optimality_findings(model: ArmModel, motion: RecordedMotion, parameters: Par
         What must be kept.
     delay : float
         By which efforts come later than the planned torques [s].
+    settled : float
+        From when on efforts are those of the motion, and not on the way from those that hold the
+        arm [s].
     interpolation_error : float
         Of the efforts, as the report has it [N m].
 
     """
-    # the last sample holds the arm, it is not of the extremal
-    z, efforts = motion.extended_states[:-1], motion.torques[:-1]
+    # the samples that hold the arm are not of the extremal
+    moving = motion.moving
+    z, efforts = motion.extended_states[moving], motion.torques[moving]
     controls = model.controls(z, parameters.stack())
     powers = np.abs(motion.position_costates * motion.rates).max()
     scale = max(float(controls.cost_rate.max()), float(powers), _TINY)
@@ -44,6 +48,8 @@ def optimality_findings(model: ArmModel, motion: RecordedMotion, parameters: Par
     if delay:
         share, more = limits.shifted_torque_error, interpolation_error
         applied = _shifted(model, motion, parameters, delay)
+    ramp = motion.since(settled).start - moving.start
+    applied, efforts = applied[ramp:], efforts[ramp:]
     n, n_t = model.arm.n_joints, model.arm.n_coordinates
     lower, upper = TorqueLimits.of(model.arm).bounds(applied[:, n_t:n_t + n])
     beyond = np.abs(efforts) - np.where(efforts >= 0, upper, -lower)
@@ -63,7 +69,7 @@ def _shifted(model: ArmModel, motion: RecordedMotion, parameters: Parameters,
     """Return extended states at the times whose torques the efforts are, shape (k, 4 n_t)."""
     from scipy.interpolate import CubicHermiteSpline  # see `ArmDynamics.prepare`
 
-    z, times = motion.extended_states[:-1], motion.times[:-1]
+    z, times = motion.extended_states[motion.moving], motion.times[motion.moving]
     spline = CubicHermiteSpline(times, z, model.optimality(z, parameters.stack()))
-    states: Array = spline(np.clip(times - delay, 0, times[-1]))
+    states: Array = spline(np.clip(times - delay, times[0], times[-1]))
     return states

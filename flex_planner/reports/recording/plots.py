@@ -115,7 +115,7 @@ def _motion_plots(request: RecordedRequest, motion: RecordedMotion, check: Motio
         _over_time('speeds', 'Joint speeds', 'speed [rad/s]', t, motion.rates[:, :n], joints),
         _tip(motion, check)]
     if arm.n_modes:
-        moving = slice(0, -1)  # without the sample that holds the arm, just after the last
+        moving = motion.moving
         bends, rates = motion.coordinates[:, n:], motion.rates[:, n:]
         found += [
             _over_time('modes', 'Modal displacements', 'displacement [m]', t, bends, modes),

@@ -37,6 +37,7 @@ from flex_planner.ros.messages.classes import (
     PlanReport,
     Point,
 )
+from flex_planner.ros.messages.spaces import SPACES
 from flex_planner.ros.settings.planner import PlannerSettings
 import numpy as np
 
@@ -127,7 +128,7 @@ def _ends(message: MotionTask, arm: Arm, settings: PlannerSettings) -> dict[str,
               for name in ('start_positions', 'goal_positions')}
     if message.space == MotionTask.JOINT:
         return angles
-    if message.space not in (MotionTask.CARTESIAN, MotionTask.CARTESIAN_GOAL):
+    if message.space not in SPACES:
         raise InvalidValueError('space', message.space,
                                 '0 (JOINT), 1 (CARTESIAN) or 2 (CARTESIAN_GOAL)')
     if message.elbow not in (-1, 0, 1):
@@ -220,6 +221,7 @@ def add_execution(report: PlanReport, reference: SampledPlan) -> None:
     report.controller_stiffness = controller.gains.stiffness.tolist()
     report.controller_damping = controller.gains.damping.tolist()
     report.controller_period = reference.controller_period
+    report.start_hold = reference.start_hold
 
 
 def duration_message(nanoseconds: int) -> Duration:

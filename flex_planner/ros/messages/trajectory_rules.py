@@ -11,10 +11,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from flex_planner.optimal_control.task import MAX_JOINT_ANGLE, MAX_VELOCITY
 import numpy as np
 
 _FIELDS = ('positions', 'velocities', 'accelerations', 'effort')
 _STILL = float(np.finfo(np.float32).eps)
+# beyond every arm that could be meant: absolute values of the fields above, with their units
+_LARGEST = (MAX_JOINT_ANGLE, 'rad'), (MAX_VELOCITY, 'rad/s'), (1e7, 'rad/s^2'), (1e7, 'N m')
 
 
 def trajectory_violations(trajectory: Any, joint_names: Sequence[str]) -> list[str]:
@@ -43,6 +46,19 @@ def trajectory_violations(trajectory: Any, joint_names: Sequence[str]) -> list[s
     last = trajectory.points[-1]
     if any(abs(speed) > _STILL for speed in last.velocities):
         found.append('the last velocities must be 0')
+    return found
+
+
+def range_violations(trajectory: Any) -> list[str]:
+    """Return a sentence for each field of a full and finite trajectory with values too large."""
+    found = []
+    for name, (largest, unit) in zip(_FIELDS, _LARGEST, strict=True):
+        values = np.array([getattr(point, name) for point in trajectory.points], dtype=float)
+        point, joint = np.unravel_index(np.abs(values).argmax(), values.shape)
+        value = float(values[point, joint])
+        if abs(value) > largest:
+            found.append(f'points[{point}].{name}[{joint}] is {value:g}, but must be a number '
+                         f'>= {-largest:g} and <= {largest:g} {unit}')
     return found
 
 

@@ -13,6 +13,7 @@ from flex_planner.ros.planner.request_queue import RequestQueue
 from flex_planner.ros.planner.streamer import Streamer
 from flex_planner_interfaces.msg import PlanReport
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 
@@ -90,7 +91,9 @@ class Diagnostics:
         self._node, self._queue, self._record, self._arm = node, queue, record, arm
         self._streamer, self._trajectories = streamer, trajectories
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 1)
-        node.create_timer(_PERIOD, self._publish, callback_group=ReentrantCallbackGroup())
+        # whatever clock the node has: that of a simulation may stand still
+        node.create_timer(_PERIOD, self._publish, callback_group=ReentrantCallbackGroup(),
+                          clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _publish(self) -> None:
         message = DiagnosticArray(status=[self._of_planner(), self._of_stream()])

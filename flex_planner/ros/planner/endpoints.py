@@ -15,6 +15,7 @@ from flex_planner_interfaces.msg import MotionTask, PlanReport
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
@@ -83,7 +84,9 @@ class Endpoint:
             handle_accepted_callback=self._on_goal, cancel_callback=self._on_cancel,
             goal_service_qos_profile=_MANY, result_service_qos_profile=_MANY,
             cancel_service_qos_profile=_MANY, result_timeout=RESULT_TIMEOUT)
-        node.create_timer(_FEEDBACK_PERIOD, self._send_feedback, callback_group=group)
+        # whatever clock the node has: that of a simulation may stand still
+        node.create_timer(_FEEDBACK_PERIOD, self._send_feedback, callback_group=group,
+                          clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     async def _on_request(self, request: Any, response: Any) -> Any:
         """Serve a request of the service."""

@@ -25,6 +25,7 @@ from flex_planner.ros.runtime.parameters import (
     declare,
     declare_arm,
     judge_changes,
+    warn_of_unknown,
 )
 from flex_planner.ros.runtime.running import run_node
 from flex_planner.ros.settings.planner import PlannerSettings
@@ -72,6 +73,7 @@ class PlannerNode(Node):  # type: ignore[misc]
         if WHY_NOT_ROS:
             raise FlexPlannerError(WHY_NOT_ROS)
         super().__init__('flex_planner')
+        warn_of_unknown(self, PlannerSettings, ['arm'])
         helper_processes()  # what the environment says is refused at once
         arm = declare_arm(self)
         self._settings = declare(self, PlannerSettings.for_arm(arm))

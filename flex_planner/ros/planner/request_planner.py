@@ -38,6 +38,7 @@ from flex_planner.ros.messages.plans import (
     STOP_CODES,
     task_from_message,
 )
+from flex_planner.ros.messages.spaces import add_space
 from flex_planner.ros.messages.trajectory_rules import trajectory_violations
 from flex_planner.ros.planner.map_starts import Starts
 from flex_planner.ros.planner.outcome import failure_outcome, Outcome, unknown_failure
@@ -164,6 +165,7 @@ class RequestPlanner:
             _LOG.exception('planning failed')
             outcome = unknown_failure(error)
         outcome = replace(outcome, search=outcome.search or search)
+        add_space(outcome.report, message)
         outcome.report.planning_time = duration_message(state.elapsed_ns)
         return self._record(message, state, outcome)
 

@@ -46,6 +46,7 @@ class Streamer:
         streamed = StreamedPlan(
             names=[*settings.joint_names, *plan.arm.modal_names], rate=settings.reference_rate,
             stamp_ns=self._node.get_clock().now().nanoseconds, began_ns=time.monotonic_ns(),
+            by_clock=self._node.get_clock().ros_time_is_active,
             times_ns=reference.times_ns, coordinates=samples.coordinates,
             rates=samples.rates, accelerations=samples.accelerations, torques=samples.torques)
         try:
@@ -88,7 +89,8 @@ class Streamer:
         node, topic = self._node, self._node.resolve_topic_name('~/reference_states')
         return subprocess.Popen(
             [sys.executable, '-m', 'flex_planner.ros.reference_states',
-             f'{node.get_name()}_states', node.get_namespace(), topic],
+             f'{node.get_name()}_states', node.get_namespace(), topic,
+             *(['by_clock'] if node.get_clock().ros_time_is_active else [])],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE)
 
 

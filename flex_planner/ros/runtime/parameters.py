@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
+from difflib import get_close_matches
 from typing import Any, TypeVar
 
 from flex_planner.arms.arm import Arm
@@ -17,10 +19,14 @@ from rcl_interfaces.msg import (
 )
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+import yaml
 
 Settings = TypeVar('Settings')
 
 _DEFAULT_ARM = 'korayem_ei50'
+# of ROS itself: none of a node's own, and not declared before they are used
+_OF_ROS = 'qos_overrides', 'use_sim_time', 'start_type_description_service'
+_SIMILAR = 0.7  # of names, for one to be meant by another
 
 
 def declare(node: Node, settings: Settings) -> Settings:
@@ -48,13 +54,83 @@ def declare(node: Node, settings: Settings) -> Settings:
     values = {}
     for entry in fields(settings):  # type: ignore[arg-type]
         default = getattr(settings, entry.name)
-        description = entry.metadata['description']
+        given, descriptor = _given(node), _descriptor(entry.metadata['description'], default)
+        floats = _as_floats(given[entry.name].value, default) if entry.name in given else None
         value = node.declare_parameter(
-            entry.name, default, _descriptor(description, default)).value
+            entry.name, default if floats is None else floats, descriptor,
+            ignore_override=floats is not None).value
         if value is None:  # what rcl makes of an empty list in YAML
             raise InvalidValueError(entry.name, value, 'a value, or left out')
         values[entry.name] = _plain(value)
+    node.add_pre_set_parameters_callback(
+        lambda changes: [_with_floats(change, values) for change in changes])
     return replace(settings, **values)  # type: ignore[type-var]
+
+
+def warn_of_unknown(node: Node, settings: type, others: Sequence[str] = ()) -> None:
+    """
+    Log the parameters that a node is given but does not know, each with the name that is nearest.
+
+    Parameters
+    ----------
+    node : Node
+        Before its parameters are declared.
+    settings : type
+        Dataclass of its parameters.
+    others : sequence of str
+        Further parameters.
+
+    """
+    known = [*others, *(entry.name for entry in fields(settings))]
+    unknown = [name for name in _given(node)
+               if name not in known and name.partition('.')[0] not in _OF_ROS]
+    if unknown:
+        node.get_logger().warning(
+            f'there is no parameter {"; no ".join(_with_nearest(name, known) for name in unknown)}'
+            ': what is given for it is not used')
+
+
+def _with_nearest(name: str, known: Sequence[str]) -> str:
+    """Return an unknown name, with the known one that is meant."""
+    nearest = get_close_matches(name, known, 1, _SIMILAR)
+    return f'{name} ({nearest[0]}?)' if nearest else name
+
+
+def _given(node: Node) -> Mapping[str, Parameter]:
+    """Return the parameters of files and command line, which rclpy offers in no other way."""
+    given: Mapping[str, Parameter] = node._parameter_overrides
+    return given
+
+
+def _with_floats(change: Parameter, values: Mapping[str, Any]) -> Parameter:
+    """Return a change of a parameter, as floats where the parameter has them."""
+    floats = _as_floats(change.value, values.get(change.name))
+    return change if floats is None else Parameter(change.name, value=floats)
+
+
+def _as_floats(value: Any, like: Any) -> float | list[float] | None:
+    """Return whole numbers, or a list as text, as floats where a parameter has those, or None."""
+    if isinstance(like, float):
+        return float(value) if isinstance(value, int) and not isinstance(value, bool) else None
+    if not isinstance(like, list) or not like or not isinstance(like[0], float):
+        return None
+    entries = _list(value) if isinstance(value, str) else _plain(value)
+    if not isinstance(entries, list) or not entries or not all(
+            isinstance(entry, (int, float)) and not isinstance(entry, bool) for entry in entries):
+        return None
+    try:
+        return [float(entry) for entry in entries]
+    except OverflowError:
+        return None
+
+
+def _list(text: str) -> object:
+    """Return what ros2 param set takes for a text: a list of whole and of other numbers."""
+    try:
+        content: object = yaml.safe_load(text)
+    except (yaml.YAMLError, ValueError, RecursionError):
+        return None
+    return content
 
 
 def declare_arm(node: Node) -> Arm:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 import faulthandler
 import logging
 import os
@@ -12,6 +12,7 @@ import threading
 import time
 
 from flex_planner.base.errors import FlexPlannerError
+from flex_planner.ros.runtime.arguments import readable_arguments, unused_files
 from flex_planner.ros.runtime.logs import forward_logs
 import rclpy
 from rclpy.exceptions import ParameterException
@@ -57,7 +58,7 @@ def run_node(create: Callable[[], Node], name: str, args: list[str] | None) -> N
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, on_signal)
-    rclpy.init(args=args)  # calls the handlers above from its own
+    _initialize(sys.argv if args is None else args, name)  # calls these handlers from its own
     forward_logs(logging.getLogger('flex_planner'))
     try:
         node = create()
@@ -81,6 +82,20 @@ def run_node(create: Callable[[], Node], name: str, args: list[str] | None) -> N
             node.destroy_node()
         rclpy.try_shutdown()
     _leave(code)
+
+
+def _initialize(arguments: Sequence[str], name: str) -> None:
+    """Start rclpy with a command line; end with code 1 and a sentence if it is none."""
+    try:
+        with readable_arguments(arguments) as readable:
+            rclpy.init(args=readable)
+    except (RuntimeError, ValueError, OSError) as error:
+        sentence = str(error).partition(', at ')[0]  # rcl adds the place in its source
+        for given, changed in zip(arguments, readable, strict=True):
+            sentence = sentence.replace(changed, given)
+        sys.exit(f'{name}: {sentence}')
+    for sentence in unused_files(arguments, name):
+        rclpy.logging.get_logger(name).warning(sentence)
 
 
 def _spin_once(executor: SingleThreadedExecutor, name: str) -> None:

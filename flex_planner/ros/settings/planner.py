@@ -21,10 +21,12 @@ from flex_planner.control.joint_controller import (
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.optimal_control.task import MAX_PAYLOAD
 from flex_planner.planning.kinds.effort import SearchEffort
-from flex_planner.planning.sampling import MAX_PERIOD, SamplingSettings
+from flex_planner.planning.sampling import MAX_PERIOD, MAX_START_HOLD, SamplingSettings
 from flex_planner.ros.settings.fields import parameter_field
 import numpy as np
 
+# of a joint [N m/rad], [N m s/rad]
+MAX_GAIN = 1e9
 # of the largest payload [kg]
 MIN_ACCURACY, MAX_ACCURACY = 1e-6, 1e3
 # of a file of a recording, and of all recordings [bytes]: a slip in the unit must not make a file
@@ -97,6 +99,10 @@ class PlannerSettings:
         -1.0, 'Efforts are shifted by half this time, so that their mean is right where they are '
         'held for it; -1: 1 / controller_rate, 0: not at all [s].', lowest=-1.0,
         highest=MAX_PERIOD)
+    start_hold: float = parameter_field(
+        0.0, 'How long a trajectory holds the arm before a motion that starts at rest, with the '
+        'torque that this takes; at least four periods of the controller. A controller leads the '
+        'arm there first. 0: not at all [s].', lowest=0.0, highest=MAX_START_HOLD)
     reference_rate: float = parameter_field(
         100.0, 'Rate of the states that are streamed along a published plan [Hz].', lowest=1.0,
         highest=1000.0)
@@ -128,7 +134,7 @@ class PlannerSettings:
         count = len(self.joint_names)
         vector('effort_weights', self.effort_weights, count, above=0)
         for name in ('controller_stiffness', 'controller_damping'):
-            vector(name, getattr(self, name), count, at_least=0)
+            vector(name, getattr(self, name), count, at_least=0, at_most=MAX_GAIN)
         if len(set(self.joint_names)) != len(self.joint_names) or '' in self.joint_names:
             raise InvalidValueError('joint_names', self.joint_names, 'different names')
         if -1 < self.controller_period < 0:
@@ -169,7 +175,8 @@ class PlannerSettings:
         period = None if self.controller_period < 0 else self.controller_period
         return SamplingSettings(
             longest_step=self.sampling_step, torque_tolerance=self.torque_tolerance,
-            controller=self.controller(), controller_period=period)
+            controller=self.controller(), controller_period=period,
+            start_hold=self.start_hold)
 
     def with_controller(self, controller: JointController) -> PlannerSettings:
         """Return the settings for another joint controller."""

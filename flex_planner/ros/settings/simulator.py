@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from flex_planner.arms.arm import Arm
+from flex_planner.arms.arm import Arm, Joint
 from flex_planner.base.validation import vector
 from flex_planner.control.default_gains import default_gains
 from flex_planner.control.joint_controller import EffortHold, Gains, MAX_RATE, MIN_RATE
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
+from flex_planner.optimal_control.task import MAX_JOINT_ANGLE
 from flex_planner.ros.settings.fields import parameter_field
+from flex_planner.ros.settings.planner import MAX_GAIN
 from flex_planner.simulation.joint_control import Disturbance, Encoder
 from flex_planner.simulation.mismatch import AS_GIVEN, Mismatch
 from flex_planner.simulation.plant import Control
@@ -96,8 +98,10 @@ class SimulatorSettings:
 
     def __post_init__(self) -> None:
         count = len(self.joint_names)
-        for name in ('initial_positions', 'stiffness', 'damping', 'added_friction'):
-            vector(name, getattr(self, name), count)
+        for name in ('stiffness', 'damping', 'added_friction'):
+            vector(name, getattr(self, name), count, at_least=0, at_most=MAX_GAIN)
+        vector('initial_positions', self.initial_positions, count, at_least=-MAX_JOINT_ANGLE,
+               at_most=MAX_JOINT_ANGLE, unit='rad')
         self.control.check(count)
         self.mismatch  # noqa: B018 - refuses what is out of bounds
 
@@ -106,7 +110,8 @@ class SimulatorSettings:
         """Return the defaults for an arm."""
         n, gains = arm.n_joints, default_gains(ArmDynamics.of(arm))
         return replace(cls(), joint_names=[f'joint{i}' for i in range(1, n + 1)],
-                       initial_positions=[0.0] * n, stiffness=gains.stiffness.tolist(),
+                       initial_positions=[_within_limits(joint) for joint in arm.joints],
+                       stiffness=gains.stiffness.tolist(),
                        damping=gains.damping.tolist(), added_friction=[0.0] * n)
 
     @property
@@ -128,3 +133,8 @@ class SimulatorSettings:
             disturbance=Disturbance(
                 joint=self.disturbance_joint, torque=self.disturbance_torque,
                 start=self.disturbance_start, duration=self.disturbance_duration))
+
+
+def _within_limits(joint: Joint) -> float:
+    """Return the angle nearest to 0 that a joint may have [rad]."""
+    return float(np.clip(0.0, joint.lower_limit, joint.upper_limit))

@@ -13,14 +13,18 @@ from __future__ import annotations
 from dataclasses import replace
 import os
 from pathlib import Path
+from typing import Any
 
 from flex_planner.arms.arm_files import load_arm, preset_files
 from flex_planner.cli.recorder import RequestRecorder
 from flex_planner.cli.request import Request
+from flex_planner.control.default_gains import default_gains
+from flex_planner.control.joint_controller import EffortHold, JointController
+from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.robustness import assess_robustness
-from flex_planner.planning.sampling import judge_execution, sample_plan
+from flex_planner.planning.sampling import judge_execution, sample_plan, SamplingSettings
 from flex_planner.reports.recording import check_motion, RecordedRequest
 import numpy as np
 import pytest
@@ -87,12 +91,13 @@ OTHERS = {
 }
 
 
-def check(task: Task, folder: Path) -> None:
+def check(task: Task, folder: Path, **sampling: Any) -> None:
     """Plan, sample, record and read a motion; its check must pass."""
     task = replace(task, allow_large_bending=True)
     plan = plan_path(task)
     assert plan.solved, plan.message
-    request = Request(task=task, elbow=-1, time_limit=60.0)
+    request = Request(task=task, elbow=-1, time_limit=60.0,
+                      sampled=SamplingSettings(**sampling))
     sampled = sample_plan(plan, request.sampling)
     assert judge_execution(plan, sampled) is plan
     sampled = replace(sampled, robustness=assess_robustness(plan, sampled))
@@ -125,6 +130,14 @@ def test_every_arm_and_motion_is_among_those_kept() -> None:
 @pytest.mark.parametrize('name', PRESETS)
 def test_recordings_of_presets_pass(name: str, tmp_path: Path) -> None:
     check(task_of(name, *PRESETS[name]), tmp_path)
+
+
+@pytest.mark.parametrize('hold', EffortHold)
+def test_recordings_of_motions_after_a_hold_pass(hold: EffortHold, tmp_path: Path) -> None:
+    task = task_of('korayem_hanging', *PRESETS['korayem_hanging'])
+    controller = JointController(gains=default_gains(ArmDynamics.of(task.arm), 300.0), rate=300.0,
+                                 hold=hold)
+    check(task, tmp_path, controller=controller, start_hold=0.3777)
 
 
 @pytest.mark.parametrize(('name', 'kind', 'modes', 'duration', 'payload'), [

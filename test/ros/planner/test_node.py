@@ -71,7 +71,7 @@ def nodes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Planne
     folder = tmp_path_factory.mktemp('nodes')
     with Planner(folder, 'korayem_rigid', 'rigid_planner', record=False) as rigid, \
             Planner(folder, 'korayem_ei50', parameter_file=PARAMETER_FILE,
-                    queue_length=1) as flexible:
+                    effort_weights=[1 / 8, 1 / 8], queue_length=1) as flexible:
         yield {'rigid': rigid, 'flexible': flexible}
         check_health(rigid)
         check_health(flexible)
@@ -463,7 +463,7 @@ def test_parameter_that_is_set_counts(rigid: Planner) -> None:
 @pytest.mark.parametrize(('name', 'value', 'reason'), [
     ('tolerance', 2.0, 'tolerance'),
     ('tolerance', math.nan, 'tolerance'),
-    ('tolerance', 1, 'DOUBLE'),
+    ('tolerance', 2, 'tolerance'), ('tolerance', 'small', 'DOUBLE'),
     ('intervals', 3, 'intervals'),
     ('elbow', 0, 'elbow is 0, but must be +1 or -1'),
     ('payload_accuracy', 0.0, 'payload_accuracy'),

@@ -21,7 +21,8 @@ from flex_planner.ros.planner.recorder import OutcomeRecorder
 from flex_planner.ros.planner.request_planner import RequestPlanner
 from flex_planner.ros.planner.request_state import RequestState
 from flex_planner.ros.settings.planner import MIN_RECORDING_SIZE, PlannerSettings
-from flex_planner_interfaces.msg import PayloadSearch, PlanReport
+from flex_planner_interfaces.msg import MotionTask, PayloadSearch, PlanReport
+from geometry_msgs.msg import Point
 import pytest
 from ros_support import search_request, task
 
@@ -40,6 +41,35 @@ def test_stop_after_the_solve_is_reported_without_a_trajectory(
     assert (outcome.report.error_code, outcome.report.error_msg) == (code, reason.value + limit)
     assert not outcome.trajectory.points
     assert not outcome.publishable
+
+
+ANGLES = {'start_positions': [1.0, -2.0], 'goal_positions': [0.8, -1.5]}
+ASSUMED = 'space is 0, as in a request without it, so that JOINT was assumed'
+
+
+@pytest.mark.parametrize(('fields', 'code', 'warned'), [
+    ({}, PlanReport.INVALID_SIZE, False),
+    ({'start_point': Point(), 'goal_point': Point()}, PlanReport.INVALID_SIZE, False),
+    (ANGLES, PlanReport.NONE, True),
+    ({**ANGLES, 'start_point': Point(), 'goal_point': Point()}, PlanReport.NONE, False)])
+def test_request_without_a_space_is_told_that_angles_were_assumed(
+        worker: RequestPlanner, settings: PlannerSettings, fields: dict[str, Any], code: int,
+        warned: bool) -> None:
+    request = task(**{'space': MotionTask().space, **fields})
+    report = worker.plan(request, RequestState(settings=settings)).report
+    assert (report.error_code, report.space) == (code, 'JOINT')
+    assert (ASSUMED in report.error_msg) == (code != PlanReport.NONE)
+    assert ('SPACE_ASSUMED' in report.warning_kinds) == warned
+    assert any(ASSUMED in sentence for sentence in report.warnings) == warned
+
+
+def test_space_of_a_request_is_repeated_in_its_result(worker: RequestPlanner,
+                                                      settings: PlannerSettings) -> None:
+    for space, name in ((1, 'CARTESIAN'), (2, 'CARTESIAN_GOAL'), (3, '')):
+        request = task(space=space, duration=-1.0, start_positions=[1.0, -2.0])
+        report = worker.plan(request, RequestState(settings=settings)).report
+        assert report.space == name
+        assert ASSUMED not in report.error_msg
 
 
 def test_trajectory_that_cannot_be_carried_out_is_not_published(
