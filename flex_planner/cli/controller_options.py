@@ -40,7 +40,8 @@ def add_controller(parser: argparse.ArgumentParser) -> None:
         help='shift the efforts by half this time, in which they are held, so that their mean is '
         'right (default: 1 / rate; 0: not at all)')
     add('--start-hold', type=number_argument, default=0.0, metavar='S',
-        help='hold the arm for this time before the motion, so that the controller can lead it to the start (default: not at all)')
+        help='hold the arm for this time before the motion, so that the controller can lead it '
+        'to the start (default: not at all)')
 
 
 def sampling_settings(options: argparse.Namespace, arm: Arm) -> SamplingSettings:
