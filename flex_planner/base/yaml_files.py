@@ -15,6 +15,7 @@ import re
 from typing import Any
 
 from flex_planner.base.errors import FlexPlannerError, InvalidValueError
+from flex_planner.base.text import shown_value
 from flex_planner.base.validation import number
 import yaml
 
@@ -41,7 +42,8 @@ def read_yaml(path: Path) -> tuple[str, object]:
         text = path.read_text(encoding='utf-8')
         return text, yaml.load(text, _StrictLoader)
     except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
-        raise YamlFileError(f'{path}: cannot be read: {error}') from None
+        reason = ' '.join(str(error).split())
+        raise YamlFileError(f'{path}: cannot be read: {reason}') from None
 
 
 class _StrictLoader(yaml.SafeLoader):
@@ -49,11 +51,14 @@ class _StrictLoader(yaml.SafeLoader):
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         """Return a mapping; PyYAML itself would keep the last of equal keys silently."""
-        keys = [key.value for key, _ in node.value]
-        for key_node, _ in node.value:
-            if keys.count(key_node.value) > 1:
+        seen: set[str] = set()
+        for key, _ in node.value:
+            if not isinstance(key, yaml.ScalarNode):
+                continue  # a list or a mapping is no key, which PyYAML says
+            if key.value in seen:
                 raise yaml.constructor.ConstructorError(
-                    None, None, f'field {key_node.value!r} is given twice', key_node.start_mark)
+                    None, None, f'field {shown_value(key.value)} is given twice', key.start_mark)
+            seen.add(key.value)
         return super().construct_mapping(node, deep)
 
 

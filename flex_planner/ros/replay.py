@@ -11,6 +11,7 @@ import time
 from typing import Any
 
 from flex_planner.base.errors import FlexPlannerError, InvalidValueError, RecordingError
+from flex_planner.base.text import printable
 from flex_planner.recording import (
     check_definition,
     definition_folder,
@@ -84,7 +85,7 @@ class Replay(Node):  # type: ignore[misc]
                                     f'recording, {metadata.duration_ns * 1e-9:g} s')
         self._outlets = self._publish_topics(metadata.topics)
         self.get_logger().info(
-            f'replaying {self._path}: {len(self._outlets)} topics, '
+            f'replaying {printable(str(self._path))}: {len(self._outlets)} topics, '
             f'{(metadata.end_ns - self._first_ns) * 1e-9 / self._settings.rate:.3g} s')
         self._begin = time.monotonic() + self._settings.delay
         self._sent, self._messages = 0, self._passes()
@@ -103,7 +104,8 @@ class Replay(Node):  # type: ignore[misc]
                     check_definition(self._path, topic, entry.type_hash, types)
                 kind = message_class(topic.type_name)
             except (ImportError, AttributeError, RecordingError) as error:
-                self.get_logger().warning(f'{topic.name} is left out: {error}')
+                self.get_logger().warning(
+                    printable(f'{topic.name} is left out: {error}'))
                 continue
             outlets[topic.name] = self.create_publisher(kind, topic.name, _profile(topic.qos))
         if not outlets:

@@ -18,6 +18,7 @@ from string import Template
 from typing import Any
 
 from flex_planner.base.errors import RecordingError
+from flex_planner.base.text import printable
 from flex_planner.base.validation import Array
 from flex_planner.base.version import VERSION
 from flex_planner.reports.recording.contents import RecordedRequest
@@ -39,9 +40,9 @@ def report_page(request: RecordedRequest, check: MotionCheck | None = None) -> s
     passed = request.solved and (check is None or check.passed)
     kind = 'find_max_payload' if request.search is not None else 'plan_path'
     return template.substitute(
-        title=escape(f'{kind}: {request.arm.name}'), kind='' if passed else 'failed',
-        file=escape(f'{request.path.name}, report of flex_planner {VERSION}'),
-        verdict=escape(verdict(request, check)), hidden='' if drawn else 'hidden',
+        title=_escape(f'{kind}: {request.arm.name}'), kind='' if passed else 'failed',
+        file=_escape(f'{request.path.name}, report of flex_planner {VERSION}'),
+        verdict=_escape(verdict(request, check)), hidden='' if drawn else 'hidden',
         data=_json(_content(tables(request, check, frequencies), drawn)),
         script=(_FOLDER / 'plots.js').read_text(encoding='utf-8'))
 
@@ -96,5 +97,20 @@ def _numbers(values: Array) -> list[float | None]:
 
 def _json(content: dict[str, Any]) -> str:
     """Return JSON that cannot end the element it stands in."""
-    text = json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(',', ':'))
+    text = json.dumps(_shown(content), ensure_ascii=False, allow_nan=False,
+                      separators=(',', ':'))
     return text.replace('<', '\\u003c')
+
+
+def _escape(text: str) -> str:
+    """Return text as HTML."""
+    return escape(printable(text))
+
+
+def _shown(content: Any) -> Any:
+    """Return content with escapes in its texts for what has no place in them."""
+    if isinstance(content, str):
+        return printable(content)
+    if isinstance(content, dict):
+        return {_shown(name): _shown(entry) for name, entry in content.items()}
+    return [_shown(entry) for entry in content] if isinstance(content, (list, tuple)) else content

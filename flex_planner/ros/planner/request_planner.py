@@ -10,6 +10,7 @@ import shutil
 
 from flex_planner.base.errors import FlexPlannerError, InvalidTaskError
 from flex_planner.base.progress import Monitor, StoppedError
+from flex_planner.base.text import printable
 from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.task import Task
@@ -177,11 +178,11 @@ class RequestPlanner:
             if outcome.report.error_code != PlanReport.NONE:
                 return outcome
             outcome.report.error_code = PlanReport.RECORDING_FAILED
-            outcome.report.error_msg = f'the plan could not be recorded: {error}'
+            outcome.report.error_msg = printable(f'the plan could not be recorded: {error}')
             return outcome
         finally:
             self._report_in_work = None
-        outcome.report.recording = str(path)
+        outcome.report.recording = printable(str(path))
         return outcome
 
 
