@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 import ctypes
+from multiprocessing import resource_tracker
 import os
+import signal
 
 _LIBC = ctypes.CDLL(None)
 _ONE_THREAD = dict.fromkeys(('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS'), '1')
@@ -27,6 +29,23 @@ def one_thread_each() -> Iterator[None]:
     finally:
         os.environ.clear()
         os.environ.update(before)
+
+
+@contextmanager
+def deaf_to_interrupts() -> Iterator[None]:
+    """
+    Let processes that are started meanwhile, and their own, never get Ctrl-C.
+
+    A terminal sends it to all of them, also to those that have not begun to listen, but it is for
+    the first one alone, which ends the others. It gets it when the block ends.
+
+    """
+    resource_tracker.ensure_running()  # which would unblock it for this thread as it starts
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def return_memory() -> None:

@@ -83,11 +83,11 @@ def integer(field: str, value: object, *, at_least: int, at_most: int) -> int:
 
 
 def _entries(values: object, depth: int = 0) -> int:
-    """Return how many entries a list has, or a number beyond the most that there may be."""
+    """Return how many entries and lists a list has, or more than the most there may be."""
     if not isinstance(values, (list, tuple)):
         return 1
     # NumPy would visit every entry, of which a file of one kilobyte can have billions
-    count = 0 if depth < _DEEPEST else _MOST_ENTRIES + 1
+    count = 1 if depth < _DEEPEST else _MOST_ENTRIES + 1
     for entry in values:
         if count > _MOST_ENTRIES:
             break

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from pathlib import Path
 import re
 from typing import TypeAlias
 
@@ -33,6 +34,12 @@ def add_arm(parser: argparse.ArgumentParser) -> None:
     """Add the arm, which every command needs."""
     parser.add_argument('arm', metavar='ARM',
                         help=f'arm file, or a preset: {", ".join(sorted(preset_files()))}')
+
+
+def add_folder(parser: argparse.ArgumentParser, default: str = 'output') -> None:
+    """Add the folder that everything is written into."""
+    parser.add_argument('--output', type=Path, default=Path(default), metavar='DIR',
+                        help='folder for all that is written (default: %(default)s)')
 
 
 def numbers(option: str, text: str, sizes: int | Sequence[int] = (), unit: str = '', *,

@@ -12,6 +12,7 @@ from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import number
 from flex_planner.cli.options import Commands
 from flex_planner.cli.progress_line import run_with_progress
+from flex_planner.cli.signals import SIGNALS
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.recording import (
     definition_folder,
@@ -28,7 +29,7 @@ from flex_planner.reports.recording import (
     write_report,
 )
 
-_MOST_SECONDS = 3600.0
+_MOST_SECONDS, _FOLDER = 3600.0, Path('output')
 
 
 def add_commands(commands: Commands) -> None:
@@ -61,7 +62,7 @@ def _add_report(commands: Commands) -> None:
         'Make one HTML file of a recorded request: task, outcome, certificate, and plots to zoom '
         'into. It needs neither ROS nor a network.')
     parser.add_argument('--output', type=Path, metavar='HTML',
-                        help='the file (default: <recording>.html)')
+                        help='the file (default: output/<recording>.html)')
     parser.add_argument('--check', action='store_true',
                         help='apply the recorded torques to the recorded arm, compare with the '
                         'recorded plan, and fail where they differ')
@@ -104,12 +105,13 @@ def _report(options: argparse.Namespace) -> int:
     """Make a page of a recording; check its plan if that is wanted."""
     request = RecordedRequest.read(options.recording)
     check = _check(request) if options.check else None
-    output = options.output or Path(
-        f'{options.recording.resolve().name.removesuffix(".mcap")}.html')
-    write_report(output, request, check)
+    name = options.recording.resolve().name.removesuffix('.mcap')
+    output = options.output or _FOLDER / f'{name}.html'
+    with SIGNALS.patient():
+        write_report(output, request, check)
     rows = [(finding.name, str(finding)) for finding in check.findings] if check else []
     print(table([('recording', str(request.path)), ('outcome', verdict(request, check)), *rows,
-                 ('report', str(output))]))
+                 ('report', str(output)), ('output folder', str(output.parent))]))
     return 0 if check is None or check.passed else 1
 
 

@@ -12,13 +12,13 @@ from dataclasses import asdict
 from html import escape
 import json
 import math
-import os
 from pathlib import Path
 from string import Template
 from typing import Any
 
 from flex_planner.base.errors import RecordingError
 from flex_planner.base.text import printable
+from flex_planner.base.text_files import write_text
 from flex_planner.base.validation import Array
 from flex_planner.base.version import VERSION
 from flex_planner.reports.recording.contents import RecordedRequest
@@ -57,12 +57,9 @@ def write_report(path: Path, request: RecordedRequest, check: MotionCheck | None
         If the system refuses.
 
     """
-    draft = path.with_name(f'.{path.name}.{os.getpid()}')
     try:
-        draft.write_text(report_page(request, check), encoding='utf-8')
-        draft.replace(path)
+        write_text(path, report_page(request, check))
     except OSError as error:
-        draft.unlink(missing_ok=True)
         raise RecordingError(f'cannot write {path}: {error.strerror or error}') from error
 
 
