@@ -41,9 +41,9 @@ setup(
     zip_safe=False,
     entry_points={
         'console_scripts': [
-            'planner = flex_planner.ros.planner.node:main',
-            'arm_simulator = flex_planner.ros.arm_simulator:main',
-            'replay = flex_planner.ros.replay:main',
+            'planner = flex_planner.ros.runtime.start:planner',
+            'arm_simulator = flex_planner.ros.runtime.start:arm_simulator',
+            'replay = flex_planner.ros.runtime.start:replay',
             'flex-planner = flex_planner.cli:main',
         ],
     },

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import errno
 import sys
 
@@ -31,25 +31,49 @@ def main(arguments: Sequence[str] | None = None) -> int:
         number of another signal that ended the work.
 
     """
+    given = sys.argv[1:] if arguments is None else arguments
+
+    def command() -> int:
+        with SIGNALS.starting():
+            # here, so that Ctrl-C while they are loaded finds somebody
+            from flex_planner.cli.parser import parse
+        options = parse(given)
+        return int(options.run(options))
+
+    return run_command(command, ends=arguments is None)
+
+
+def run_command(command: Callable[[], int], *, ends: bool = True) -> int:
+    """
+    Run a command, and say why it fails.
+
+    Parameters
+    ----------
+    command : callable
+        Returns an exit code.
+    ends : bool
+        Whether the process ends afterwards.
+
+    Returns
+    -------
+    int
+        Exit code, see `main`.
+
+    """
     with lasting_streams() as (output, _), SIGNALS:
         try:
-            code = _told(output, _run(sys.argv[1:] if arguments is None else arguments))
+            code = _told(output, _run(command))
         except SystemExit as end:  # after help, and what is wrong with a command line
-            raise SystemExit(_told(output, end.code if isinstance(end.code, int) else 1)) \
-                from None
-        if arguments is None:
+            raise SystemExit(_told(output, end.code if isinstance(end.code, int) else 1)) from None
+        if ends:
             SIGNALS.ending(code)
     return code
 
 
-def _run(arguments: Sequence[str]) -> int:
-    """Run a command; return its exit code."""
+def _run(command: Callable[[], int]) -> int:
+    """Return the exit code of a command, also of one that fails."""
     try:
-        with SIGNALS.starting():
-            # here, so that Ctrl-C while they are loaded finds somebody
-            from flex_planner.cli.parser import parse
-        options = parse(arguments)
-        code = int(options.run(options))
+        code = command()
         SIGNALS.check()
     except BaseException as error:
         return _failed(error)

@@ -71,7 +71,7 @@ class Outputs:
         """Write recording and picture of a plan; yield names and paths as they are written."""
         recorder = self.recorder
         yield from self._write(
-            recorder and (lambda: recorder.record_plan(plan, reference)),
+            (lambda: recorder.record_plan(plan, reference)) if recorder else None,
             self._draw_motion(plan, 'motion') if plan.solved else iter(()))
 
     def write_search(self, found: MaxPayload, accuracy: float, step: float,
@@ -79,8 +79,8 @@ class Outputs:
         """Write recording and pictures of a search, see `write_plan`."""
         recorder = self.recorder
         yield from self._write(
-            recorder and (lambda: recorder.record_search(found, accuracy, step, reference)),
-            self._draw_search(found))
+            (lambda: recorder.record_search(found, accuracy, step, reference)) if recorder
+            else None, self._draw_search(found))
 
     def _write(self, record: Callable[[], Path] | None, pictures: Iterator[Row]) -> Iterator[Row]:
         """Record, then draw; a recording that fails is told when the pictures are drawn."""

@@ -50,7 +50,8 @@ def print_files(files: Iterator[Row]) -> int:
     """
     count = 0
     with SIGNALS.patient():
-        for count, row in enumerate(files, 1):
+        for row in files:
+            count += 1
             print(table([row]), flush=True)
             SIGNALS.check()
     return count

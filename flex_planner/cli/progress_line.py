@@ -25,8 +25,9 @@ _REWRITE = '\r\x1b[K'
 
 class Display:
     """
-    Shows progress: on a terminal as a line that is rewritten, elsewhere as a line per phase and
-    every few seconds.
+    Shows progress.
+
+    On a terminal it is a line that is rewritten, elsewhere a line per phase and every few seconds.
 
     Parameters
     ----------
@@ -60,8 +61,8 @@ class Display:
             self.begin(progress.phase)
         else:
             payload = f', payload {progress.payload:.6g} kg' if progress.payload else ''
-            self._state = (f'{progress.phase}{payload}: iteration {progress.iteration}, correction '
-                           f'{progress.residual:.1e}, {progress.intervals} intervals')
+            self._state = (f'{progress.phase}{payload}: iteration {progress.iteration}, '
+                           f'correction {progress.residual:.1e}, {progress.intervals} intervals')
             self.remind()
 
     def remind(self) -> None:

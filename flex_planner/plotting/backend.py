@@ -18,7 +18,7 @@ def load_matplotlib() -> None:
     """Load Matplotlib, without a backend where the one in the environment is refused."""
     known = set(sys.modules)
     try:
-        import matplotlib  # noqa: F401
+        import matplotlib
     except ValueError:
         if _VARIABLE not in os.environ:
             raise

@@ -10,6 +10,7 @@ import textwrap
 from flex_planner.base.validation import Array
 from flex_planner.maps.cell_results import CellCode
 from flex_planner.maps.pictures.data import MapAxis, MapData
+from flex_planner.plotting.figures import plain
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis

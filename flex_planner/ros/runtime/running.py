@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 import faulthandler
 import logging
 import os
 import signal
 import sys
+import tempfile
 import threading
 import time
 
 from flex_planner.base.errors import FlexPlannerError
+from flex_planner.base.text import printable
 from flex_planner.ros.runtime.logs import forward_logs
 import rclpy
 from rclpy.exceptions import ParameterException
@@ -20,7 +23,8 @@ import rclpy.logging
 from rclpy.node import Node
 
 _LONGEST_WAIT = 0.2  # [s]
-_LAST_RESORT = 3.0  # [s] after a signal
+# [s] after a signal, on machines that have much else to do
+_LAST_RESORT, _BY_FORCE = 4.0, 8.0
 _AFTER_ERROR = 0.01  # [s]; an error that comes again and again must not fill disk and processor
 
 
@@ -49,15 +53,19 @@ def run_node(create: Callable[[], Node], name: str, args: list[str] | None) -> N
     node, code, started = None, 0, False
 
     def on_signal(number: int, frame: object) -> None:
-        # should anything below hang, say where, and end
-        faulthandler.dump_traceback_later(_LAST_RESORT, exit=True)
         # once it spins, rclpy ends it between two callbacks; before, nobody would for seconds
         if not started:
-            sys.exit(0)
+            os._exit(0)
+        _end_soon()
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, on_signal)
-    rclpy.init(args=args)  # calls the handlers above from its own
+    _have_log_folder()
+    try:
+        rclpy.init(args=args)  # calls the handlers above from its own
+    except Exception as error:
+        print(f'{name}: {" ".join(printable(str(error)).split())}', file=sys.stderr)
+        _leave(1)
     forward_logs(logging.getLogger('flex_planner'))
     try:
         node = create()
@@ -70,17 +78,48 @@ def run_node(create: Callable[[], Node], name: str, args: list[str] | None) -> N
             _spin_once(executor, name)
     except ExternalShutdownException:
         pass
-    except (FlexPlannerError, ParameterException) as error:
-        rclpy.logging.get_logger(name).fatal(str(error))
+    except (FlexPlannerError, ParameterException, OSError) as error:
+        rclpy.logging.get_logger(name).fatal(printable(str(error)))
         code = 1
     except Exception:
         if rclpy.ok():
             raise  # else it comes of a signal that shut rclpy down
     finally:
+        _clean_up(node)
+    _leave(code)
+
+
+def _clean_up(node: Node | None) -> None:
+    """End the node and ROS; where a signal has ended ROS before, parts of them are gone."""
+    try:
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()
-    _leave(code)
+    except Exception:
+        if rclpy.ok():
+            raise
+
+
+def _end_soon() -> None:
+    """End the process in a while, should it hang: quietly, for it was told to end."""
+    watch = threading.Timer(_LAST_RESORT, os._exit, [0])
+    watch.daemon = True
+    watch.start()
+    # where a library keeps Python's threads from running; the file stays open until the end
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    faulthandler.dump_traceback_later(_BY_FORCE, exit=True, file=nowhere)
+
+
+def _have_log_folder() -> None:
+    """Let ROS log into a temporary folder where it cannot into its own, which is an error."""
+    home = os.environ.get('ROS_HOME') or os.path.expanduser('~/.ros')
+    folder = os.environ.get('ROS_LOG_DIR') or os.path.join(home, 'log')
+    try:
+        os.makedirs(folder, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return
+    except OSError:
+        os.environ['ROS_LOG_DIR'] = tempfile.mkdtemp(prefix='flex_planner-log-')
 
 
 def _spin_once(executor: SingleThreadedExecutor, name: str) -> None:
@@ -99,7 +138,7 @@ def _spin_once(executor: SingleThreadedExecutor, name: str) -> None:
         if not rclpy.ok():
             raise
         rclpy.logging.get_logger(name).error(
-            f'a callback failed: {type(error).__name__}: {error}')
+            printable(f'a callback failed: {type(error).__name__}: {error}'))
         time.sleep(_AFTER_ERROR)
 
 
@@ -108,11 +147,11 @@ def _leave(code: int) -> None:
     End the process.
 
     A solve that did not give up in time still runs in its thread. The libraries' clean-up at
-    exit would wait for it, and has nothing left to do: ROS is shut down, files are closed.
+    exit would wait for it or stumble over it, and has nothing left to do: ROS is shut down, files
+    are closed.
 
     """
-    if any(thread is not threading.main_thread() for thread in threading.enumerate()):
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(code)
-    sys.exit(code)
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError, AttributeError):
+            stream.flush()
+    os._exit(code)
