@@ -64,7 +64,9 @@ def run_node(create: Callable[[], Node], name: str, args: list[str] | None) -> N
     try:
         rclpy.init(args=args)  # calls the handlers above from its own
     except Exception as error:
-        print(f'{name}: {" ".join(printable(str(error)).split())}', file=sys.stderr)
+        reason = ' '.join(str(error).split())
+        print(printable(f'{name}: ROS cannot start: {type(error).__name__}: {reason}'),
+              file=sys.stderr)
         _leave(1)
     forward_logs(logging.getLogger('flex_planner'))
     try:
