@@ -9,6 +9,7 @@ simulator in processes of their own, and asks as any other node would.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 import time
 
@@ -174,13 +175,16 @@ def run(folder: Path) -> str:
     """Run the demonstration, write into a folder, return the table."""
     arm = load_arm(ARM)
     start, _ = postures_from_points(arm, START, GOAL, ELBOW)
-    planner = NodeProcess('flex_planner.ros.planner.node',
-                          {'arm': ARM, 'recording_folder': folder / 'recordings'})
-    simulator = NodeProcess('flex_planner.ros.arm_simulator',
-                            {'arm': ARM, 'payload_mass': PAYLOAD,
-                             'initial_positions': start.tolist()},
-                            {'joint_trajectory': '/flex_planner/joint_trajectory'})
-    with planner, simulator:
+    with ExitStack() as stack:
+        with SIGNALS.patient():  # what is begun must be known, to be ended
+            stack.enter_context(NodeProcess(
+                'flex_planner.ros.planner.node',
+                {'arm': ARM, 'recording_folder': folder / 'recordings'}))
+            stack.enter_context(NodeProcess(
+                'flex_planner.ros.arm_simulator',
+                {'arm': ARM, 'payload_mass': PAYLOAD, 'initial_positions': start.tolist()},
+                {'joint_trajectory': '/flex_planner/joint_trajectory'}))
+        SIGNALS.check()
         client = DemoClient()
         try:
             client.wait_for_nodes()

@@ -31,7 +31,8 @@ def drawn(name: str, path: Path, draw: Callable[[Path], object]) -> Iterator[Row
 
     """
     try:
-        draw(path)
+        with SIGNALS.hasty():
+            draw(path)
     except Exception as error:
         SIGNALS.check()  # libraries make other exceptions of an interruption
         reason = ' '.join(str(error).split()) or type(error).__name__
@@ -45,7 +46,7 @@ def print_files(files: Iterator[Row]) -> int:
     """
     Have files written, print the name of each as it is written, and return their number.
 
-    A file that is being written when Ctrl-C is pressed is finished, those after it are not begun.
+    A recording that is being written when Ctrl-C is pressed is finished, a picture is left out.
 
     """
     count = 0

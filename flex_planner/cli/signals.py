@@ -42,7 +42,7 @@ class CommandSignals:
 
     def __init__(self) -> None:
         self.number = 0
-        self._patient = 0
+        self._patient, self._hasty = 0, False
         self._leave: Callable[[], int] | None = None
         self._interrupted = -math.inf
         self._before: dict[int, Any] = {}
@@ -116,6 +116,15 @@ class CommandSignals:
         self._leave = lambda: code
         self._before.clear()
 
+    @contextmanager
+    def hasty(self) -> Iterator[None]:
+        """Let a signal interrupt a block after all, also while it loads libraries."""
+        patient, self._patient, self._hasty = self._patient, 0, True
+        try:
+            yield
+        finally:
+            self._patient, self._hasty = patient, False
+
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
         first, self.number = not self.number, self.number or number
         if not (first and self._patient):
@@ -131,6 +140,8 @@ class CommandSignals:
         if time.monotonic() < self._interrupted + _ON_ITS_WAY:
             return
         if _is_importing(frame):
+            if self._hasty:
+                os._exit(self.tell())
             signal.setitimer(signal.ITIMER_REAL, _LATER)
             return
         self._interrupted = time.monotonic()

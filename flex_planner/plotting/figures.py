@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
 import secrets
 import warnings
@@ -50,11 +51,13 @@ def save(figure: Figure, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     # not the whole name, which may be as long as names can be
     stage = path.with_name(f'.{secrets.token_hex(8)}.{kind}')
+    drawn = BytesIO()  # drawing takes much longer than writing
     try:
         with warnings.catch_warnings():
             # letters that the font lacks are drawn as boxes, which is seen
             warnings.filterwarnings('ignore', message='Glyph .* missing from')
-            figure.savefig(stage, dpi=_DPI, format=kind)
+            figure.savefig(drawn, dpi=_DPI, format=kind)
+        stage.write_bytes(drawn.getvalue())
         stage.replace(path)
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(path)) from error

@@ -219,7 +219,7 @@ def test_largest_payload_is_told_with_its_bracket_and_front(searched: Outcome) -
 
 
 def test_search_is_drawn_and_recorded(searched: Outcome, folder: Path) -> None:
-    for name, file in (('search', 'max_payload'), ('motion', 'motion')):
+    for name, file in (('search', 'max_payload'), ('motion', 'max_payload_motion')):
         assert searched.rows[f'picture of the {name}'] == str(folder / f'korayem_rigid_{file}.png')
         assert is_picture(searched.rows[f'picture of the {name}'])
     found = recorded(searched.rows['recording'])

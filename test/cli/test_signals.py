@@ -137,12 +137,13 @@ def test_import_is_not_interrupted_in_its_middle(tmp_path: Path,
 def test_file_that_is_being_written_becomes_whole(capsys: pytest.CaptureFixture[str],
                                                   tmp_path: Path) -> None:
     def draw(path: Path) -> None:
-        press()
-        path.write_text('whole')
+        path.write_text('drawn')
 
     def files() -> Iterator[tuple[str, str]]:
-        for name in 'first', 'second':
-            yield from drawn(name, tmp_path / name, draw)
+        press()
+        (tmp_path / 'recording').write_text('whole')
+        yield 'recording', 'recording'
+        yield from drawn('picture', tmp_path / 'picture', draw)
 
     def work() -> int:
         print_files(files())
@@ -150,7 +151,21 @@ def test_file_that_is_being_written_becomes_whole(capsys: pytest.CaptureFixture[
 
     assert run_command(work, ends=False) == 130
     assert capsys.readouterr().err == 'flex-planner: canceled\n'
-    assert [(file.name, file.read_text()) for file in tmp_path.iterdir()] == [('first', 'whole')]
+    assert [(file.name, file.read_text()) for file in tmp_path.iterdir()] == [
+        ('recording', 'whole')]
+
+
+def test_picture_is_not_waited_for(tmp_path: Path) -> None:
+    def draw(path: Path) -> None:
+        press()
+        path.write_text('drawn')
+
+    def work() -> int:
+        print_files(drawn('picture', tmp_path / 'picture', draw))
+        return 0
+
+    assert run_command(work, ends=False) == 130
+    assert not list(tmp_path.iterdir())
 
 
 def test_signals_mean_what_they_meant_before(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,7 +6,6 @@ import os
 from pathlib import Path
 import subprocess
 import sys
-from typing import Any
 
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.plotting.figures import plain, save
@@ -16,13 +15,14 @@ import pytest
 
 def test_picture_is_written_whole_or_not_at_all(tmp_path: Path,
                                                 monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(self: Figure, path: Path, **options: Any) -> None:
-        path.write_bytes(b'half')
+    def interrupted(self: Path, data: bytes) -> None:
+        with self.open('wb') as file:
+            file.write(data[:10])
         raise KeyboardInterrupt
 
     path = tmp_path / 'picture.png'
     path.write_bytes(b'whole')
-    monkeypatch.setattr(Figure, 'savefig', interrupted)
+    monkeypatch.setattr(Path, 'write_bytes', interrupted)
     with pytest.raises(KeyboardInterrupt):
         save(Figure(), path)
     assert [(file.name, file.read_bytes()) for file in tmp_path.iterdir()] == [

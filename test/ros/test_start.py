@@ -53,8 +53,8 @@ def test_node_needs_neither_streams_nor_a_home(tmp_path: Path) -> None:
     parameters.write_text('/**: {ros__parameters: {arm: "none\\x1b[31m.yaml"}}\n')
     ended = subprocess.run(
         ['bash', '-c', 'exec "$@" <&- >&-', 'bash', *START, SIMULATOR, '--ros-args',
-         '--params-file', str(parameters)], stderr=subprocess.PIPE, text=True, check=False, timeout=100,
-        env={**kept, 'HOME': '/proc/none'})
+         '--params-file', str(parameters)], stderr=subprocess.PIPE, text=True, check=False,
+        timeout=100, env={**kept, 'HOME': '/proc/none'})
     assert ended.returncode == 1
     assert ended.stderr.count('\n') == 1
     assert r"[arm_simulator]: arm file 'none\x1b[31m.yaml' does not exist" in ended.stderr
