@@ -8,6 +8,7 @@ from typing import Any
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import plain_arm
+from flex_planner.base.text import printable
 from flex_planner.maps.cell_results import CellCode
 from flex_planner.maps.kept_motions import distances, KeptMotion, signature
 from flex_planner.maps.quantities import Quantity
@@ -103,7 +104,7 @@ class MapStarts:
         axes: list[str] = self._group['code'].attrs['_ARRAY_DIMENSIONS']
         values = ', '.join(f'{name} = {_value(self._group[name], k)}'
                            for name, k in zip(axes, index, strict=True))
-        return f'{values} of {self._path.name}'
+        return f'{values} of {printable(self._path.name)}'
 
 
 def _value(axis: Any, k: int) -> str:

@@ -35,7 +35,7 @@ def clean_up():
     try:
         hang()
     finally:
-        time.sleep(0.5)
+        time.sleep(0.3)
         print('cleaned up', flush=True)
 
 def deaf():
@@ -74,14 +74,15 @@ def start() -> Iterator[Callable[[str], subprocess.Popen[str]]]:
     ('work', signal.SIGINT, 1, 130, 'canceled', 'cleaned up\n'),
     ('work', signal.SIGINT, 3, 130, 'canceled', 'cleaned up\n'),
     ('work', signal.SIGHUP, 1, 129, 'ended by SIGHUP', 'cleaned up\n'),
-    ('deaf', signal.SIGINT, 3, 130, 'canceled', 'cleaned up\n')])
+    ('deaf', signal.SIGINT, 3, 130, 'canceled', 'cleaned up\n')],
+    ids=['imports', 'imports SIGTERM', 'work', 'work thrice', 'work SIGHUP', 'deaf thrice'])
 def test_command_ends_in_good_order(start: Callable[[str], subprocess.Popen[str]], where: str,
                                     number: signal.Signals, presses: int, code: int, said: str,
                                     out: str) -> None:
     process = start(where)
     for _ in range(presses):
         process.send_signal(number)
-        time.sleep(0.1)
+        time.sleep(0.05)
     shown, errors = process.communicate(timeout=60)
     assert (process.returncode, errors, shown) == (code, f'flex-planner: {said}\n', out)
 

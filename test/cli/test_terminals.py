@@ -39,7 +39,8 @@ def test_name_that_cannot_be_encoded_is_escaped(strange: Path) -> None:
 
 
 @pytest.mark.parametrize('script', [
-    '"$@" <&- >&- 2>&-; echo $?', '"$@" 2>&1 | true; echo ${PIPESTATUS[0]}'])
+    '"$@" <&- >&- 2>&-; echo $?', '"$@" 2>&1 | true; echo ${PIPESTATUS[0]}'],
+    ids=['closed', 'no reader'])
 def test_streams_that_are_gone_are_no_failure(script: str) -> None:
     ended = shell(script, 'arm', 'korayem_rigid')
     assert (ended.stdout, ended.stderr) == ('0\n', '')
