@@ -32,15 +32,21 @@ def one_thread_each() -> Iterator[None]:
 
 
 @contextmanager
-def deaf_to_interrupts() -> Iterator[None]:
+def deaf_to_interrupts(*, pool: bool = False) -> Iterator[None]:
     """
     Let processes that are started meanwhile, and their own, never get Ctrl-C.
 
     A terminal sends it to all of them, also to those that have not begun to listen, but it is for
     the first one alone, which ends the others. It gets it when the block ends.
 
+    Parameters
+    ----------
+    pool : bool
+        Whether multiprocessing starts them.
+
     """
-    resource_tracker.ensure_running()  # which would unblock it for this thread as it starts
+    if pool:  # its tracker would unblock Ctrl-C for this thread as it starts
+        resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

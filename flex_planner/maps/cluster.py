@@ -54,7 +54,7 @@ def local_cluster(workers: int) -> Iterator[Client]:
     """
     with _quiet(), one_thread_each(), dask.config.set(_SETTINGS):
         try:
-            with deaf_to_interrupts():
+            with deaf_to_interrupts(pool=True):
                 cluster = LocalCluster(
                     n_workers=workers, threads_per_worker=1, processes=True,
                     dashboard_address=None, scheduler_kwargs={'dashboard_address': _ANY_PORT},

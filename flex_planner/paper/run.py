@@ -88,7 +88,7 @@ def _compute_each(keys: Sequence[str], reduced: bool, processes: int, pictures: 
     context = multiprocessing.get_context('spawn')
     pool = ProcessPoolExecutor(processes, context)
     with one_thread_each(), pool:
-        with deaf_to_interrupts():
+        with deaf_to_interrupts(pool=True):
             jobs = {pool.submit(_compute_section, key, reduced, pictures): key for key in order}
         try:
             left: set[Future[Section]] = set(jobs)
