@@ -10,8 +10,7 @@ def write_text(path: Path, text: str) -> None:
     """
     Write a text as UTF-8, in place of an older file only when it is complete.
 
-    Folders above it are made if missing. Halves of characters, which names of files may hold, are
-    written as escapes.
+    Halves of characters, which names of files may hold, are written as escapes.
 
     Raises
     ------
@@ -19,7 +18,6 @@ def write_text(path: Path, text: str) -> None:
         If it cannot be written.
 
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
     # not the whole name, which may be as long as names can be
     draft = path.with_name(f'.{secrets.token_hex(8)}.partial')
     try:

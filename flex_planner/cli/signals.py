@@ -49,9 +49,11 @@ class CommandSignals:
         self._hook = sys.unraisablehook
 
     def __enter__(self) -> CommandSignals:
-        if self._before or threading.current_thread() is not threading.main_thread():
+        if self._before:
             return self
         self.number, self._interrupted, self._leave = 0, -math.inf, None
+        if threading.current_thread() is not threading.main_thread():
+            return self
         for number in _ENDING:
             if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:  # nohup
                 self._before[number] = signal.signal(number, self._on_signal)

@@ -66,6 +66,7 @@ def _paper(options: argparse.Namespace) -> int:
     remark = (f'Computed in {display.elapsed:.0f} s by flex_planner {VERSION} on '
               f'{processes} processors ({platform.machine()}).')
     SIGNALS.check()
+    page.parent.mkdir(parents=True, exist_ok=True)
     write_text(page, document(sections, _PICTURES, remark))
     print(summary(sections))
     shown = '' if options.no_plot else f', pictures in {pictures}'

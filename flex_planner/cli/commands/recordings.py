@@ -106,6 +106,8 @@ def _report(options: argparse.Namespace) -> int:
     request = RecordedRequest.read(options.recording)
     check = _check(request) if options.check else None
     name = options.recording.resolve().name.removesuffix('.mcap')
+    if options.output is None:
+        _FOLDER.mkdir(exist_ok=True)
     output = options.output or _FOLDER / f'{name}.html'
     with SIGNALS.patient():
         write_report(output, request, check)
