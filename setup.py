@@ -48,9 +48,9 @@ setup(
     zip_safe=False,
     entry_points={
         'console_scripts': [
-            'planner = flex_planner.ros.start:planner',
-            'arm_simulator = flex_planner.ros.start:arm_simulator',
-            'replay = flex_planner.ros.start:replay',
+            'planner = flex_planner.ros.runtime.start:planner',
+            'arm_simulator = flex_planner.ros.runtime.start:arm_simulator',
+            'replay = flex_planner.ros.runtime.start:replay',
             'flex-planner = flex_planner.cli:main',
         ],
     },

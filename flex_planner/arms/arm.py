@@ -17,6 +17,7 @@ from flex_planner.arms.beam_eigenmodes import MAX_LOAD_RATIO, TipLoad
 from flex_planner.arms.mode_shapes import FAMILIES, LinkModes, mode_shapes
 from flex_planner.arms.quantities import check_quantity
 from flex_planner.base.errors import InvalidValueError
+from flex_planner.base.text import LONGEST_NAME, printable
 from flex_planner.base.validation import Array, integer, number, vector
 import numpy as np
 from numpy.typing import ArrayLike
@@ -211,7 +212,8 @@ class Arm:
     Parameters
     ----------
     name, source : str
-        Shown to people; `source` says where the numbers come from.
+        Shown to people; `source` says where the numbers come from. What would steer a terminal is
+        kept as escapes.
     links : tuple of Link
         1 to 8.
     joints : tuple of Joint
@@ -249,6 +251,8 @@ class Arm:
         if len(self.nodes) not in (0, n + 1):
             raise InvalidValueError('number of nodes', len(self.nodes),
                                     f'0 or {n + 1}, one per joint and one for the tip')
+        object.__setattr__(self, 'name', printable(self.name, LONGEST_NAME))
+        object.__setattr__(self, 'source', printable(self.source, keep='\n\t'))
         if not self.nodes:
             object.__setattr__(self, 'nodes', (Node(),) * (n + 1))
         gravity = vector('gravity', self.gravity, 2, unit='m/s^2')

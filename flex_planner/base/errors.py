@@ -7,9 +7,19 @@ Bad input raises; a numerical failure does not: it is a status of the plan.
 
 from __future__ import annotations
 
+from flex_planner.base.text import printable, shown_value
+
 
 class FlexPlannerError(Exception):
-    """Base of every exception that flex_planner raises on purpose."""
+    """
+    Base of every exception that flex_planner raises on purpose.
+
+    Its message is one line of bounded length that is safe to show, whatever names it repeats.
+
+    """
+
+    def __str__(self) -> str:
+        return printable(super().__str__())
 
 
 class InvalidValueError(FlexPlannerError, ValueError):
@@ -31,7 +41,7 @@ class InvalidValueError(FlexPlannerError, ValueError):
         self.field = field
         self.value = value
         self.bound = bound
-        shown = 'missing' if value is None else repr(value)
+        shown = 'missing' if value is None else shown_value(value)
         super().__init__(f'{field} is {shown}, but must be {bound}')
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 import ctypes
+from multiprocessing import resource_tracker
 import os
 import signal
 import threading
@@ -71,6 +72,29 @@ def _environment(changes: dict[str, str]) -> Iterator[None]:
     finally:
         os.environ.clear()
         os.environ.update(before)
+
+
+@contextmanager
+def deaf_to_interrupts(*, pool: bool = False) -> Iterator[None]:
+    """
+    Let processes that are started meanwhile, and their own, never get Ctrl-C.
+
+    A terminal sends it to all of them, also to those that have not begun to listen, but it is for
+    the first one alone, which ends the others. It gets it when the block ends.
+
+    Parameters
+    ----------
+    pool : bool
+        Whether multiprocessing starts them.
+
+    """
+    if pool:  # its tracker would unblock Ctrl-C for this thread as it starts
+        resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextmanager

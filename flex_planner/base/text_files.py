@@ -1,9 +1,16 @@
-"""Text files as they come: through pipes, from editors of other systems, too large, or no text."""
+"""
+Text files.
+
+They are read as they come: through pipes, from editors of other systems, too large, or no text.
+They are written whole or not at all.
+
+"""
 
 from __future__ import annotations
 
 import codecs
 from pathlib import Path
+import secrets
 import sys
 
 from flex_planner.base.errors import FlexPlannerError
@@ -41,6 +48,27 @@ def read_text(path: Path) -> str:
     if not text.strip():
         raise TextFileError(f'{say_file(path)}: cannot be read: it is empty')
     return text
+
+
+def write_text(path: Path, text: str) -> None:
+    """
+    Write a text as UTF-8, in place of an older file only when it is complete.
+
+    Halves of characters, which names of files may hold, are written as escapes.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written.
+
+    """
+    # not the whole name, which may be as long as names can be
+    draft = path.with_name(f'.{secrets.token_hex(8)}.partial')
+    try:
+        draft.write_text(text, encoding='utf-8', errors='backslashreplace')
+        draft.replace(path)
+    finally:
+        draft.unlink(missing_ok=True)
 
 
 def say_file(path: Path) -> str:

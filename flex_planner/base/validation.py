@@ -7,10 +7,13 @@ import math
 
 from flex_planner.base.errors import InvalidSizeError, InvalidValueError, NotFiniteError
 from flex_planner.base.sentences import count_of
+from flex_planner.base.text import printable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+
+_MOST_ENTRIES, _DEEPEST = 100_000, 8
 
 
 def number(
@@ -82,6 +85,27 @@ def integer(field: str, value: object, *, at_least: int, at_most: int) -> int:
     return int(value)
 
 
+def _entries(values: object, depth: int = 0) -> int:
+    """Return how many entries and lists a list has, or more than the most there may be."""
+    if not isinstance(values, (list, tuple)):
+        return 1
+    # NumPy would visit every entry, of which a file of one kilobyte can have billions
+    count = 1 if depth < _DEEPEST else _MOST_ENTRIES + 1
+    for entry in values:
+        if count > _MOST_ENTRIES:
+            break
+        count += _entries(entry, depth + 1)
+    return count
+
+
+def plain_names(field: str, names: Sequence[str]) -> None:
+    """Raise InvalidValueError unless all names can be shown as they are."""
+    for index, name in enumerate(names):
+        if printable(name) != name:
+            raise InvalidValueError(f'{field}[{index}]', name,
+                                    'a short text without control characters')
+
+
 def vector(
     field: str,
     values: ArrayLike,
@@ -122,6 +146,8 @@ def vector(
     sizes = (size,) if isinstance(size, int) else tuple(size)
     wanted = ' or '.join(str(entry) for entry in sizes)
     numbers = 'number' if sizes == (1,) else 'numbers'
+    if _entries(values) > _MOST_ENTRIES:
+        raise InvalidValueError(field, values, f'a list of {wanted} {numbers}')
     try:
         array = np.array(values, dtype=float)
     except (TypeError, ValueError, OverflowError):

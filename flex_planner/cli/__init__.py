@@ -2,61 +2,105 @@
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+import errno
 import sys
 
 from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.progress import StoppedError, StopReason
 from flex_planner.base.sentences import say_os_error
-from flex_planner.base.version import VERSION
-from flex_planner.cli.commands import arm, cache, compare, paper, plan, recordings
-from flex_planner.cli.commands import map as maps
-from flex_planner.cli.options import join_lists
-from flex_planner.cli.progress_line import CanceledError
+from flex_planner.base.streams import lasting_streams, LastingStream
+from flex_planner.cli.signals import CanceledError, SIGNALS
 
-_CANCELED = 130  # what a shell makes of a process that SIGINT ended
+# not worth a word: the reader of the output has seen enough
+_QUIET = (errno.EPIPE, errno.ESHUTDOWN)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """
     Run the console script.
 
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Default: those of the process, which ends afterwards.
+
     Returns
     -------
     int
-        Exit code: 0; 1 after a message on standard error; 130 if Ctrl-C was pressed.
+        Exit code: 0; 1 after a message on standard error; 130 if Ctrl-C was pressed, 128 and the
+        number of another signal that ended the work.
 
     """
     given = sys.argv[1:] if arguments is None else arguments
-    options = _parser().parse_args(join_lists(given))
-    try:
+
+    def command() -> int:
+        with SIGNALS.starting():
+            # here, so that Ctrl-C while they are loaded finds somebody
+            from flex_planner.cli.parser import parse
+        options = parse(given)
         return int(options.run(options))
-    except FlexPlannerError as error:
-        print(f'flex-planner: {error}', file=sys.stderr)
-        return 1
-    except OSError as error:
-        print(f'flex-planner: {say_os_error(error)}', file=sys.stderr)
-        return 1
-    except StoppedError as error:
-        print(f'flex-planner: {error}', file=sys.stderr)
-        return _CANCELED if error.reason is StopReason.CANCELED else 1
-    except (CanceledError, KeyboardInterrupt) as error:
-        print(f'flex-planner: {str(error) or "canceled"}', file=sys.stderr)
-        return _CANCELED
+
+    return run_command(command, ends=arguments is None)
 
 
-def _parser() -> argparse.ArgumentParser:
-    """Return the description of the command line."""
-    parser = argparse.ArgumentParser(
-        prog='flex-planner', description='Motion planning for flexible-link manipulators.')
-    parser.add_argument('--version', action='version', version=VERSION)
-    commands = parser.add_subparsers(required=True, metavar='COMMAND')
-    arm.add_command(commands)
-    plan.add_commands(commands)
-    compare.add_command(commands)
-    maps.add_command(commands)
-    paper.add_command(commands)
-    cache.add_command(commands)
-    recordings.add_commands(commands)
-    return parser
+def run_command(command: Callable[[], int], *, ends: bool = True) -> int:
+    """
+    Run a command, and say why it fails.
+
+    Parameters
+    ----------
+    command : callable
+        Returns an exit code.
+    ends : bool
+        Whether the process ends afterwards.
+
+    Returns
+    -------
+    int
+        Exit code, see `main`.
+
+    """
+    with lasting_streams() as (output, _), SIGNALS:
+        try:
+            code = _told(output, _run(command))
+        except SystemExit as end:  # after help, and what is wrong with a command line
+            raise SystemExit(_told(output, end.code if isinstance(end.code, int) else 1)) from None
+        if ends:
+            SIGNALS.ending(code)
+    return code
+
+
+def _run(command: Callable[[], int]) -> int:
+    """Return the exit code of a command, also of one that fails."""
+    try:
+        code = command()
+        SIGNALS.check()
+    except BaseException as error:
+        return _failed(error)
+    return code
+
+
+def _failed(error: BaseException) -> int:
+    """Say why a command ends; raise what is an error of the program."""
+    if SIGNALS.number and not isinstance(error, CanceledError):
+        return SIGNALS.tell()  # libraries make other exceptions of an interruption
+    if isinstance(error, KeyboardInterrupt):
+        return SIGNALS.tell()
+    if not isinstance(error, (FlexPlannerError, OSError, StoppedError, CanceledError)):
+        raise error
+    sentence = say_os_error(error) if isinstance(error, OSError) else error
+    print(f'flex-planner: {sentence}', file=sys.stderr)
+    canceled = isinstance(error, CanceledError) or (
+        isinstance(error, StoppedError) and error.reason is StopReason.CANCELED)
+    return SIGNALS.exit_code if canceled else 1
+
+
+def _told(output: LastingStream, code: int) -> int:
+    """Return the exit code; it is 1 where the results could not be told to the end."""
+    output.flush()
+    failure = output.failure
+    if failure is None or failure.errno in _QUIET:
+        return code
+    print(f'flex-planner: standard output failed: {failure.strerror or failure}', file=sys.stderr)
+    return code or 1

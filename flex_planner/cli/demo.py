@@ -1,207 +1,36 @@
-"""
-The paper's motion over real ROS 2: planned, published, carried out by a simulated arm, recorded.
-
-Korayem et al. 2009, section 5.2, with links of E I = 50 N m^2. Starts the planner and the
-simulator in processes of their own, and asks as any other node would.
-
-"""
+"""Run the demonstration: ``python -m flex_planner.cli.demo``."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+import os
 from pathlib import Path
 import sys
-import time
 
-from diagnostic_msgs.msg import DiagnosticArray
-from flex_planner.arms.arm import Arm
-from flex_planner.arms.arm_files import load_arm
-from flex_planner.base.validation import Array
-from flex_planner.cli.options import path_argument
-from flex_planner.optimal_control.task import postures_from_points
-from flex_planner.plotting import draw_motion, Execution, Motion
-from flex_planner.reports.motion import certificate_rows, joint_rows, planning_row, table
-from flex_planner.ros.messages.plans import duration_seconds
-from flex_planner.ros.planner.diagnostics import SUBSCRIBERS
-from flex_planner.ros.runtime.processes import NodeProcess
-from flex_planner_interfaces.msg import FlexibleTrajectory, MotionTask, PlanReport
-from flex_planner_interfaces.srv import PlanPath
-from geometry_msgs.msg import Point, PointStamped
-import numpy as np
-import rclpy
-from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
-from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64
-from trajectory_msgs.msg import JointTrajectory
-
-ARM = 'korayem_ei50'
-START, GOAL, ELBOW = (0.5, 0.0), (0.5, 0.5), -1
-PAYLOAD, DURATION = 1.0, 1.0
-SETTLING = 1.0  # [s], that the simulator watches the arm by default
-_LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+from flex_planner.cli import run_command
+from flex_planner.cli.signals import SIGNALS
 
 
-class DemoError(Exception):
-    """The demonstration cannot go on."""
+def main() -> int:
+    """Run the demonstration from the command line; return the exit code, as `cli.main`."""
+    return run_command(_demonstrate)
 
 
-class DemoClient(Node):  # type: ignore[misc]
-    """Asks for a plan, and listens to the controller's topic and to the arm."""
+def _demonstrate() -> int:
+    with SIGNALS.starting():
+        from flex_planner.cli.options import path_argument
 
-    def __init__(self) -> None:
-        super().__init__('flex_planner_demo')
-        self.arrived: list[tuple[int, JointTrajectory]] = []
-        self.states: list[JointState] = []
-        self.tips: list[PointStamped] = []
-        self.subscribers = 0  # of the trajectory, as the planner sees them
-        self.settled: list[Float64] = []
-        self.create_subscription(JointTrajectory, '/flex_planner/joint_trajectory',
-                                 self._on_trajectory, _LATCHED)
-        self.create_subscription(JointState, '/joint_states', self.states.append, 100)
-        self.create_subscription(PointStamped, '/arm_simulator/tip', self.tips.append, 100)
-        self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
-        self.create_subscription(Float64, '/arm_simulator/residual_vibration',
-                                 self.settled.append, _LATCHED)
-        self._planner = self.create_client(PlanPath, '/flex_planner/plan_path')
-
-    def _on_trajectory(self, trajectory: JointTrajectory) -> None:
-        self.arrived.append((self.get_clock().now().nanoseconds, trajectory))
-
-    def _on_diagnostics(self, message: DiagnosticArray) -> None:
-        for status in message.status:
-            for pair in status.values:
-                if pair.key == SUBSCRIBERS:
-                    self.subscribers = int(pair.value)
-
-    def wait(self, what: str, done: Callable[[], bool], limit: float) -> None:
-        """Spin until something is the case, or raise DemoError after a time [s]."""
-        end = time.monotonic() + limit
-        while not done():
-            if time.monotonic() > end:
-                raise DemoError(f'no {what} within {limit:g} s')
-            rclpy.spin_once(self, timeout_sec=0.05)
-
-    def wait_for_nodes(self) -> None:
-        """Wait for the planner's service, the simulator, and for them to know each other."""
-        self.wait('planner', self._planner.service_is_ready, 120)
-        self.wait('simulator', lambda: bool(self.states and self.tips), 120)
-        # what the planner does not know of yet would miss the trajectory
-        self.wait('connection', lambda: self.subscribers >= 2, 60)
-
-    def plan(self) -> tuple[PlanPath.Response, float]:
-        """Ask for the motion; return the answer and the time until it was on the topic [s]."""
-        task = MotionTask(
-            space=MotionTask.CARTESIAN, start_point=Point(x=START[0], y=START[1]),
-            goal_point=Point(x=GOAL[0], y=GOAL[1]), elbow=ELBOW, duration=DURATION,
-            payload_mass=PAYLOAD, effort_weights=[1 / 8, 1 / 8], publish=True)
-        began = self.get_clock().now().nanoseconds
-        future = self._planner.call_async(PlanPath.Request(task=task))
-        self.wait('answer', future.done, 60)
-        response = future.result()
-        if response.report.error_code != PlanReport.NONE:
-            raise DemoError(response.report.error_msg)
-        self.wait('trajectory on the topic', lambda: bool(self.arrived), 10)
-        return response, (self.arrived[0][0] - began) * 1e-9
-
-    def watch(self) -> Execution:
-        """Follow the arm until it says what was left of its motion, however late it is."""
-        began = self.arrived[0][0]
-        self.wait('motion', lambda: bool(self.settled), 60)
-
-        def since(message: JointState | PointStamped) -> float:
-            stamp = message.header.stamp
-            return float(stamp.sec * 10**9 + stamp.nanosec - began) * 1e-9
-
-        states = [state for state in self.states if since(state) >= 0]
-        tips = [tip for tip in self.tips if since(tip) >= 0]
-        return Execution(
-            times=np.array([since(state) for state in states]),
-            positions=np.array([state.position for state in states]),
-            speeds=np.array([state.velocity for state in states]),
-            torques=np.array([state.effort for state in states]),
-            tip_times=np.array([since(tip) for tip in tips]),
-            tip=np.array([(tip.point.x, tip.point.y) for tip in tips]))
-
-
-def motion_from_message(trajectory: FlexibleTrajectory) -> Motion:
-    """Return a trajectory message as arrays."""
-    joints, bending = trajectory.joint_trajectory.points, trajectory.points
-
-    def rows(points: list[object], field: str) -> Array:
-        return np.array([list(getattr(point, field)) for point in points])
-
-    times = [duration_seconds(point.time_from_start) for point in joints]
-    return Motion(
-        times=np.array(times),
-        coordinates=np.hstack([rows(joints, 'positions'), rows(bending, 'modal_displacements')]),
-        rates=np.hstack([rows(joints, 'velocities'), rows(bending, 'modal_rates')]),
-        torques=rows(joints, 'effort'),
-        tip=np.array([(point.x, point.y) for point in trajectory.tip_path]))
-
-
-def _table(arm: Arm, report: PlanReport, delay: float, execution: Execution,
-           files: dict[str, object]) -> str:
-    """Return the results of the demonstration, as lines of text."""
-    late = execution.tip[execution.tip_times > execution.tip_times[-1] - SETTLING / 2]
-    errors = np.linalg.norm(late - GOAL, axis=1) * 1e3
-    planning = duration_seconds(report.planning_time)
-    return table([
-        ('arm', arm.name),
-        ('motion', f'{START} m to {GOAL} m in {DURATION:g} s with {PAYLOAD:g} kg'),
-        planning_row(planning, report.strategy, f'{report.iterations} iterations',
-                     f'{report.mesh_intervals} intervals'),
-        *(('warning', sentence) for sentence in report.warnings),
-        ('on the topic after', f'{delay:.2f} s'),
-        ('cost J', f'{report.cost:.6f}'),
-        *joint_rows(report.peak_speeds, report.peak_speed_shares, report.peak_torques,
-                    report.peak_torque_shares),
-        *certificate_rows(report),
-        ('simulated arm, at rest', f'tip error {errors.max():.1e} mm, '
-                                   f'vibration {np.ptp(errors):.1e} mm'),
-        *((name, str(path)) for name, path in files.items())])
-
-
-def run(folder: Path) -> str:
-    """Run the demonstration, write into a folder, return the table."""
-    arm = load_arm(ARM)
-    start, _ = postures_from_points(arm, START, GOAL, ELBOW)
-    planner = NodeProcess('flex_planner.ros.planner.node',
-                          {'arm': ARM, 'recording_folder': folder / 'recordings'})
-    simulator = NodeProcess('flex_planner.ros.arm_simulator',
-                            {'arm': ARM, 'payload_mass': PAYLOAD,
-                             'initial_positions': start.tolist()},
-                            {'joint_trajectory': '/flex_planner/joint_trajectory'})
-    with planner, simulator:
-        client = DemoClient()
-        try:
-            client.wait_for_nodes()
-            response, delay = client.plan()
-            execution = client.watch()
-        finally:
-            client.destroy_node()
-    picture = folder / 'motion.png'
-    joint_names = list(response.trajectory.joint_trajectory.joint_names)
-    draw_motion(picture, arm, joint_names, motion_from_message(response.trajectory), execution)
-    return _table(arm, response.report, delay, execution,
-                  {'picture': picture, 'recording': response.report.recording})
-
-
-def main() -> None:
-    """Run the demonstration from the command line."""
-    parser = argparse.ArgumentParser(description=__doc__.strip().splitlines()[0])
-    parser.add_argument('--output', type=path_argument, default=Path('output'),
-                        help='folder for picture and recording (default: output)')
+    parser = argparse.ArgumentParser(
+        description='Plan a motion over ROS 2, and let a simulated arm carry it out.')
+    parser.add_argument('--output', type=path_argument, default=Path('output'), metavar='DIR',
+                        help='folder for all that is written (default: %(default)s)')
     folder = parser.parse_args().output.resolve()
-    rclpy.init()
-    try:
-        print(run(folder))
-    except DemoError as error:
-        sys.exit(f'flex_planner demo: {error}')
-    finally:
-        rclpy.try_shutdown()
+    os.environ.setdefault('ROS_LOG_DIR', str(folder / 'log'))
+    from flex_planner.cli.demonstration import demonstrate
+
+    demonstrate(folder)
+    return 0
 
 
 if __name__ == '__main__':
-    main()
+    sys.exit(main())

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from flex_planner.maps.tally import Tally
     import xarray as xr
 
-_SELDOM = 10.0  # [s], between two lines where there is no terminal
-_OFTEN = 0.1  # [s], on a terminal
 _BAR = 10
 
 
@@ -25,12 +23,11 @@ class MapDisplay(Display):
 
     def show(self, tally: Tally) -> None:
         """Show it, unless it was shown a moment ago."""
-        if self.elapsed > self._shown + (_OFTEN if self._terminal else _SELDOM):
+        if self.is_due():
             if self._terminal:
                 self._rewrite(progress_line(tally, bar=True))
             else:
-                self._shown = self.elapsed
-                self.begin(progress_line(tally))
+                self._add(progress_line(tally))
 
 
 def progress_line(tally: Tally, *, bar: bool = False) -> str:

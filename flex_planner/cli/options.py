@@ -64,6 +64,12 @@ def add_arm(parser: argparse.ArgumentParser) -> None:
                         f'{", ".join(sorted(preset_files()))}')
 
 
+def add_folder(parser: argparse.ArgumentParser, default: str = 'output') -> None:
+    """Add the folder that everything is written into."""
+    parser.add_argument('--output', type=path_argument, default=Path(default), metavar='DIR',
+                        help='folder for all that is written (default: %(default)s)')
+
+
 def numbers(option: str, text: str, sizes: int | Sequence[int] = (), unit: str = '', *,
             finite: bool = True) -> Array:
     """

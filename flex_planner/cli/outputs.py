@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 import os
 from pathlib import Path
@@ -11,10 +11,11 @@ import sys
 import tempfile
 from typing import TYPE_CHECKING
 
-from flex_planner.base.errors import InvalidValueError, RecordingError
+from flex_planner.base.errors import FlexPlannerError, InvalidValueError, RecordingError
 from flex_planner.base.paths import file_stem
 from flex_planner.capacity.results import MaxPayload
-from flex_planner.cli.options import path_argument
+from flex_planner.cli.options import add_folder
+from flex_planner.cli.pictures import drawn
 from flex_planner.cli.request import Request
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.sampling import SampledPlan
@@ -68,41 +69,64 @@ class Outputs:
                    recorder=_recorder(request, options.output) if records else None)
 
     def write_plan(self, plan: Plan, reference: SampledPlan | None) -> Iterator[Row]:
-        """Write pictures and recording of a plan; yield names and paths as they are written."""
-        if self.draws and plan.solved:
-            yield self._draw_motion(plan)
-        if self.recorder is not None:
-            yield 'recording', str(self.recorder.record_plan(plan, reference))
+        """Write recording and picture of a plan; yield names and paths as they are written."""
+        recorder = self.recorder
+        yield from self._write(
+            (lambda: recorder.record_plan(plan, reference)) if recorder else None,
+            self._draw_motion(plan, 'motion') if plan.solved else iter(()))
 
     def write_search(self, found: MaxPayload, accuracy: float, step: float,
                      reference: SampledPlan | None) -> Iterator[Row]:
-        """Write pictures and recording of a search, see `write_plan`."""
+        """Write recording and pictures of a search, see `write_plan`."""
+        recorder = self.recorder
+        yield from self._write(
+            (lambda: recorder.record_search(found, accuracy, step, reference)) if recorder
+            else None, self._draw_search(found))
+
+    def _write(self, record: Callable[[], Path] | None, pictures: Iterator[Row]) -> Iterator[Row]:
+        """Record, then draw; a recording that fails is told when the pictures are drawn."""
+        failure: Exception | None = None
+        if record is not None:
+            try:
+                yield 'recording', str(record())
+            except (FlexPlannerError, OSError) as error:
+                failure = error
+        if self.draws:
+            yield from pictures
+        if self.draws or record is not None:
+            yield 'output folder', str(self.folder)
+        if failure is not None:
+            raise failure
+
+    def _draw_search(self, found: MaxPayload) -> Iterator[Row]:
+        """Draw a search and the motion with the largest payload."""
         solved = found.plan if found.plan is not None and found.plan.solved else None
-        if self.draws and (solved or found.front.payloads.size or found.trials):
+
+        def draw(path: Path) -> None:
             from flex_planner.plotting import draw_max_payload
 
-            path = self.folder / f'{self.stem}_max_payload.png'
             draw_max_payload(path, found, _joint_names(found.task.arm.n_joints),
                              _fine_motion(solved) if solved else None)
-            yield 'picture of the search', str(path)
-        if self.draws and solved:
-            yield self._draw_motion(solved)
-        if self.recorder is not None:
-            yield 'recording', str(self.recorder.record_search(found, accuracy, step, reference))
 
-    def _draw_motion(self, plan: Plan) -> Row:
+        if solved or found.front.payloads.size or found.trials:
+            yield from drawn('picture of the search', self.folder / f'{self.stem}_max_payload.png',
+                             draw)
+        if solved:
+            yield from self._draw_motion(solved, 'max_payload_motion')
+
+    def _draw_motion(self, plan: Plan, name: str) -> Iterator[Row]:
         """Draw the motion of a plan."""
-        from flex_planner.plotting import draw_motion
+        def draw(path: Path) -> None:
+            from flex_planner.plotting import draw_motion
 
-        path = self.folder / f'{self.stem}_motion.png'
-        draw_motion(path, plan.arm, _joint_names(plan.arm.n_joints), _fine_motion(plan))
-        return 'picture of the motion', str(path)
+            draw_motion(path, plan.arm, _joint_names(plan.arm.n_joints), _fine_motion(plan))
+
+        yield from drawn('picture of the motion', self.folder / f'{self.stem}_{name}.png', draw)
 
 
 def add_outputs(parser: argparse.ArgumentParser) -> None:
     """Add the options for what is written."""
-    parser.add_argument('--output', type=path_argument, default=Path('output'), metavar='DIR',
-                        help='folder for pictures and recordings (default: output)')
+    add_folder(parser)
     parser.add_argument('--no-plot', action='store_true', help='draw nothing')
     parser.add_argument('--no-recording', action='store_true', help='record nothing')
 

@@ -29,7 +29,7 @@ from flex_planner.planning.point_times import MAX_SAMPLES
 from flex_planner.planning.sampling import SamplingSettings
 import numpy as np
 
-MAX_TIME_LIMIT = 3600.0
+MAX_TIME_LIMIT, _TIME_LIMIT = 3600.0, 60.0  # [s]
 # names of the core that are not those of options, which have - for _
 _POINTS = {'start_point': '--from', 'goal_point': '--to'}
 _ANGLES = {'start_positions': '--from-angles', 'goal_positions': '--to-angles'}
@@ -138,8 +138,8 @@ def add_task(parser: argparse.ArgumentParser, payload: str) -> None:
         help='largest allowed half squared error of the final state, eq. (17) (default: 0.001)')
     add('--allow-large-bending', action='store_true',
         help='accept links that bend by more than 0.3 of their length, though beams are linear')
-    add('--time-limit', type=number_argument, default=MAX_TIME_LIMIT, metavar='S',
-        help='give up after this time (default and maximum: %(default)g)')
+    add('--time-limit', type=number_argument, default=_TIME_LIMIT, metavar='S',
+        help=f'give up after this time (default: %(default)g, at most {MAX_TIME_LIMIT:g})')
 
 
 def add_objectives(parser: argparse.ArgumentParser) -> None:

@@ -119,7 +119,7 @@ def _rising(field: str, values: object) -> Array:
     # numpy would take true for 1 and '1' for 1
     if not isinstance(values, np.ndarray) and (
             not isinstance(values, Sequence)
-            or any(isinstance(entry, (bool, str)) for entry in values)):
+            or any(isinstance(entry, (bool, str, list, tuple, dict)) for entry in values)):
         raise InvalidValueError(field, values, wanted)
     try:
         array = np.array(values, dtype=float)

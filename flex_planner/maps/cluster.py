@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 import logging
-import signal
 
 import dask
 from dask.system import CPU_COUNT
-from distributed import Client, LocalCluster, Worker, WorkerPlugin
+from distributed import Client, LocalCluster
 from distributed.system import MEMORY_LIMIT
-from flex_planner.base.errors import FlexPlannerError
-from flex_planner.base.processes import one_thread_each
+from flex_planner.base.errors import FlexPlannerError, InvalidValueError
+from flex_planner.base.processes import deaf_to_interrupts, one_thread_each
+from flex_planner.maps.addresses import greet
 
 ATTEMPTS = 3  # at a block that ends its process, or raises
 LOST = 'the scheduler was lost; finished blocks are kept, and are not computed again'
-_CONNECTING = 10.0  # [s]
+_GREETING, _CONNECTING = 5.0, 10.0  # [s]
 _CLOSING = 5.0  # [s]
 _SHARE = 0.9  # of the memory, for all workers together
 _ANY_PORT = '127.0.0.1:0'  # of the scheduler's pages; Dask warns if its own is another map's
@@ -34,14 +34,6 @@ _NOISY = ('distributed', 'distributed.client', 'tornado.application')
 
 class ClusterError(FlexPlannerError):
     """The processes that should compute a map cannot be had, or are lost."""
-
-
-class _KeepOnInterrupt(WorkerPlugin):  # type: ignore[misc]
-    """Leaves it to the client what Ctrl-C does: a terminal sends it to every process."""
-
-    def setup(self, worker: Worker) -> None:
-        """Ignore it."""
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 @contextmanager
@@ -62,15 +54,16 @@ def local_cluster(workers: int) -> Iterator[Client]:
     """
     with _quiet(), one_thread_each(), dask.config.set(_SETTINGS):
         try:
-            cluster = LocalCluster(
-                n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None,
-                scheduler_kwargs={'dashboard_address': _ANY_PORT},
-                memory_limit=int(_SHARE * MEMORY_LIMIT / workers), silence_logs=logging.CRITICAL)
+            with deaf_to_interrupts(pool=True):
+                cluster = LocalCluster(
+                    n_workers=workers, threads_per_worker=1, processes=True,
+                    dashboard_address=None, scheduler_kwargs={'dashboard_address': _ANY_PORT},
+                    memory_limit=int(_SHARE * MEMORY_LIMIT / workers),
+                    silence_logs=logging.CRITICAL)
         except (OSError, RuntimeError) as error:
             raise ClusterError(f'cannot start {workers} processes: {error}') from error
         try:
             with Client(cluster, set_as_default=False) as client:
-                client.register_plugin(_KeepOnInterrupt())
                 yield client
         finally:
             cluster.close(timeout=_CLOSING)
@@ -90,13 +83,19 @@ def remote_cluster(address: str) -> Iterator[Client]:
     ------
     ClusterError
         If it does not answer, or has no workers.
+    InvalidValueError
+        If it is no address.
 
     """
     with _quiet():
         try:
+            greet(address, _GREETING)
             client = Client(address, timeout=_CONNECTING, set_as_default=False)
-        except (OSError, ValueError, TimeoutError) as error:
-            raise ClusterError(f'no scheduler answers at {address}: {error}') from error
+        except InvalidValueError:
+            raise
+        except Exception as error:  # of any kind where another program answers
+            reason = str(error) or type(error).__name__
+            raise ClusterError(f'no scheduler answers at {address}: {reason}') from error
         with client:
             try:
                 client.wait_for_workers(1, timeout=_CONNECTING)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import plain_arm
+from flex_planner.base.text import printable
 from flex_planner.base.yaml_text import format_yaml, parse_yaml, YamlTextError
 from flex_planner.maps.cell_results import CellCode
 from flex_planner.maps.kept_motions import distances, KeptMotion, signature
@@ -115,7 +116,7 @@ class MapStarts:
         """Return a cell in words."""
         values = ', '.join(f'{name} = {self._value(name, k)}'
                            for name, k in zip(self._stored.axes, index, strict=True))
-        return f'{values} of {self._path.name}'
+        return f'{values} of {printable(self._path.name)}'
 
     def _value(self, name: str, k: int) -> str:
         """Return a value of an axis with its unit."""

@@ -18,6 +18,7 @@ from flex_planner.base.errors import (
     UnreachableError,
 )
 from flex_planner.base.paths import expand_path, PathError
+from flex_planner.base.text import LONGEST_NAME, printable
 from flex_planner.base.text_files import say_file
 from flex_planner.base.validation import Array, integer, number
 from flex_planner.base.yaml_files import read_yaml, YamlFileError, YamlSection
@@ -92,6 +93,7 @@ class Study:
     _near: Array | None = field(init=False, default=None, repr=False)
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, 'name', printable(self.name, LONGEST_NAME))
         check_motors(self.quantity, self.arm)
         check_axes(self.quantity, self.arm, self.axes)
         for end in self.motion.ends:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+import logging
 import multiprocessing
 from pathlib import Path
-import signal
 import time
 from typing import Protocol
 
-from flex_planner.base.processes import one_thread_each
+from flex_planner.base.processes import deaf_to_interrupts, one_thread_each
 from flex_planner.base.progress import StoppedError, StopReason
 from flex_planner.paper.evidence import Section
 from flex_planner.paper.sections import (
@@ -40,6 +40,7 @@ STUDIES: dict[str, SectionStudy] = {
 _LONGEST = ('6.2', '6.1', '6.4')
 _OFTEN, _PATIENCE = 0.1, 2.0  # [s], between two looks at Ctrl-C; until a process is killed
 Report = Callable[[str, int, int], None]
+_LOG = logging.getLogger(__name__)
 
 
 def compute_sections(keys: Sequence[str], *, reduced: bool, processes: int, report: Report,
@@ -85,10 +86,10 @@ def _compute_each(keys: Sequence[str], reduced: bool, processes: int, pictures: 
     """Yield sections as they are done."""
     order = sorted(keys, key=lambda key: key not in _LONGEST)
     context = multiprocessing.get_context('spawn')
-    # Ctrl-C in a terminal reaches all processes, and is for the first one alone
-    pool = ProcessPoolExecutor(processes, context, signal.signal, (signal.SIGINT, signal.SIG_IGN))
+    pool = ProcessPoolExecutor(processes, context)
     with one_thread_each(), pool:
-        jobs = {pool.submit(_compute_section, key, reduced, pictures): key for key in order}
+        with deaf_to_interrupts(pool=True):
+            jobs = {pool.submit(_compute_section, key, reduced, pictures): key for key in order}
         try:
             left: set[Future[Section]] = set(jobs)
             while left:
@@ -117,8 +118,11 @@ def _end_children() -> None:
 def _compute_section(key: str, reduced: bool, pictures: Path | None) -> Section:
     section = STUDIES[key](reduced=reduced)
     if pictures is not None:
-        from flex_planner.plotting.panels import draw_picture
+        try:
+            from flex_planner.plotting.panels import draw_picture
 
-        for picture in section.pictures:
-            draw_picture(pictures, picture)
+            for picture in section.pictures:
+                draw_picture(pictures, picture)
+        except Exception as error:  # the numbers are there
+            _LOG.warning('section %s has no pictures: %s', key, error)
     return section

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from flex_planner.plotting import backend  # noqa: F401 - before the others load Matplotlib
 from flex_planner.plotting.comparison import draw_comparison
 from flex_planner.plotting.modes import draw_mode_shapes
 from flex_planner.plotting.motion import draw_motion, Execution, Motion

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from flex_planner.base.validation import Array
-from flex_planner.plotting.figures import finish, save, say
+from flex_planner.plotting.figures import finish, plain, save, say
 from flex_planner.simulation.comparison import Comparison
 from flex_planner.simulation.execution import ExecutionMode, ExecutionResult
 from matplotlib.axes import Axes
@@ -48,7 +48,7 @@ def draw_comparison(path: Path, comparison: Comparison) -> None:
     if results:
         handles, labels = distance.get_legend_handles_labels()
         figure.legend(handles, labels, loc='outside lower center', ncols=len(results))
-    figure.suptitle(f'{comparison.flexible.arm.name}: one task, planned and carried out in '
+    figure.suptitle(f'{plain(comparison.flexible.arm.name)}: one task, planned and carried out in '
                     f'{len(results)} modes')
     save(figure, path)
 

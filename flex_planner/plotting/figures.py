@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
 import secrets
+import warnings
 
+from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.paths import expand_path
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -21,6 +24,11 @@ def finish(axes: Axes, title: str, y_label: str, x_label: str = 'time [s]', *,
         axes.legend(fontsize='small', loc=legend, ncols=columns)
 
 
+def plain(text: str) -> str:
+    """Return a text from outside that Matplotlib takes for no formula."""
+    return text.replace('$', r'\$')
+
+
 def say(axes: Axes, text: str) -> None:
     """Write a remark into a diagram that has nothing to show."""
     axes.text(0.5, 0.5, text, transform=axes.transAxes, ha='center')
@@ -32,15 +40,26 @@ def save(figure: Figure, path: Path) -> None:
 
     Raises
     ------
+    InvalidValueError
+        If its name ends like that of no kind of picture.
     OSError
         If it cannot be written, naming the path.
 
     """
     path = expand_path(path)
+    kind = path.suffix[1:].lower() or 'png'
+    if kind not in figure.canvas.get_supported_filetypes():
+        raise InvalidValueError('the picture', str(path), 'named like a picture, NAME.png')
     path.parent.mkdir(parents=True, exist_ok=True)
-    stage = path.with_name(f'.{secrets.token_hex(8)}.{path.name}')
+    # not the whole name, which may be as long as names can be
+    stage = path.with_name(f'.{secrets.token_hex(8)}.{kind}')
+    drawn = BytesIO()  # drawing takes much longer than writing
     try:
-        figure.savefig(stage, dpi=_DPI)
+        with warnings.catch_warnings():
+            # letters that the font lacks are drawn as boxes, which is seen
+            warnings.filterwarnings('ignore', message='Glyph .* missing from')
+            figure.savefig(drawn, dpi=_DPI, format=kind)
+        stage.write_bytes(drawn.getvalue())
         stage.replace(path)
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(path)) from error

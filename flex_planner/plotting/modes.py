@@ -10,7 +10,7 @@ from flex_planner.base.validation import Array
 from flex_planner.dynamics.statics import equilibrium, natural_modes
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.parameters import Parameters
-from flex_planner.plotting.figures import finish, save
+from flex_planner.plotting.figures import finish, plain, save
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 import numpy as np
@@ -48,7 +48,7 @@ def draw_mode_shapes(path: Path, model: ArmModel, posture: Array, payload_mass: 
         _draw_link_shapes(axes, arm, i)
     for k, axes in enumerate(np.atleast_1d(bottom.subplots(1, shown))):
         _draw_natural_mode(axes, arm, rest, vectors[:, k], frequencies[k])
-    figure.suptitle(f'{arm.name}, payload {payload_mass:g} kg')
+    figure.suptitle(f'{plain(arm.name)}, payload {payload_mass:g} kg')
     save(figure, path)
 
 

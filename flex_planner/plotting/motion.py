@@ -11,7 +11,7 @@ from flex_planner.arms.kinematics import link_points
 from flex_planner.base.validation import Array
 from flex_planner.optimal_control.torque_limits import TorqueLimits
 from flex_planner.planning.plan import Samples
-from flex_planner.plotting.figures import finish, save, say
+from flex_planner.plotting.figures import finish, plain, save, say
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 import numpy as np
@@ -109,14 +109,14 @@ def draw_motion(path: Path, arm: Arm, joint_names: Sequence[str], motion: Motion
     draw_tip(axes[1, 0], arm, motion, execution)
     _draw_modes(axes[1, 1], arm, motion)
     _draw_distance(axes[1, 2], motion, execution)
-    figure.suptitle(arm.name)
+    figure.suptitle(plain(arm.name))
     save(figure, path)
 
 
 def _draw_joints(axes: Axes, title: str, label: str, names: Sequence[str], times: Array,
                  values: Array, done: tuple[Array, Array] | None) -> None:
     """Draw one line per joint, and the simulated motion."""
-    for i, name in enumerate(names):
+    for i, name in enumerate(map(plain, names)):
         axes.plot(times, values[:, i], color=f'C{i}', label=name)
         if done is not None:
             axes.plot(done[0], done[1][:, i], '--', color=f'C{i}', alpha=0.6,

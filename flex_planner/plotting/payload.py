@@ -7,7 +7,7 @@ from pathlib import Path
 
 from flex_planner.base.validation import Array
 from flex_planner.capacity.results import MaxPayload, PayloadMethod
-from flex_planner.plotting.figures import finish, save, say
+from flex_planner.plotting.figures import finish, plain, save, say
 from flex_planner.plotting.motion import draw_tip, draw_torques, Motion
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -48,7 +48,7 @@ def draw_max_payload(path: Path, found: MaxPayload, joint_names: Sequence[str],
     if motion is not None:
         draw_torques(axes[1, 0], found.task.arm, joint_names, motion)
         draw_tip(axes[1, 1], found.task.arm, motion)
-    figure.suptitle(f'{found.task.arm.name}\n{_result(found)}')
+    figure.suptitle(f'{plain(found.task.arm.name)}\n{_result(found)}')
     save(figure, path)
 
 

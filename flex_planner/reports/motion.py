@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+import sys
 
+from flex_planner.base.text import printable
 from flex_planner.capacity.results import MaxPayload
 from flex_planner.planning.certificate import Certificate
 from flex_planner.planning.kinds.clusters import KindOfMotion
@@ -17,8 +19,8 @@ _NAMES = 26
 
 
 def table(rows: Iterable[Row]) -> str:
-    """Return names and values as lines of text."""
-    return '\n'.join(f'{name:<{_NAMES}} {value}' for name, value in rows)
+    """Return names and values as lines of text, a line each."""
+    return '\n'.join(f'{name:<{_NAMES}} {printable(value, sys.maxsize)}' for name, value in rows)
 
 
 def columns(names: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

@@ -7,6 +7,7 @@ import time
 
 from builtin_interfaces.msg import Time
 from flex_planner.arms.kinematics import tip_position
+from flex_planner.base.text import printable
 from flex_planner.base.validation import Array
 from flex_planner.control.joint_reference import JointReference
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
@@ -90,7 +91,7 @@ class ArmSimulator(Node):  # type: ignore[misc]
         self._advance()  # first, so that the motion begins when its trajectory came
         refusal = self._refusal(trajectory)
         if refusal:
-            self.get_logger().error(f'trajectory refused: {refusal}')
+            self.get_logger().error(printable(f'trajectory refused: {refusal}'))
             return
         reference = _reference(trajectory, self._settings.joint_names)
         self._plant.follow(reference.after(*self._plant.joint_state, self._plant.torque))

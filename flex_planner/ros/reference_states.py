@@ -274,7 +274,8 @@ def main() -> None:
         clock.close()
     # Fast DDS may spin without end where it leaves while another one does (its issue 6513)
     time.sleep(_AFTER_YOU)
-    faulthandler.dump_traceback_later(_LAST_RESORT, exit=True)
+    nowhere = os.open(os.devnull, os.O_WRONLY)  # open to the end
+    faulthandler.dump_traceback_later(_LAST_RESORT, exit=True, file=nowhere)
     node.destroy_node()
     rclpy.try_shutdown()
 

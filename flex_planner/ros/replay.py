@@ -11,6 +11,7 @@ from typing import Any
 
 from flex_planner.base.errors import FlexPlannerError, InvalidValueError, RecordingError
 from flex_planner.base.paths import expand_path
+from flex_planner.base.text import printable
 from flex_planner.recording import (
     check_encoding,
     Decoder,
@@ -95,7 +96,7 @@ class Replay(Node):  # type: ignore[misc]
             self.get_logger().warning(f'left out: {channel}')
         self._outlets = self._publish_topics(metadata.topics)
         self.get_logger().info(
-            f'replaying {self._path}: {len(self._outlets)} topics, '
+            f'replaying {printable(str(self._path))}: {len(self._outlets)} topics, '
             f'{(metadata.end_ns - self._first_ns) * 1e-9 / self._settings.rate:.3g} s')
         self._begin = time.monotonic() + self._settings.delay
         self._sent, self._messages = 0, self._passes()
@@ -116,7 +117,7 @@ class Replay(Node):  # type: ignore[misc]
                 outlets[topic.name] = self.create_publisher(kind, topic.name, _profile(topic.qos))
                 self._kinds[topic.name] = topic.type_name
             except Exception as error:  # also whatever the middleware has against a topic
-                self.get_logger().warning(f'{topic.name} is left out: {error}')
+                self.get_logger().warning(printable(f'{topic.name} is left out: {error}'))
         if not outlets:
             raise RecordingError(f'{self._path} holds no messages that could be published')
         return outlets

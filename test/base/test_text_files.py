@@ -1,4 +1,4 @@
-"""Files as they come: of other systems, through pipes, and what is no text at all."""
+"""Files as they come, also through pipes or without any text, and as they are written."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import socket
 import sys
 import threading
 
-from flex_planner.base.text_files import MAX_BYTES, read_text, TextFileError
+from flex_planner.base.text_files import MAX_BYTES, read_text, TextFileError, write_text
 import pytest
 
 TEXT = 'name: Größe 🦾\nlinks: []\n'
@@ -70,3 +70,17 @@ def test_closed_standard_input_gets_a_sentence(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(sys, 'stdin', None)
     with pytest.raises(TextFileError, match='^the standard input: cannot be read: it is closed'):
         read_text(Path('-'))
+
+
+def test_text_is_utf_8_whatever_it_holds(tmp_path: Path) -> None:
+    path = tmp_path / ('n' * 250)
+    write_text(path, 'λ \udcff')
+    assert path.read_bytes() == 'λ '.encode() + rb'\udcff'
+
+
+def test_older_text_stays_where_the_new_one_is_not_complete(tmp_path: Path) -> None:
+    path = tmp_path / 'text'
+    write_text(path, 'old')
+    with pytest.raises(TypeError):
+        write_text(path, 3)  # type: ignore[arg-type]
+    assert [(file.name, file.read_text()) for file in tmp_path.iterdir()] == [('text', 'old')]

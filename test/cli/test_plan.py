@@ -224,7 +224,7 @@ def test_largest_payload_is_told_with_its_bracket_and_front(searched: Outcome) -
 
 
 def test_search_is_drawn_and_recorded(searched: Outcome, folder: Path) -> None:
-    for name, file in (('search', 'max_payload'), ('motion', 'motion')):
+    for name, file in (('search', 'max_payload'), ('motion', 'max_payload_motion')):
         assert searched.rows[f'picture of the {name}'] == str(folder / f'korayem_rigid_{file}.png')
         assert is_picture(searched.rows[f'picture of the {name}'])
     found = recorded(searched.rows['recording'])
@@ -251,7 +251,7 @@ def test_payloads_tried_are_told_and_recorded(raised: Outcome) -> None:
 def test_nothing_is_left_beside_pictures_and_recordings(
         planned: Outcome, searched: Outcome, raised: Outcome, folder: Path) -> None:
     assert sorted(path.name for path in folder.iterdir()) == [
-        'korayem_rigid_max_payload.png', 'korayem_rigid_motion.png', 'recordings']
+        'korayem_rigid_max_payload.png', 'korayem_rigid_max_payload_motion.png', 'recordings']
     kinds = sorted(path.name.split('_2')[0] for path in (folder / 'recordings').iterdir())
     assert kinds == ['find_max_payload', 'find_max_payload', 'plan_path']
 
@@ -303,7 +303,8 @@ def test_nothing_is_written_if_told_so(tmp_path: Path, monkeypatch: pytest.Monke
 @pytest.mark.parametrize('command', ['plan', 'payload'])
 def test_impossible_payload_is_a_failure_that_is_told_and_recorded(command: str,
                                                                    tmp_path: Path) -> None:
-    outcome = run(command, 'korayem_rigid', *MOTION, '--payload', '7', '--output', str(tmp_path))
+    outcome = run(command, 'korayem_rigid', *MOTION, '--payload', '7', '--output', str(tmp_path),
+                  '--time-limit', '600')
     assert outcome.code == 1
     # the motors' power of 14 W proves it from some 50 kg on; 7 kg is only not found
     assert outcome.reason.startswith('flex-planner: no motion found: ')

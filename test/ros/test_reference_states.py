@@ -243,9 +243,7 @@ def test_process_that_spins_while_it_leaves_is_ended_by_force() -> None:
     hung = subprocess.run([sys.executable, '-c', SPINNING, 'hung_states', '/', '/hung'],
                           stdin=subprocess.DEVNULL, capture_output=True, check=False, text=True,
                           timeout=60)
-    assert hung.returncode == 1
-    assert hung.stderr.startswith('Timeout (')
-    assert 'in main' in hung.stderr  # where it was
+    assert (hung.returncode, hung.stderr) == (1, '')
 
 
 def test_states_that_were_due_before_a_plan_came_are_left_out(plan_of: PlanFactory) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 import re
 
-from flex_planner.cli import demo
+from flex_planner.cli import demonstration
 from flex_planner_interfaces.srv import PlanPath
 import pytest
 import rclpy
@@ -28,7 +28,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope='module')
 def table(folder: Path, ros: None) -> dict[str, str]:
-    rows = [re.split(' {2,}', line.strip(), maxsplit=1) for line in demo.run(folder).splitlines()]
+    rows = [re.split(' {2,}', line.strip(), maxsplit=1)
+            for line in demonstration.run(folder).splitlines()]
     return {row[0]: row[1] for row in rows}
 
 
@@ -37,7 +38,7 @@ def test_table_shows_motion_certificate_and_files(table: dict[str, str]) -> None
         'arm', 'motion', 'planned in', 'warning', 'on the topic after', 'cost J', 'joint 1',
         'joint 2', 'certificate', 'collocation residual', 'boundary error (eq. 17)',
         'Hamiltonian drift', 're-simulated tip error', 'residual vibration',
-        'simulated arm, at rest', 'picture', 'recording']
+        'simulated arm, at rest', 'picture', 'recording', 'output folder']
     assert table['arm'] == 'Korayem 2009 two-link arm, EI = 50 N m^2'
     assert table['motion'] == '(0.5, 0.0) m to (0.5, 0.5) m in 1 s with 1 kg'
     assert float(table['cost J']) == pytest.approx(0.64717, abs=1e-4)
@@ -63,9 +64,9 @@ def test_picture_and_recording_are_in_the_folder(table: dict[str, str], folder: 
 
 
 def test_demonstration_waits_for_nodes_with_a_limit(ros: None) -> None:
-    client = demo.DemoClient()
+    client = demonstration.DemoClient()
     try:
-        with pytest.raises(demo.DemoError, match='no planner within 0.1 s'):
+        with pytest.raises(demonstration.DemoError, match='no planner within 0.1 s'):
             client.wait('planner', client.create_client(PlanPath, '/absent').service_is_ready, 0.1)
     finally:
         client.destroy_node()

@@ -10,11 +10,13 @@ from flex_planner.base.paths import file_stem
 from flex_planner.base.validation import number
 from flex_planner.cli.options import (
     add_arm,
+    add_folder,
     angles,
     Commands,
     number_argument,
     path_argument,
 )
+from flex_planner.cli.pictures import drawn, print_files
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.task import MAX_PAYLOAD
 from flex_planner.reports.arm import describe_arm, standard_postures
@@ -31,7 +33,8 @@ def add_command(commands: Commands) -> None:
                         help='joint angles for frequencies and deflections; may be repeated '
                         '(default: stretched, and bent by 90 degrees)')
     parser.add_argument('--plot', type=path_argument, metavar='PNG',
-                        help='picture of the mode shapes (default: <arm>_modes.png)')
+                        help='picture of the mode shapes (default: DIR/<arm>_modes.png)')
+    add_folder(parser)
     parser.add_argument('--no-plot', action='store_true', help='draw nothing')
     parser.set_defaults(run=_run)
 
@@ -44,12 +47,16 @@ def _run(options: argparse.Namespace) -> int:
                 if options.posture else standard_postures(arm))
     model = ArmModel(arm)
     text = describe_arm(model, postures, payload)
+    print(text, flush=True)
     if options.no_plot or not arm.n_modes:
-        print(text)
         return 0
-    from flex_planner.plotting import draw_mode_shapes
 
-    path = options.plot or Path(f'{file_stem(options.arm)}_modes.png')
-    draw_mode_shapes(path, model, postures[-1], payload)
-    print(f'{text}\n\nmode shapes: {path}')
-    return 0
+    def draw(path: Path) -> None:
+        from flex_planner.plotting import draw_mode_shapes
+
+        draw_mode_shapes(path, model, postures[-1], payload)
+
+    print()
+    path = options.plot or options.output / f'{file_stem(options.arm)}_modes.png'
+    count = print_files(drawn('mode shapes', path, draw))
+    return 1 if options.plot and not count else 0

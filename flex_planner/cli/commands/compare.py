@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
 from pathlib import Path
 import sys
 
 from flex_planner.base.paths import file_stem
 from flex_planner.base.progress import Monitor
 from flex_planner.cli.options import (
+    add_folder,
     Commands,
     integer_argument,
     number_argument,
     numbers,
-    path_argument,
 )
 from flex_planner.cli.outputs import check_folder
+from flex_planner.cli.pictures import drawn, print_files
 from flex_planner.cli.progress_line import run_with_progress
 from flex_planner.cli.request import add_task, Request, say_failure, translate_errors
 from flex_planner.control.joint_controller import Gains
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.reports.comparison import comparison_rows, comparison_table
-from flex_planner.reports.motion import table
+from flex_planner.reports.motion import Row, table
 from flex_planner.simulation.comparison import compare, Comparison
 from flex_planner.simulation.mismatch import Mismatch
 import numpy as np
@@ -53,8 +55,7 @@ def add_command(commands: Commands) -> None:
         help='rate of the joint controller (default: %(default)g)')
     add('--settling', type=number_argument, default=1.0, metavar='S',
         help='time to watch the arm after its arrival (default: %(default)g)')
-    add('--output', type=path_argument, default=Path('output'), metavar='DIR',
-        help='folder for the picture (default: output)')
+    add_folder(parser)
     add('--no-plot', action='store_true', help='draw nothing')
     parser.set_defaults(run=_compare)
 
@@ -78,16 +79,23 @@ def _compare(options: argparse.Namespace) -> int:
                  *comparison_rows(found)]))
     print(f'\n{comparison_table(found)}\n')
     if not options.no_plot and found.results:
-        from flex_planner.plotting import draw_comparison
-
-        path = options.output / f'{file_stem(options.arm)}_comparison.png'
-        draw_comparison(path, found)
-        print(table([('picture', str(path))]))
+        print_files(_draw(options, found))
     if not found.solved:
         failed = found.rigid if found.flexible.solved else found.flexible
         print(f'flex-planner: {failed.arm.name}: '
               f'{say_failure(failed, request.time_limit)}', file=sys.stderr)
     return 0 if found.solved else 1
+
+
+def _draw(options: argparse.Namespace, found: Comparison) -> Iterator[Row]:
+    """Draw the results."""
+    def draw(path: Path) -> None:
+        from flex_planner.plotting import draw_comparison
+
+        draw_comparison(path, found)
+
+    yield from drawn('picture', options.output / f'{file_stem(options.arm)}_comparison.png', draw)
+    yield 'output folder', str(options.output)
 
 
 def _mismatch(options: argparse.Namespace) -> Mismatch:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
 from pathlib import Path
 import sys
 from typing import TYPE_CHECKING
@@ -12,9 +13,11 @@ from flex_planner.base.paths import file_stem
 from flex_planner.base.validation import integer
 from flex_planner.cli.map_progress import MapDisplay, outcome_rows
 from flex_planner.cli.options import Commands, integer_argument, path_argument
-from flex_planner.cli.progress_line import CanceledError, interruptible
+from flex_planner.cli.pictures import drawn, print_files
+from flex_planner.cli.signals import CanceledError, SIGNALS
+from flex_planner.maps.addresses import check_address
 from flex_planner.maps.cell_results import CellCode
-from flex_planner.reports.motion import table
+from flex_planner.reports.motion import Row, table
 
 if TYPE_CHECKING:
     from flex_planner.maps.store import MapStore
@@ -37,7 +40,7 @@ def add_command(commands: Commands) -> None:
         help='folder for store and pictures, or a store that ends in .zarr (default: %(default)s)')
     add('--workers', type=integer_argument, metavar='N',
         help='worker processes (default: one per processor)')
-    add('--scheduler', default='', metavar='ADDRESS',
+    add('--scheduler', metavar='ADDRESS',
         help='compute on the Dask cluster with this scheduler, such as tcp://host:8786')
     add('--draw', action='store_true', help='draw the stored cells, compute nothing')
     add('--reset', action='store_true', help='remove the existing map, and start anew')
@@ -69,22 +72,25 @@ def _draw(path: Path) -> int:
     """Draw a map in a folder beside its store."""
     from flex_planner.maps.draw_map import draw_map
 
-    print(table([('picture', str(picture)) for picture in draw_map(path, path.with_suffix(''))]))
+    with SIGNALS.patient():
+        pictures = draw_map(path, path.with_suffix(''))
+    print(table([('picture', str(picture)) for picture in pictures]))
     return 0
 
 
 def _compute(options: argparse.Namespace) -> int:
     """Compute the missing cells, print a summary and draw the map."""
+    _check(options)
     from flex_planner.maps.store import MapStore
     from flex_planner.maps.study import load_study
 
-    _check(options)
     study, path = load_study(options.study), _place(options)
     with MapStore.of(path, study, reset=options.reset) as store:
         tally = _run(options, study, store)
         print(table([*outcome_rows(tally, store.dataset()), ('store', str(path))]))
     if not options.no_plot:
-        _draw(path)
+        print_files(_pictures(path))
+    print(table([('output folder', str(path.parent))]))
     failed = tally.of(CellCode.FAILED)
     if failed:
         print(f'flex-planner: {failed} cells failed by an error of the program; the variable '
@@ -92,8 +98,23 @@ def _compute(options: argparse.Namespace) -> int:
     return 1 if failed else 0
 
 
+def _pictures(path: Path) -> Iterator[Row]:
+    """Draw a map that is just computed."""
+    pictures: list[Path] = []
+
+    def draw(folder: Path) -> None:
+        from flex_planner.maps.draw_map import draw_map
+
+        pictures.extend(draw_map(path, folder))
+
+    for _ in drawn('pictures', path.with_suffix(''), draw):
+        yield from (('picture', str(picture)) for picture in pictures)
+
+
 def _check(options: argparse.Namespace) -> None:
-    """Refuse options that contradict each other."""
+    """Refuse options that contradict each other, and what is no address."""
+    if options.scheduler is not None:
+        check_address(options.scheduler)
     if options.workers is not None:
         integer('--workers', options.workers, at_least=1, at_most=1024)
         if options.scheduler:
@@ -113,14 +134,14 @@ def _run(options: argparse.Namespace, study: Study, store: MapStore) -> Tally:
     if done:
         print(f'{store.path}: {done} of {store.codes.size} cells are computed already')
     try:
-        with interruptible() as canceled:
+        with SIGNALS.patient() as canceled:
             tally = run_map(study, store, workers=options.workers or 0,
-                            scheduler=options.scheduler, begin=display.begin,
+                            scheduler=options.scheduler or '', begin=display.begin,
                             report=display.show, canceled=canceled)
     finally:
         display.close()
     if canceled() and tally.done < tally.cells:
         again = ' without --reset' if options.reset else ''
-        raise CanceledError(f'canceled: {tally.done} of {tally.cells} cells are kept in '
+        raise CanceledError(f'{SIGNALS.word}: {tally.done} of {tally.cells} cells are kept in '
                             f'{store.path}; run the same command{again} to go on')
     return tally

@@ -8,11 +8,14 @@ from pathlib import Path
 import platform
 import sys
 
+from flex_planner.base.text_files import write_text
 from flex_planner.base.validation import integer
 from flex_planner.base.version import VERSION
 from flex_planner.cli.options import Commands, integer_argument, path_argument
 from flex_planner.cli.outputs import check_folder
-from flex_planner.cli.progress_line import Display, interruptible
+from flex_planner.cli.progress_line import Display
+from flex_planner.cli.signals import SIGNALS
+from flex_planner.reports.motion import table
 
 _PAGE, _PICTURES = 'paper.md', 'images/paper'
 
@@ -52,7 +55,7 @@ def _paper(options: argparse.Namespace) -> int:
     display.begin(f'{len(keys)} sections in {processes} processes')
     page, pictures = options.output / _PAGE, options.output / _PICTURES
     try:
-        with interruptible() as canceled:
+        with SIGNALS.patient() as canceled:
             sections = list(compute_sections(
                 keys, reduced=options.reduced, processes=processes, canceled=canceled,
                 pictures=None if options.no_plot else pictures,
@@ -62,8 +65,11 @@ def _paper(options: argparse.Namespace) -> int:
         display.close()
     remark = (f'Computed in {display.elapsed:.0f} s by flex_planner {VERSION} on '
               f'{processes} processors ({platform.machine()}).')
-    page.write_text(document(sections, _PICTURES, remark))
+    SIGNALS.check()
+    page.parent.mkdir(parents=True, exist_ok=True)
+    write_text(page, document(sections, _PICTURES, remark))
     print(summary(sections))
     shown = '' if options.no_plot else f', pictures in {pictures}'
     print(f'\nwritten: {page}{shown}, in {display.elapsed:.0f} s')
+    print(table([('output folder', str(options.output))]))
     return 0

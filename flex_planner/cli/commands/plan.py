@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
 from dataclasses import replace
 import sys
 
@@ -14,6 +13,7 @@ from flex_planner.capacity.results import MaxPayload, PayloadMethod
 from flex_planner.cli.controller_options import add_controller
 from flex_planner.cli.options import Commands, integer_argument, number_argument
 from flex_planner.cli.outputs import add_outputs, Outputs
+from flex_planner.cli.pictures import print_files
 from flex_planner.cli.progress_line import run_with_progress
 from flex_planner.cli.request import (
     add_objectives,
@@ -103,7 +103,7 @@ def _plan(options: argparse.Namespace) -> int:
     _print_result(request, f'with {request.task.payload_mass:g} kg', [*plan_rows(plan), *rows])
     if text := weights_table(plan):
         print(f'\n{text}\n')
-    _print_files(outputs.write_plan(plan, reference if plan.solved else None))
+    print_files(outputs.write_plan(plan, reference if plan.solved else None))
     return _exit_code(request, plan)
 
 
@@ -130,7 +130,7 @@ def _payload(options: argparse.Namespace) -> int:
     _print_result(request, '', [*payload_rows(found), *rows])
     if text := search_table(found):
         print(f'\n{text}\n')
-    _print_files(outputs.write_search(found, accuracy, step, reference if found.solved else None))
+    print_files(outputs.write_search(found, accuracy, step, reference if found.solved else None))
     return _exit_code(request, found)
 
 
@@ -155,12 +155,6 @@ def _print_result(request: Request, payload: str, rows: list[Row]) -> None:
     """Print the request and its result."""
     print(table([('arm', request.task.arm.name), ('motion', f'{request} {payload}'.rstrip()),
                  *rows]), flush=True)
-
-
-def _print_files(files: Iterator[Row]) -> None:
-    """Write the files, and print the name of each as it is written."""
-    for row in files:
-        print(table([row]), flush=True)
 
 
 def _exit_code(request: Request, outcome: Plan | MaxPayload) -> int:

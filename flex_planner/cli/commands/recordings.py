@@ -13,6 +13,7 @@ from flex_planner.base.progress import Monitor, StoppedError
 from flex_planner.base.validation import number
 from flex_planner.cli.options import Commands, number_argument, path_argument
 from flex_planner.cli.progress_line import run_with_progress
+from flex_planner.cli.signals import SIGNALS
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.recording import (
     definition_folder,
@@ -31,7 +32,7 @@ from flex_planner.reports.recording import (
     write_report,
 )
 
-_MOST_SECONDS = 3600.0
+_MOST_SECONDS, _FOLDER = 3600.0, Path('output')
 
 
 def add_commands(commands: Commands) -> None:
@@ -64,7 +65,7 @@ def _add_report(commands: Commands) -> None:
         'Make one HTML file of a recorded request: task, outcome, certificate, and plots to zoom '
         'into. It needs neither ROS nor a network.')
     parser.add_argument('--output', type=path_argument, metavar='HTML',
-                        help='the file (default: <recording>.html)')
+                        help='the file (default: output/<recording>.html)')
     parser.add_argument('--check', action='store_true',
                         help='apply the recorded torques to the recorded arm, compare with the '
                         'recorded plan, and fail where they differ')
@@ -109,15 +110,18 @@ def _replay(options: argparse.Namespace) -> int:
 def _report(options: argparse.Namespace) -> int:
     """Make a page of a recording; check its plan if that is wanted."""
     request = RecordedRequest.read(options.recording)
-    output = options.output or Path(
-        f'{options.recording.resolve().name.removesuffix(".mcap")}.html')
+    name = options.recording.resolve().name.removesuffix('.mcap')
+    output = options.output or _FOLDER / f'{name}.html'
     with _contradictions(request):
         check = _check(request) if options.check else None
-        write_report(output, request, check)
+        if options.output is None:
+            _FOLDER.mkdir(exist_ok=True)
+        with SIGNALS.patient():
+            write_report(output, request, check)
     rows = [(finding.name, str(finding)) for finding in check.findings] if check else []
     print(table([('recording', shown_path(request.path)), ('outcome', verdict(request, check)),
                  *rows, *(('not read', str(channel)) for channel in request.left_out),
-                 ('report', shown_path(output))]))
+                 ('report', shown_path(output)), ('output folder', shown_path(output.parent))]))
     return 0 if check is None or check.passed else 1
 
 

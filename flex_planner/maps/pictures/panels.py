@@ -10,6 +10,7 @@ import textwrap
 from flex_planner.base.validation import Array
 from flex_planner.maps.cell_results import CellCode
 from flex_planner.maps.pictures.data import MapAxis, MapData
+from flex_planner.plotting.figures import plain
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
@@ -189,8 +190,8 @@ def finish_map(figure: Figure, data: MapData, omitted: list[str], entries: list[
     width = figure.get_figwidth()
     lines = [f'{data.name}: {data.quantity}' if data.name else data.quantity, data.progress,
              f'left out: {"; ".join(omitted)}' if omitted else '']
-    figure.suptitle('\n'.join(textwrap.fill(line, int(_LETTERS * width)) for line in lines
-                              if line), fontsize='large')
+    title = '\n'.join(textwrap.fill(line, int(_LETTERS * width)) for line in lines if line)
+    figure.suptitle(plain(title), fontsize='large')
     if entries:
         figure.legend(handles=entries, loc='outside lower center', fontsize='small',
                       ncols=max(1, int(width / _ENTRY)))

@@ -12,13 +12,14 @@ from dataclasses import asdict
 from html import escape
 import json
 import math
-import os
 from pathlib import Path
 from string import Template
 from typing import Any
 
 from flex_planner.base.errors import RecordingError
 from flex_planner.base.paths import expand_path
+from flex_planner.base.text import printable
+from flex_planner.base.text_files import write_text
 from flex_planner.base.validation import Array
 from flex_planner.base.version import VERSION
 from flex_planner.recording import shown_path
@@ -41,9 +42,9 @@ def report_page(request: RecordedRequest, check: MotionCheck | None = None) -> s
     passed = request.solved and (check is None or check.passed)
     kind = 'find_max_payload' if request.search is not None else 'plan_path'
     return template.substitute(
-        title=escape(f'{kind}: {request.arm.name}'), kind='' if passed else 'failed',
-        file=escape(f'{shown_path(request.path.name)}, report of flex_planner {VERSION}'),
-        verdict=escape(verdict(request, check)), hidden='' if drawn else 'hidden',
+        title=_escape(f'{kind}: {request.arm.name}'), kind='' if passed else 'failed',
+        file=_escape(f'{shown_path(request.path.name)}, report of flex_planner {VERSION}'),
+        verdict=_escape(verdict(request, check)), hidden='' if drawn else 'hidden',
         data=_json(_content(tables(request, check, frequencies), drawn)),
         script=(_FOLDER / 'plots.js').read_text(encoding='utf-8'))
 
@@ -59,12 +60,9 @@ def write_report(path: Path, request: RecordedRequest, check: MotionCheck | None
 
     """
     path = expand_path(path)
-    draft = path.with_name(f'.{path.name}.{os.getpid()}')
     try:
-        draft.write_text(report_page(request, check), encoding='utf-8')
-        draft.replace(path)
+        write_text(path, report_page(request, check))
     except OSError as error:
-        draft.unlink(missing_ok=True)
         raise RecordingError(f'cannot write {path}: {error.strerror or error}') from error
 
 
@@ -99,5 +97,20 @@ def _numbers(values: Array) -> list[float | None]:
 
 def _json(content: dict[str, Any]) -> str:
     """Return JSON that cannot end the element it stands in."""
-    text = json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(',', ':'))
+    text = json.dumps(_shown(content), ensure_ascii=False, allow_nan=False,
+                      separators=(',', ':'))
     return text.replace('<', '\\u003c')
+
+
+def _escape(text: str) -> str:
+    """Return text as HTML."""
+    return escape(printable(text))
+
+
+def _shown(content: Any) -> Any:
+    """Return content with escapes in its texts for what has no place in them."""
+    if isinstance(content, str):
+        return printable(content)
+    if isinstance(content, dict):
+        return {_shown(name): _shown(entry) for name, entry in content.items()}
+    return [_shown(entry) for entry in content] if isinstance(content, (list, tuple)) else content

@@ -17,6 +17,7 @@ from flex_planner.base.errors import (
 )
 from flex_planner.base.progress import StopReason
 from flex_planner.base.sentences import say_reason
+from flex_planner.base.text import printable
 from flex_planner.base.validation import number, vector
 from flex_planner.optimal_control.ends_at_points import ends_at_points
 from flex_planner.optimal_control.task import Task
@@ -149,7 +150,7 @@ def error_code(error: Exception) -> int:
 
 def failure_report(code: int, sentence: str) -> PlanReport:
     """Return a report without numbers."""
-    report = PlanReport(error_code=code, error_msg=sentence)
+    report = PlanReport(error_code=code, error_msg=printable(sentence))
     for name in ('cost', 'effort', 'energy', 'collocation_residual', 'boundary_error',
                  'hamiltonian_drift', 'tip_error', 'residual_vibration', 'state_error',
                  'costate_error', 'torque_interpolation_error', *EXECUTION_FIELDS,

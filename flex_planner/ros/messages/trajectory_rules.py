@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from flex_planner.base.text import shown_value
 from flex_planner.optimal_control.task import MAX_JOINT_ANGLE, MAX_VELOCITY
 import numpy as np
 
@@ -34,8 +35,8 @@ def trajectory_violations(trajectory: Any, joint_names: Sequence[str]) -> list[s
     """
     found = []
     if sorted(trajectory.joint_names) != sorted(joint_names):
-        found.append(f'joint_names is {list(trajectory.joint_names)}, but must be a permutation '
-                     f'of {list(joint_names)}')
+        found.append(f'joint_names is {shown_value(list(trajectory.joint_names))}, but must be a '
+                     f'permutation of {shown_value(list(joint_names))}')
     if trajectory.header.stamp.sec or trajectory.header.stamp.nanosec:
         found.append('header.stamp must be 0, which starts the motion on arrival')
     if not trajectory.points:

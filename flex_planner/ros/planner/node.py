@@ -7,6 +7,7 @@ from typing import Any
 
 from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.processes import helper_processes
+from flex_planner.base.text import printable
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.planning.robustness import prepare_robustness
 from flex_planner.ros.messages.classes import WHY_NOT_ROS
@@ -85,7 +86,7 @@ class PlannerNode(Node):  # type: ignore[misc]
         starts = Starts(self._settings.map_store, arm)
         if self._settings.map_store:
             self.get_logger().info(f'requests may start from {len(starts)} motions of '
-                                   f'{self._settings.map_store}')
+                                   f'{printable(self._settings.map_store)}')
         self._planner = RequestPlanner(
             ArmModel(arm), OutcomeRecorder(arm, self.resolve_topic_name), starts)
         prepare_robustness(arm)
@@ -126,7 +127,8 @@ class PlannerNode(Node):  # type: ignore[misc]
             if task.publish and outcome.publishable:
                 self._publish(outcome, pending.state.settings)
         except Exception as error:
-            self.get_logger().error(f'a request failed: {type(error).__name__}: {error}')
+            self.get_logger().error(
+                printable(f'a request failed: {type(error).__name__}: {error}'))
             outcome = unknown_failure(error)
         self._record.add(outcome.report)
         self._log(outcome)

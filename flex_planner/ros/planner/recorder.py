@@ -13,6 +13,7 @@ from typing import Final
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import plain_arm
 from flex_planner.base.errors import RecordingError
+from flex_planner.base.text import printable
 from flex_planner.base.version import VERSION
 from flex_planner.base.yaml_text import format_yaml
 from flex_planner.planning.plan import Plan
@@ -97,7 +98,7 @@ class OutcomeRecorder:
         settings, stamp, report = state.settings, state.stamp_ns, outcome.report
         ready = stamp + report.planning_time.sec * 10**9 + report.planning_time.nanosec
         path = settings.output_folder() / self._name(stamp, outcome.search)
-        report.recording = str(path)
+        report.recording = printable(str(path))
         with Recording.create(path.parent, path.name, TYPES,
                               custom_data={'flex_planner': VERSION},
                               max_bytes=settings.max_recording_size or None) as recording:

@@ -11,6 +11,7 @@ import shutil
 from flex_planner.base.errors import FlexPlannerError, InvalidTaskError
 from flex_planner.base.progress import Monitor, StoppedError, StopReason
 from flex_planner.base.sentences import say_reason
+from flex_planner.base.text import printable
 from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.task import Task
@@ -185,7 +186,7 @@ class RequestPlanner:
             return outcome
         finally:
             self._report_in_work = None
-        outcome.report.recording = str(path)
+        outcome.report.recording = printable(str(path))
         return outcome
 
 
@@ -195,10 +196,11 @@ def _say_not_recorded(report: PlanReport, error: Exception, state: RequestState)
     required = state.settings.recording_required or state.stopping()
     if required and report.error_code == PlanReport.NONE:
         report.error_code = PlanReport.RECORDING_FAILED
-        report.error_msg = f'the plan could not be recorded: {error}'
+        report.error_msg = printable(f'the plan could not be recorded: {error}')
         return
     report.warning_kinds = [*report.warning_kinds, WarningKind.NOT_RECORDED.name]
-    report.warnings = [*report.warnings, f'the request could not be recorded: {error}']
+    report.warnings = [*report.warnings,
+                       printable(f'the request could not be recorded: {error}')]
 
 
 def _name_limit(report: PlanReport, monitor: Monitor) -> None:

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 
+from flex_planner.base.processes import deaf_to_interrupts
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.sampling import SampledPlan
 from flex_planner.ros.reference_states import StreamedPlan
@@ -87,11 +88,12 @@ class Streamer:
 
     def _start_process(self) -> subprocess.Popen[bytes]:
         node, topic = self._node, self._node.resolve_topic_name('~/reference_states')
-        return subprocess.Popen(
-            [sys.executable, '-m', 'flex_planner.ros.reference_states',
-             f'{node.get_name()}_states', node.get_namespace(), topic,
-             *(['by_clock'] if node.get_clock().ros_time_is_active else [])],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        with deaf_to_interrupts():
+            return subprocess.Popen(
+                [sys.executable, '-m', 'flex_planner.ros.reference_states',
+                 f'{node.get_name()}_states', node.get_namespace(), topic,
+                 *(['by_clock'] if node.get_clock().ros_time_is_active else [])],
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE)
 
 
 def _end(code: int) -> str:

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import logging
 
+from flex_planner.base.text import printable
 import rclpy.logging
+
+_LONGEST = 20000
 
 
 class _RosHandler(logging.Handler):
@@ -13,7 +16,7 @@ class _RosHandler(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Log one record."""
         logger = rclpy.logging.get_logger(record.name)
-        text = self.format(record)
+        text = printable(self.format(record), _LONGEST, keep='\n\t')
         # rclpy allows one severity per calling line
         if record.levelno >= logging.ERROR:
             logger.error(text)

@@ -11,6 +11,7 @@ import sys
 from types import TracebackType
 
 _PATIENCE = 5.0
+_START = 'flex_planner.ros.runtime.start'
 
 
 class NodeProcess:
@@ -44,7 +45,7 @@ class NodeProcess:
             output = stack.enter_context(log.open('wb')) if log else None
             # a session of its own: Ctrl-C in the terminal reaches the node through stop() only
             self.process = subprocess.Popen(
-                [sys.executable, '-m', module, '--ros-args', *arguments],
+                [sys.executable, '-m', _START, module, '--ros-args', *arguments],
                 stdout=output, stderr=output, start_new_session=True)
 
     def stop(self, number: signal.Signals = signal.SIGINT) -> int:

@@ -8,7 +8,7 @@ from pathlib import Path
 from flex_planner.arms.arm import Arm
 from flex_planner.base.errors import InvalidSizeError, InvalidValueError
 from flex_planner.base.paths import expand_path, folder_from_environment
-from flex_planner.base.validation import vector
+from flex_planner.base.validation import plain_names, vector
 from flex_planner.collocation import Solver, SolverSettings
 from flex_planner.control.default_gains import default_gains
 from flex_planner.control.joint_controller import (
@@ -137,6 +137,7 @@ class PlannerSettings:
             vector(name, getattr(self, name), count, at_least=0, at_most=MAX_GAIN)
         if len(set(self.joint_names)) != len(self.joint_names) or '' in self.joint_names:
             raise InvalidValueError('joint_names', self.joint_names, 'different names')
+        plain_names('joint_names', self.joint_names)
         if -1 < self.controller_period < 0:
             raise InvalidValueError('controller_period', self.controller_period,
                                     f'-1, or from 0 to {MAX_PERIOD:g} s')

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from flex_planner.arms.arm import Arm, Joint
-from flex_planner.base.validation import vector
+from flex_planner.base.validation import plain_names, vector
 from flex_planner.control.default_gains import default_gains
 from flex_planner.control.joint_controller import EffortHold, Gains, MAX_RATE, MIN_RATE
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
@@ -98,6 +98,7 @@ class SimulatorSettings:
 
     def __post_init__(self) -> None:
         count = len(self.joint_names)
+        plain_names('joint_names', self.joint_names)
         for name in ('stiffness', 'damping', 'added_friction'):
             vector(name, getattr(self, name), count, at_least=0, at_most=MAX_GAIN)
         vector('initial_positions', self.initial_positions, count, at_least=-MAX_JOINT_ANGLE,

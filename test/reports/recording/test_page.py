@@ -39,7 +39,7 @@ def test_report_on_the_command_line(plan: Path, failure: Path, tmp_path: Path,
     assert 'the check of the recording passed' in capsys.readouterr().out
     assert main(['report', str(next(failure.glob('*.mcap')))]) == 0
     assert 'Failed, error 304' in capsys.readouterr().out
-    assert {path.name for path in tmp_path.iterdir()} == {
+    assert {path.name for path in (tmp_path / 'output').iterdir()} == {
         f'{plan.name}.html', f'{failure.name}_0.html'}
     for arguments, complaint in ((['/nowhere'], 'cannot read /nowhere'),
                                  ([__file__], 'is damaged or not an MCAP file'),

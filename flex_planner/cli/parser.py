@@ -1,0 +1,27 @@
+"""The description of the command line."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+
+from flex_planner.base.version import VERSION
+from flex_planner.cli.commands import arm, cache, compare, paper, plan, recordings
+from flex_planner.cli.commands import map as maps
+from flex_planner.cli.options import join_lists
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Return the options of a command line; SystemExit after a message where it is wrong."""
+    parser = argparse.ArgumentParser(
+        prog='flex-planner', description='Motion planning for flexible-link manipulators.')
+    parser.add_argument('--version', action='version', version=VERSION)
+    commands = parser.add_subparsers(required=True, metavar='COMMAND')
+    arm.add_command(commands)
+    plan.add_commands(commands)
+    compare.add_command(commands)
+    maps.add_command(commands)
+    paper.add_command(commands)
+    cache.add_command(commands)
+    recordings.add_commands(commands)
+    return parser.parse_args(join_lists(arguments))
