@@ -26,6 +26,7 @@ from flex_planner.planning.plan import peaks, Plan, PlanStatus, Samples
 from flex_planner.planning.robustness import robustness_warnings
 from flex_planner.planning.sampling import SampledPlan
 from flex_planner.planning.warnings import PlanWarning
+from flex_planner.ros.messages.measured_starts import ArmStateError
 from flex_planner.ros.settings.planner import PlannerSettings
 from flex_planner_interfaces.msg import (
     FlexiblePoint,
@@ -140,6 +141,8 @@ def _ends(message: MotionTask, arm: Arm, settings: PlannerSettings) -> dict[str,
 
 def error_code(error: Exception) -> int:
     """Return the code of PlanReport for an exception."""
+    if isinstance(error, ArmStateError):
+        return error.code
     return next((code for kind, code in ERROR_CODES if isinstance(error, kind)),
                 int(PlanReport.UNKNOWN))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from datetime import datetime, timezone
 import itertools
 from pathlib import Path
+import time
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import plain_arm
@@ -25,7 +26,7 @@ from flex_planner.ros.planner.outcome import Outcome
 from flex_planner.ros.planner.request_state import RequestState
 from flex_planner.ros.runtime.parameters import as_mapping
 from flex_planner.ros.settings.planner import PlannerSettings
-from flex_planner_interfaces.msg import MotionTask, PayloadSearch
+from flex_planner_interfaces.msg import MotionTask, PlanReport
 import yaml
 
 
@@ -83,7 +84,8 @@ class OutcomeRecorder:
         """
         settings, stamp, report = state.settings, state.stamp_ns, outcome.report
         ready = stamp + report.planning_time.sec * 10**9 + report.planning_time.nanosec
-        path = settings.output_folder() / self._name(stamp, outcome.search)
+        path = settings.output_folder() / self._name(
+            stamp, 'plan_path' if outcome.search is None else 'find_max_payload')
         report.recording = str(path)
         with Recording.create(path.parent, path.name, self._types,
                               custom_data={'flex_planner': VERSION},
@@ -100,21 +102,40 @@ class OutcomeRecorder:
                 self._write_states(recording, state, outcome.plan, outcome.reference, ready)
         return path
 
+    def write_execution(self, task: MotionTask, state: RequestState, report: PlanReport) -> None:
+        """
+        Write a recording of how a plan was carried out; the arguments are those of `write`.
+
+        Raises
+        ------
+        RecordingError
+            If it cannot be written; nothing is left behind then.
+
+        """
+        settings, now = state.settings, time.time_ns()
+        path = settings.output_folder() / self._name(now, 'execution')
+        report.execution_recording = str(path)
+        with Recording.create(path.parent, path.name, self._types,
+                              custom_data={'flex_planner': VERSION}) as recording:
+            recording.attach('scenario.yaml', self._scenario(settings).encode(),
+                             media_type='application/yaml', time_ns=now)
+            recording.write(self._task, task, now)
+            recording.write(self._report, report, now)
+
     def _write_states(self, recording: Recording, state: RequestState, plan: Plan,
                       reference: SampledPlan, ready: int) -> None:
         """Write the samples of a plan that is ready at a time [ns]."""
         names = [*state.settings.joint_names, *plan.arm.modal_names]
-        for k, time in enumerate(reference.times_ns):
+        for k, passed in enumerate(reference.times_ns):
             if state.stopping():
                 raise RecordingError(f'writing stopped after {k} of {len(reference.times_ns)} '
                                      'samples')
-            stamp = ready + int(time)
+            stamp = ready + int(passed)
             message = reference_state(plan, reference.samples, k, names, stamp)
             recording.write(self._states, message, stamp)
 
-    def _name(self, stamp: int, search: PayloadSearch | None) -> str:
+    def _name(self, stamp: int, kind: str) -> str:
         """Return a name that sorts by kind and time and is not used twice."""
-        kind = 'plan_path' if search is None else 'find_max_payload'
         moment = datetime.fromtimestamp(stamp // 10**9, timezone.utc)
         return f'{kind}_{moment:%Y%m%dT%H%M%S}_{stamp % 10**9:09d}_{next(self._numbers):04d}'
 

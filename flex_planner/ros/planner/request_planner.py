@@ -18,6 +18,7 @@ from flex_planner.planning.plan_path import plan_kind
 from flex_planner.planning.robustness import assess_robustness
 from flex_planner.planning.sampling import judge_execution, sample_plan
 from flex_planner.planning.strategies.initial_guesses import WARM_START
+from flex_planner.ros.messages.measured_starts import ArmStateError, starts_at_arm, with_start
 from flex_planner.ros.messages.payload_searches import (
     report_from_search,
     search_message,
@@ -26,7 +27,6 @@ from flex_planner.ros.messages.payload_searches import (
 )
 from flex_planner.ros.messages.plans import (
     add_execution,
-    duration_message,
     error_code,
     objectives_from_message,
     planning_time_limit,
@@ -37,8 +37,14 @@ from flex_planner.ros.messages.plans import (
     task_from_message,
 )
 from flex_planner.ros.messages.trajectory_rules import trajectory_violations
+from flex_planner.ros.planner.arm_state import ArmState
 from flex_planner.ros.planner.map_starts import Starts
-from flex_planner.ros.planner.outcome import failure_outcome, Outcome, unknown_failure
+from flex_planner.ros.planner.outcome import (
+    enter_times,
+    failure_outcome,
+    Outcome,
+    unknown_failure,
+)
 from flex_planner.ros.planner.recorder import OutcomeRecorder
 from flex_planner.ros.planner.request_state import RequestState
 from flex_planner.ros.settings.planner import PlannerSettings
@@ -65,13 +71,16 @@ class RequestPlanner:
         Where outcomes are kept.
     starts : Starts, optional
         Motions that requests near them start from.
+    arm_state : ArmState, optional
+        Where the arm is; without it, nobody knows and nothing is checked.
 
     """
 
     def __init__(self, model: ArmModel, recorder: OutcomeRecorder,
-                 starts: Starts | None = None) -> None:
+                 starts: Starts | None = None, arm_state: ArmState | None = None) -> None:
         self._model, self._recorder = model, recorder
         self._starts = Starts('', model.arm) if starts is None else starts
+        self._arm_state = arm_state
         self._report_in_work: PlanReport | None = None
 
     def plan(self, message: MotionTask, state: RequestState) -> Outcome:
@@ -144,8 +153,12 @@ class RequestPlanner:
     def _conclude(self, work: Callable[[Task, Monitor], Outcome], message: MotionTask,
                   state: RequestState, search: PayloadSearch | None = None) -> Outcome:
         """Do the work of a request and record its outcome, with `search` where it failed."""
+        measured: list[float] = []
         try:
             state.report(replace(state.progress, phase='start'))
+            if starts_at_arm(message):
+                message = self._place(message, state)
+                measured = list(message.start_positions)
             task = task_from_message(message, self._model.arm, state.settings)
             monitor = Monitor(time_limit=planning_time_limit(message, state.settings),
                               canceled=state.is_canceled, report=state.report)
@@ -158,8 +171,46 @@ class RequestPlanner:
             _LOG.exception('planning failed')
             outcome = unknown_failure(error)
         outcome = replace(outcome, search=outcome.search or search)
-        outcome.report.planning_time = duration_message(state.elapsed_ns)
+        outcome.report.measured_positions = measured
+        if message.publish:
+            self.check_start(outcome, state)
+        enter_times(outcome.report, state)
         return self._record(message, state, outcome)
+
+    def check_start(self, outcome: Outcome, state: RequestState) -> None:
+        """Make an outcome a failure if the arm is not where its plan starts."""
+        if self._arm_state is None or outcome.plan is None or not outcome.publishable:
+            return
+        report = outcome.report
+        try:
+            measured = self._arm_state.check(outcome.plan.task, state.settings, state.motion)
+        except ArmStateError as error:
+            report.error_code, report.error_msg = error.code, str(error)
+        else:
+            report.measured_positions = measured or report.measured_positions
+
+    def record_execution(self, message: MotionTask, state: RequestState,
+                         report: PlanReport) -> None:
+        """Record how a plan was carried out, and enter the recording into its report."""
+        if not state.settings.record:
+            return
+        try:
+            self._recorder.write_execution(message, state, report)
+        except Exception as error:
+            expected = isinstance(error, FlexPlannerError)
+            _LOG.error('recording failed: %s', error, exc_info=not expected)
+            report.execution_recording = ''
+            if report.error_code == PlanReport.NONE:
+                report.error_code = PlanReport.RECORDING_FAILED
+                report.error_msg = ('the plan was carried out, but how could not be recorded: '
+                                    f'{error}')
+
+    def _place(self, message: MotionTask, state: RequestState) -> MotionTask:
+        """Return the task that starts where the arm is."""
+        if self._arm_state is None:
+            raise ArmStateError(PlanReport.ARM_STATE_UNKNOWN, 'nobody knows where the arm is')
+        state.report(replace(state.progress, phase='looking where the arm is'))
+        return with_start(message, self._arm_state.find_rest(state.settings, state.is_canceled))
 
     def _record(self, message: MotionTask, state: RequestState, outcome: Outcome) -> Outcome:
         """Record an outcome; a plan that cannot be recorded is a failure with a trajectory."""

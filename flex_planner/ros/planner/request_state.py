@@ -36,7 +36,13 @@ class RequestState:
     progress : Progress
         The latest.
     withdrawn : bool
-        Whether the client has canceled it.
+        Whether it is given up.
+    reason : str
+        Why, where its client has not canceled it.
+    began_ns : int
+        When the worker began with it, by the monotonic clock [ns]; 0 while it waits.
+    motion : str
+        How the arm moved when it was accepted, empty if it did not or is not watched.
 
     """
 
@@ -46,11 +52,19 @@ class RequestState:
     stamp_ns: int = field(default_factory=time.time_ns)
     progress: Progress = _WAITING
     withdrawn: bool = False
+    reason: str = ''
+    began_ns: int = 0
+    motion: str = ''
 
     @property
     def elapsed_ns(self) -> int:
         """Time since it was accepted [ns]."""
         return time.monotonic_ns() - self.accepted_ns
+
+    @property
+    def waited_ns(self) -> int:
+        """Time that it waited for others [ns]."""
+        return (self.began_ns or time.monotonic_ns()) - self.accepted_ns
 
     def is_canceled(self) -> bool:
         """Return whether to stop working on it."""

@@ -1,0 +1,101 @@
+"""The controller that carries out plans, as the planner node sees it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from flex_planner.base.errors import FlexPlannerError
+from flex_planner.ros.planner.execution import Execution
+from rclpy.action import ActionClient, get_action_names_and_types
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.clock import Clock, ClockType
+from rclpy.exceptions import InvalidServiceNameException, InvalidTopicNameException
+from rclpy.executors import Executor
+from rclpy.node import Node
+from trajectory_msgs.msg import JointTrajectory
+
+_PERIOD = 0.05  # [s]
+_TYPE = 'control_msgs/action/FollowJointTrajectory'
+
+
+class Controller:
+    """
+    The controller that plans are sent to.
+
+    Parameters
+    ----------
+    node : Node
+        The planner.
+    action : str
+        Name of the controller's action.
+
+    Raises
+    ------
+    FlexPlannerError
+        If control_msgs is not installed, or there can be no such action.
+
+    """
+
+    def __init__(self, node: Node, action: str) -> None:
+        try:
+            from control_msgs.action import FollowJointTrajectory
+        except ImportError as error:
+            raise FlexPlannerError(
+                f'execute_action is {action!r}, but control_msgs, which has the type of this '
+                f'action, is missing: install ros-jazzy-control-msgs ({error})') from error
+        group = ReentrantCallbackGroup()
+        try:
+            self.name = node.resolve_service_name(action)
+            self.client = ActionClient(node, FollowJointTrajectory, action, callback_group=group)
+        except (InvalidServiceNameException, InvalidTopicNameException, ValueError) as error:
+            raise FlexPlannerError(f'execute_action is {action!r}, but must be the name of an '
+                                   f'action: {error}') from error
+        _check_topic(node, self.name)
+        self.node, self.goal_type = node, FollowJointTrajectory.Goal
+        self._executions: list[Execution] = []
+        node.create_timer(_PERIOD, self._advance, group, Clock(clock_type=ClockType.STEADY_TIME))
+
+    def start(self, trajectory: JointTrajectory, timeout: float, executor: Executor,
+              on_accepted: Callable[[], None]) -> Execution:
+        """
+        Let the controller carry out a plan.
+
+        Parameters
+        ----------
+        trajectory : JointTrajectory
+            The plan.
+        timeout : float
+            Time for each answer of the controller beyond what the motion takes [s].
+        executor : Executor
+            Runs what awaits the end.
+        on_accepted : callable
+            Called once the controller has accepted the plan.
+
+        """
+        execution = Execution(self, trajectory, timeout, executor, on_accepted)
+        self._executions.append(execution)
+        return execution
+
+    def describe_absence(self) -> str:
+        """Return what is there instead of the action, in words."""
+        found = dict(get_action_names_and_types(self.node))
+        if self.name in found:
+            return f'there is {self.name}, but its type is {", ".join(found[self.name])}'
+        others = sorted(name for name, types in found.items() if _TYPE in types)
+        known = ', '.join(others) or 'none'
+        return f'there is no action {self.name}; of its type there is {known}'
+
+    def _advance(self) -> None:
+        for execution in list(self._executions):
+            execution.advance()
+            if execution.future.done():
+                self._executions.remove(execution)
+
+
+def _check_topic(node: Node, action: str) -> None:
+    """Raise FlexPlannerError if the controller also gets plans over the topic."""
+    topic = node.resolve_topic_name('~/joint_trajectory')
+    if topic.rpartition('/')[0] == action.rpartition('/')[0]:
+        raise FlexPlannerError(
+            f'execute_action is {action}, and the topic ~/joint_trajectory is {topic}: the same '
+            'controller would get every plan twice; leave the remapping or the parameter out')
