@@ -13,7 +13,7 @@ import sys
 
 import pytest
 
-SOURCE = Path(__file__).parent / 'control_msgs'
+SOURCE = Path(__file__).parents[1] / 'data' / 'control_msgs'
 ROOT = Path(__file__).parents[2]
 BUILD = ROOT / 'build' / 'test_control_msgs'
 

@@ -15,7 +15,7 @@ from rclpy.node import Node
 from trajectory_msgs.msg import JointTrajectory
 
 _PERIOD = 0.05  # [s]
-_TYPE = 'control_msgs/action/FollowJointTrajectory'
+_TYPE, _FEEDBACK = 'control_msgs/action/FollowJointTrajectory', '_FeedbackMessage'
 
 
 class Controller:
@@ -78,12 +78,19 @@ class Controller:
 
     def describe_absence(self) -> str:
         """Return what is there instead of the action, in words."""
-        found = dict(get_action_names_and_types(self.node))
-        if self.name in found:
-            return f'there is {self.name}, but its type is {", ".join(found[self.name])}'
-        others = sorted(name for name, types in found.items() if _TYPE in types)
-        known = ', '.join(others) or 'none'
-        return f'there is no action {self.name}; of its type there is {known}'
+        types = self._types(self.name)
+        if types - {_TYPE}:
+            return f'there is {self.name}, but its type is {", ".join(sorted(types))}'
+        if types:
+            return f'{self.name} is there, but not all of it was discovered in time'
+        known = (name for name, kinds in get_action_names_and_types(self.node) if _TYPE in kinds)
+        others = ', '.join(sorted(name for name in known if self._types(name)))
+        return f'there is no action {self.name}; of its type there is {others or "none"}'
+
+    def _types(self, action: str) -> set[str]:
+        """Return the types of the servers of an action, empty without one."""
+        return {server.topic_type.removesuffix(_FEEDBACK)
+                for server in self.node.get_publishers_info_by_topic(f'{action}/_action/feedback')}
 
     def _advance(self) -> None:
         for execution in list(self._executions):
