@@ -1,9 +1,9 @@
 """
 A controller with the action FollowJointTrajectory, whose parameter says what is wrong with it.
 
-The parameter behaviour is one of: carry_out, refuse, silent (does not say whether it
-accepts), slow (accepts after 2 s), abort, wrong (succeeds with an error code), hang (never ends, but
-can be canceled), stubborn (nor can it be canceled), leave (ends while it carries out a plan).
+The parameter behaviour is one of: carry_out, refuse, silent (does not say whether it accepts),
+slow (accepts after 2 s), abort, wrong (succeeds with an error code), hang (never ends, but can be
+canceled), stubborn (nor can it be canceled), leave (ends while it carries out a plan).
 
 """
 

@@ -21,12 +21,13 @@ _MANY = 6  # names in a sentence
 
 @dataclass(slots=True)
 class _Joint:
-    """The last of one joint; a velocity of nan is none."""
+    """The last of one joint; a velocity of nan is none, a position may not be given."""
 
-    heard_ns: int
-    stamp_ns: int
-    position: float
-    velocity: float
+    heard_ns: int = 0
+    stamp_ns: int = 0
+    position: float = math.nan
+    velocity: float = math.nan
+    given: bool = False
     track: deque[tuple[int, float]] = field(default_factory=deque)
 
     def renew(self, heard_ns: int, stamp_ns: int, position: float, velocity: float) -> None:
@@ -119,8 +120,9 @@ class MeasuredJoints:
         with self._lock:
             for name, position, velocity in zip(message.name, positions, velocities, strict=True):
                 if name in self._names:
-                    known = self._joints.setdefault(name, _Joint(now_ns, stamp, 0.0, 0.0))
-                    known.renew(now_ns, stamp, position, velocity)
+                    joint = self._joints.setdefault(name, _Joint())
+                    joint.renew(now_ns, stamp, position, velocity)
+                    joint.given = len(message.position) == len(message.name)
                 elif len(self._others) < _MANY:
                     self._others[name] = None
 
@@ -169,6 +171,8 @@ class MeasuredJoints:
         joint = self._joints[name]
         silence, age = (now_ns - joint.heard_ns) * 1e-9, (now_ns - joint.stamp_ns) * 1e-9
         limit = f'joint_state_timeout = {timeout:g} s'
+        if not joint.given:
+            return f'the message on {self._topic} that names {name} has not one position per name'
         if not math.isfinite(joint.position):
             return f'the position of {name} is {joint.position} on {self._topic}'
         if silence > timeout:

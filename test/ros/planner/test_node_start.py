@@ -35,7 +35,8 @@ class WatchedPlanner(Planner):
         self._states = self.node.create_publisher(JointState, f'/{name}/joint_states', 10)
         self._say: Callable[[float], list[JointState]] = lambda passed: []
         self._began = time.monotonic()
-        self.node.create_timer(PERIOD, self._publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.node.create_timer(PERIOD, self._publish, clock=steady)
 
     def put(self, say: Callable[[float], list[JointState]] | list[JointState],
             seconds: float = 0.4) -> None:
