@@ -112,7 +112,7 @@ def robustness_warnings(certificate: ExecutionCertificate, robustness: Robustnes
         Of the arm [m].
 
     """
-    found = []
+    found = _execution_warnings(certificate, reach)
     if certificate.open_loop_amplification > _AMPLIFIED:
         found.append(PlanWarning(kind=WarningKind.OPEN_LOOP_UNSTABLE, sentence=(
             'without feedback the motion is unstable: an error '
@@ -136,6 +136,18 @@ def robustness_warnings(certificate: ExecutionCertificate, robustness: Robustnes
             f'residual vibration if {change}: {_millimetres(vibration)}, but '
             f'{_millimetres(robustness.nominal)} as modelled'))
         for kind, (vibration, change) in changes.items() if vibration > most]
+
+
+def _execution_warnings(certificate: ExecutionCertificate, reach: float) -> list[PlanWarning]:
+    """Return what is to be known of a trajectory on the very arm that it was planned for."""
+    worst = max(certificate.tip_error, certificate.residual_vibration)
+    if worst <= _NOTABLE * reach:
+        return []
+    return [PlanWarning(kind=WarningKind.ARRIVES_ELSEWHERE, value=worst, sentence=(
+        f'torques that are held for {1e3 * certificate.controller.period:.3g} ms leave the tip '
+        f'{_millimetres(certificate.tip_error)} from its goal and '
+        f'{_millimetres(certificate.residual_vibration)} of vibration, where the plan leaves '
+        'none: a faster controller or a calmer motion leaves less'))]
 
 
 def _millimetres(length: float) -> str:

@@ -47,6 +47,7 @@ class WarningKind(Enum):
     LINKS_OVERLAP = 'links overlap'
     JOINT_WITHOUT_INERTIA = 'clamped link on a joint without inertia'
     TOO_FEW_MODES = 'too few modes'
+    ARRIVES_ELSEWHERE = 'the controller leads the arm elsewhere'
     SENSITIVE_TO_MODES = 'sensitive to the number of modes'
     SENSITIVE_TO_STIFFNESS = 'sensitive to the stiffness'
     SENSITIVE_TO_PAYLOAD = 'sensitive to the payload'

@@ -20,7 +20,12 @@ from flex_planner.planning.robustness import (
     robustness_warnings,
     with_more_modes,
 )
-from flex_planner.planning.sampling import sample_plan, SampledPlan, SamplingSettings
+from flex_planner.planning.sampling import (
+    judge_execution,
+    sample_plan,
+    SampledPlan,
+    SamplingSettings,
+)
 from flex_planner.planning.warnings import WarningKind
 from flex_planner.simulation.joint_control import Encoder
 from flex_planner.simulation.plant import Control, Plant
@@ -115,6 +120,21 @@ def test_open_loop_that_magnifies_errors_is_told(plan: Plan, sampled: SampledPla
     first = robustness_warnings(unstable, robustness, plan.arm.reach)[0]
     assert first.kind is WarningKind.OPEN_LOOP_UNSTABLE
     assert 'grows to 3.5e+02 times its size' in first.sentence
+
+
+def test_trajectory_that_its_controller_leads_elsewhere_is_told(plan: Plan) -> None:
+    # efforts are not shifted for the period in which they are held
+    slow = JointController(gains=Gains.of(2, 100.0, 10.0), rate=250.0)
+    sampled = sample_plan(plan, SamplingSettings(controller=slow, controller_period=0.0))
+    # the plan is solved and may be published, but not without a word
+    assert judge_execution(plan, sampled).solved
+    error = sampled.execution.tip_error
+    assert 1e-4 * plan.arm.reach < error < 5e-3 * plan.arm.reach
+    warning = robustness_warnings(sampled.execution, assess_robustness(plan, sampled),
+                                  plan.arm.reach)[0]
+    assert warning.kind is WarningKind.ARRIVES_ELSEWHERE
+    assert warning.value == max(error, sampled.execution.residual_vibration)
+    assert f'held for 4 ms leave the tip {error * 1e3:.2g} mm from its goal' in warning.sentence
 
 
 def test_rigid_arm_and_empty_hand_have_no_figures_of_their_own(plan_of: PlanFactory) -> None:
