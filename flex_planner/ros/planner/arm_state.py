@@ -17,7 +17,7 @@ from flex_planner_interfaces.msg import PlanReport
 import numpy as np
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
-from rclpy.exceptions import InvalidTopicNameException
+from rclpy.exceptions import NameValidationException
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
@@ -64,8 +64,9 @@ class ArmState:
             self._joints = MeasuredJoints(settings.joint_names, node.resolve_topic_name(topic))
             self._subscription = node.create_subscription(
                 JointState, topic, self._hear, _QOS, callback_group=_Polled())
-        except (InvalidTopicNameException, ValueError) as error:
-            raise InvalidValueError('joint_states_topic', topic, 'the name of a topic') from error
+        except (NameValidationException, RuntimeError) as error:
+            raise InvalidValueError('joint_states_topic', topic,
+                                    f'the name of a topic: {error}') from error
         # by a clock that also goes on while a simulation is paused
         node.create_timer(_POLLING_PERIOD, self.listen, callback_group=ReentrantCallbackGroup(),
                           clock=Clock(clock_type=ClockType.STEADY_TIME))

@@ -9,7 +9,7 @@ from flex_planner.ros.planner.execution import Execution
 from rclpy.action import ActionClient, get_action_names_and_types
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
-from rclpy.exceptions import InvalidServiceNameException, InvalidTopicNameException
+from rclpy.exceptions import NameValidationException
 from rclpy.executors import Executor
 from rclpy.node import Node
 from trajectory_msgs.msg import JointTrajectory
@@ -47,7 +47,7 @@ class Controller:
         try:
             self.name = node.resolve_service_name(action)
             self.client = ActionClient(node, FollowJointTrajectory, action, callback_group=group)
-        except (InvalidServiceNameException, InvalidTopicNameException, ValueError) as error:
+        except (NameValidationException, RuntimeError) as error:
             raise FlexPlannerError(f'execute_action is {action!r}, but must be the name of an '
                                    f'action: {error}') from error
         _check_topic(node, self.name)

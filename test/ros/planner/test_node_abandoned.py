@@ -80,8 +80,8 @@ def test_second_node_of_a_name_is_warned_of(planner: Planner) -> None:
     log = planner.recordings.parent / 'second.log'
     with NodeProcess('flex_planner.ros.arm_simulator', {'arm': 'korayem_rigid'},
                      {'__node': 'flex_planner'}, log) as second:
-        planner.wait('both warnings', lambda: all(
-            'another node is named /flex_planner' in text() for text in (planner.log, log.read_text)))
+        said = 'another node is named /flex_planner'
+        planner.wait('both warnings', lambda: said in planner.log() and said in log.read_text())
         assert second.process.poll() is None
         assert second.stop(signal.SIGINT) == 0
     assert planner.log().count('another node is named') == 1

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import ExitStack
 import os
 from pathlib import Path
 from typing import Any
 
 from action_msgs.msg import GoalStatus
-from control_msgs_support import environment
+from action_msgs.srv import CancelGoal
+from control_msgs_support import BUILD, environment
 from flex_planner.recording import definition_folder, MessageTypes, read_recording
 from flex_planner.reports.recording.contents import RecordedRequest
 from flex_planner.ros.runtime.processes import NodeProcess
+from flex_planner_interfaces import action
 from flex_planner_interfaces.msg import PlanReport
 import pytest
 from rcl_interfaces.srv import SetParameters
+from rclpy.action import ActionServer
 from rclpy.parameter import Parameter
 from ros_support import Planner, STARTING, SUPPORT
 from std_msgs.msg import String
@@ -65,7 +69,6 @@ def arena(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Arena]:
         with Arena(folder) as arena:
             try:
                 yield arena
-                assert arena.process.process.poll() is None
                 assert 'Traceback' not in arena.log()
             finally:
                 arena.server.stop()
@@ -141,6 +144,17 @@ def test_cancellation_passes_on_to_the_controller(arena: Arena) -> None:
     assert _recorded(result.report.execution_recording) == PlanReport.CANCELED
 
 
+def test_motion_that_somebody_cancels_at_the_controller_is_no_success(arena: Arena) -> None:
+    arena.behave('hang')
+    plan = arena.send_plan(publish=True)
+    arena.heard('accepted')
+    arena.call(CancelGoal, f'{ACTION}/_action/cancel_goal', CancelGoal.Request())  # all of them
+    arena.wait('the answer', plan.done)
+    report = plan.result().report
+    assert report.error_code == PlanReport.EXECUTION_CANCELED
+    assert f'somebody else canceled the motion at {ACTION}' in report.error_msg
+
+
 def test_controller_that_does_not_cancel_is_named(arena: Arena) -> None:
     arena.behave('stubborn')
     goal = arena.plan_goal(publish=True)
@@ -164,32 +178,53 @@ def test_controller_that_leaves_and_one_that_is_not_there(arena: Arena, tmp_path
     assert report.error_code == PlanReport.EXECUTION_NO_SERVER, report.error_msg
     assert f'there is no action {ACTION}' in report.error_msg
     assert not arena.published
+    other = ActionServer(arena.node, action.PlanPath, ACTION, lambda goal: None)
+    arena.spin(0.5)
+    report = arena.report(publish=True)
+    other.destroy()
+    assert report.error_code == PlanReport.EXECUTION_NO_SERVER, report.error_msg
+    assert 'but its type is flex_planner_interfaces/action/PlanPath' in report.error_msg
     arena.restart(tmp_path)
     arena.behave('carry_out')
     assert arena.report(publish=True).error_code == PlanReport.NONE
 
 
-@pytest.mark.parametrize(('parameters', 'words'), [
-    ({'execute_action': 'no name!'}, 'must be the name of an action'),
-    ({'execute_action': '/flex_planner/follow_joint_trajectory'}, 'every plan twice'),
-    ({'joint_states_topic': 'no name!'}, 'must be the name of a topic'),
-], ids=str)
-def test_node_with_a_name_that_cannot_be_says_so_and_ends(
-        arena: Arena, tmp_path: Path, parameters: dict[str, Any], words: str) -> None:
-    with Planner(tmp_path, 'korayem_rigid', **parameters) as planner:
-        planner.wait('the end', lambda: planner.process.process.poll() is not None)
-        assert planner.process.process.returncode == 1
-        assert words in planner.log()
-        assert 'Traceback' not in planner.log()
+def test_node_with_a_name_that_cannot_be_says_so_and_ends(arena: Arena, tmp_path: Path) -> None:
+    check_refusals(tmp_path, [
+        ({'execute_action': 'no name!'}, 'must be the name of an action'),
+        ({'execute_action': '/flex_planner/follow_joint_trajectory'}, 'every plan twice'),
+        ({'joint_states_topic': '/a//b'}, 'must be the name of a topic')])
 
 
-def test_node_without_control_msgs_says_so_and_ends(tmp_path: Path) -> None:
+def test_node_without_control_msgs_says_so_and_ends(tmp_path: Path,
+                                                    monkeypatch: pytest.MonkeyPatch) -> None:
     if not environment():
         pytest.skip('control_msgs is installed')
-    with Planner(tmp_path, 'korayem_rigid', execute_action=ACTION) as planner:
-        planner.wait('the end', lambda: planner.process.process.poll() is not None)
-        assert planner.process.process.returncode == 1
-        assert 'install ros-jazzy-control-msgs' in planner.log()
+    others = [path for path in os.environ['PYTHONPATH'].split(os.pathsep)
+              if BUILD not in Path(path).parents]
+    monkeypatch.setenv('PYTHONPATH', os.pathsep.join(others))
+    check_refusals(tmp_path, [({'execute_action': ACTION}, 'install ros-jazzy-control-msgs')])
+
+
+def check_refusals(folder: Path, wrong: list[tuple[dict[str, Any], str]]) -> None:
+    """Require that nodes with such parameters do not start, and say why; all start at once."""
+    with ExitStack() as stack:
+        nodes = [stack.enter_context(NodeProcess(
+            'flex_planner.ros.planner.node', {'arm': 'korayem_rigid', **parameters},
+            log=folder / f'{k}.log')) for k, (parameters, _) in enumerate(wrong)]
+        assert [node.process.wait(STARTING) for node in nodes] == [1] * len(wrong)
+    for k, (_, words) in enumerate(wrong):
+        log = (folder / f'{k}.log').read_text()
+        assert words in log
+        assert 'Traceback' not in log
+
+
+def test_planner_that_ends_while_the_arm_moves_ends_in_good_order(arena: Arena) -> None:
+    arena.behave('hang')
+    arena.plan_goal(publish=True)
+    arena.heard('accepted')
+    assert arena.stop() == 0
+    assert 'Traceback' not in arena.log()
 
 
 def _recorded(path: str) -> int:
