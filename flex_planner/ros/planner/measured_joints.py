@@ -28,7 +28,7 @@ class _Joint:
     position: float = math.nan
     velocity: float = math.nan
     given: bool = False
-    track: deque[tuple[int, float]] = field(default_factory=deque)
+    track: deque[tuple[int, float, float]] = field(default_factory=deque)
 
     def renew(self, heard_ns: int, stamp_ns: int, position: float, velocity: float) -> None:
         """Take what a message says."""
@@ -39,22 +39,30 @@ class _Joint:
         if not math.isfinite(position):
             self.track.clear()
         elif not self.track or heard_ns - self.track[-1][0] >= _SPACING:
-            self.track.append((heard_ns, position))
+            self.track.append((heard_ns, position, velocity))
         while self.track and self.track[0][0] < heard_ns - _WINDOW:
             self.track.popleft()
 
     @property
     def drift(self) -> float:
         """Return by how much the position changed within the last moments [rad]."""
-        values = [position for _, position in self.track] + [self.position]
+        values = [self.position, *(position for _, position, _ in self.track)]
         return max(values) - min(values)
 
     @property
     def speed(self) -> float:
-        """Return the measured velocity, or the mean of the last moments [rad/s]."""
-        if math.isfinite(self.velocity):
-            return self.velocity
-        began, position = self.track[0] if self.track else (self.heard_ns, self.position)
+        """
+        Return the speed in the last moments [rad/s].
+
+        The median of the velocities, as those of a joint at rest jump where they are differences
+        of rounded angles; without velocities, the mean from the positions.
+
+        """
+        velocities = [self.velocity, *(velocity for _, _, velocity in self.track)]
+        finite = [velocity for velocity in velocities if math.isfinite(velocity)]
+        if finite:
+            return float(np.median(finite))
+        began, position = self.track[0][:2] if self.track else (self.heard_ns, self.position)
         passed = (self.heard_ns - began) * 1e-9
         return (self.position - position) / passed if passed else 0.0
 

@@ -49,7 +49,7 @@ def refusal(joints: MeasuredJoints, *messages: JointState, later: float = 0.0) -
     [state(gripper=(9, 9), joint2=(0.2, 0.4), joint1=(0.1, 0.3), rail=(8, 8))],
     [state(joint2=(0.2, 0.4)), state(gripper=(9, 9)), state(joint1=(0.1, 0.3))],
     [state(NOW, joint1=(0.1, 0.3), joint2=(0.2, 0.4))],
-    [state(joint1=(math.nan, 7), joint2=(5, 5)), state(joint1=(0.1, 0.3), joint2=(0.2, 0.4))],
+    [state(joint1=(math.nan,), joint2=(0.2,)), state(joint1=(0.1, 0.3), joint2=(0.2, 0.4))],
     [state(), state(joint1=(0.1, 0.3), joint2=(0.2, 0.4)), state()],
 ], ids=['in order', 'reversed', 'among others', 'one by one', 'stamped', 'after nan', 'empty'])
 def test_joints_are_found_however_they_come(joints: MeasuredJoints,
@@ -107,6 +107,15 @@ def test_two_publishers_that_contradict_each_other_show_as_drift(joints: Measure
                        now_ns=NOW + k * SECOND // 50)
     assert reading.drifts.tolist() == [0.3, 0]
     assert reading.speeds.tolist() == [0, 0]
+
+
+def test_velocities_that_jump_at_rest_are_no_motion(joints: MeasuredJoints) -> None:
+    for k in range(50):  # rounded to 0.001 rad, and differentiated over a millisecond
+        jumps = k % 5 == 4
+        reading = hear(joints, state(joint1=(0.001 * jumps, 1.0 * jumps), joint2=(1.0, 0.3)),
+                       now_ns=NOW + k * SECOND // 100)
+    assert reading.speeds.tolist() == [0, 0.3]
+    assert reading.drifts[0] <= 0.001
 
 
 def test_rest_after_a_motion_is_seen_soon(joints: MeasuredJoints) -> None:

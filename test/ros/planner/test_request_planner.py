@@ -17,7 +17,7 @@ from flex_planner.ros.planner.recorder import OutcomeRecorder
 from flex_planner.ros.planner.request_planner import RequestPlanner
 from flex_planner.ros.planner.request_state import RequestState
 from flex_planner.ros.settings.planner import PlannerSettings
-from flex_planner_interfaces.msg import PayloadSearch, PlanReport
+from flex_planner_interfaces.msg import MotionTask, PayloadSearch, PlanReport
 import pytest
 from ros_support import search_request, task
 
@@ -255,3 +255,26 @@ def test_payload_found_is_returned_but_not_published_if_it_cannot_be_recorded(
     assert outcome.search is not None
     assert outcome.search.payload == pytest.approx(MOST, abs=ACCURACY)
     assert outcome.trajectory.points
+
+
+def test_execution_that_cannot_be_recorded_is_no_success(
+        worker: RequestPlanner, settings: PlannerSettings, tmp_path: Path) -> None:
+    blocked = tmp_path / 'a file'
+    blocked.write_text('')
+    state = RequestState(settings=replace(settings, recording_folder=str(blocked)))
+    report = PlanReport(execution_accepted=True)
+    worker.record_execution(task(), state, report)
+    assert report.error_code == PlanReport.RECORDING_FAILED
+    assert report.error_msg.startswith('the plan was carried out, but how could not be recorded: ')
+    assert (report.execution_accepted, report.execution_recording) == (True, '')
+    aborted = PlanReport(error_code=PlanReport.EXECUTION_ABORTED, error_msg='it gave up')
+    worker.record_execution(task(), state, aborted)
+    assert (aborted.error_code, aborted.error_msg) == (
+        PlanReport.EXECUTION_ABORTED, 'it gave up')
+
+
+def test_motion_cannot_start_where_the_arm_is_if_nobody_knows_that(
+        worker: RequestPlanner, settings: PlannerSettings) -> None:
+    outcome = worker.plan(task(start=MotionTask.CURRENT), RequestState(settings=settings))
+    assert outcome.report.error_code == PlanReport.ARM_STATE_UNKNOWN
+    assert outcome.report.error_msg == 'nobody knows where the arm is'
