@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 import time
+from typing import Any
 
 from rclpy.node import Node
 
@@ -51,5 +52,5 @@ class Audience:
         return before and self._absent
 
 
-def _gids(endpoints: list[object]) -> Readers:
-    return frozenset(bytes(endpoint.endpoint_gid) for endpoint in endpoints)  # type: ignore[attr-defined]
+def _gids(endpoints: Iterable[Any]) -> Readers:
+    return frozenset(bytes(endpoint.endpoint_gid) for endpoint in endpoints)

@@ -55,6 +55,11 @@ class Controller:
         self._executions: list[Execution] = []
         node.create_timer(_PERIOD, self._advance, group, Clock(clock_type=ClockType.STEADY_TIME))
 
+    @property
+    def busy(self) -> bool:
+        """Return whether a plan is being carried out."""
+        return bool(self._executions)
+
     def start(self, trajectory: JointTrajectory, timeout: float, executor: Executor,
               on_accepted: Callable[[], None]) -> Execution:
         """

@@ -107,7 +107,7 @@ class PlannerNode(Node):  # type: ignore[misc]
         self._markers = self.create_publisher(MarkerArray, '~/markers', LATCHED)
         self._record = Record()
         self._diagnostics = Diagnostics(self, self._queue, self._record, self._streamer,
-                                        self._joints, arm.name)
+                                        self._joints, arm.name, self._controller)
         self._endpoints = self._create_endpoints()
         self._streamer.wait_until_ready()
         self.get_logger().info(f'ready to plan for {arm.name}')

@@ -11,6 +11,7 @@ from typing import Any
 from action_msgs.msg import GoalStatus
 from action_msgs.srv import CancelGoal
 from control_msgs_support import BUILD, environment
+from diagnostic_msgs.msg import DiagnosticArray
 from flex_planner.recording import definition_folder, MessageTypes, read_recording
 from flex_planner.reports.recording.contents import RecordedRequest
 from flex_planner.ros.runtime.processes import NodeProcess
@@ -131,8 +132,11 @@ def test_plan_that_is_accepted_too_late_is_canceled(arena: Arena) -> None:
 
 def test_cancellation_passes_on_to_the_controller(arena: Arena) -> None:
     arena.behave('hang')
-    goal = arena.plan_goal(publish=True)
+    status = arena.listen(DiagnosticArray, '/diagnostics', 10)
+    goal = arena.plan_goal(publish=True, duration=4.0)
     arena.heard('accepted')
+    arena.wait('the status', lambda: any(
+        message.status[0].message.startswith('carrying out a plan') for message in status))
     arena.wait('feedback', lambda: any(
         message.phase == 'carrying out the plan' for _, message in goal.feedback))
     assert goal.cancel()
