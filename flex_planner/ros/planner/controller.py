@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from flex_planner.base.errors import FlexPlannerError
-from flex_planner.ros.planner.execution import Execution
+from flex_planner.ros.planner.execution import ActionLink, Execution
 from rclpy.action import ActionClient, get_action_names_and_types
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
@@ -45,13 +45,16 @@ class Controller:
                 f'action, is missing: install ros-jazzy-control-msgs ({error})') from error
         group = ReentrantCallbackGroup()
         try:
-            self.name = node.resolve_service_name(action)
-            self.client = ActionClient(node, FollowJointTrajectory, action, callback_group=group)
+            name = node.resolve_service_name(action)
+            client = ActionClient(node, FollowJointTrajectory, action, callback_group=group)
         except (NameValidationException, RuntimeError) as error:
             raise FlexPlannerError(f'execute_action is {action!r}, but must be the name of an '
                                    f'action: {error}') from error
-        _check_topic(node, self.name)
-        self.node, self.goal_type = node, FollowJointTrajectory.Goal
+        _check_topic(node, name)
+        self._node, self._name = node, name
+        self._link = ActionLink(
+            name, client, FollowJointTrajectory.Goal,
+            lambda: int(node.get_clock().now().nanoseconds), self._describe_absence)
         self._executions: list[Execution] = []
         node.create_timer(_PERIOD, self._advance, group, Clock(clock_type=ClockType.STEADY_TIME))
 
@@ -77,25 +80,25 @@ class Controller:
             Called once the controller has accepted the plan.
 
         """
-        execution = Execution(self, trajectory, timeout, executor, on_accepted)
+        execution = Execution(self._link, trajectory, timeout, executor, on_accepted)
         self._executions.append(execution)
         return execution
 
-    def describe_absence(self) -> str:
+    def _describe_absence(self) -> str:
         """Return what is there instead of the action, in words."""
-        types = self._types(self.name)
+        types = self._types(self._name)
         if types - {_TYPE}:
-            return f'there is {self.name}, but its type is {", ".join(sorted(types))}'
+            return f'there is {self._name}, but its type is {", ".join(sorted(types))}'
         if types:
-            return f'{self.name} is there, but not all of it was discovered in time'
-        known = (name for name, kinds in get_action_names_and_types(self.node) if _TYPE in kinds)
+            return f'{self._name} is there, but not all of it was discovered in time'
+        known = (name for name, kinds in get_action_names_and_types(self._node) if _TYPE in kinds)
         others = ', '.join(sorted(name for name in known if self._types(name)))
-        return f'there is no action {self.name}; of its type there is {others or "none"}'
+        return f'there is no action {self._name}; of its type there is {others or "none"}'
 
     def _types(self, action: str) -> set[str]:
         """Return the types of the servers of an action, empty without one."""
-        return {server.topic_type.removesuffix(_FEEDBACK)
-                for server in self.node.get_publishers_info_by_topic(f'{action}/_action/feedback')}
+        servers = self._node.get_publishers_info_by_topic(f'{action}/_action/feedback')
+        return {server.topic_type.removesuffix(_FEEDBACK) for server in servers}
 
     def _advance(self) -> None:
         for execution in list(self._executions):

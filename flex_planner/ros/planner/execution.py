@@ -6,18 +6,16 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 import time
-from typing import Any, TYPE_CHECKING
+from typing import Any, NamedTuple
 
 from action_msgs.msg import GoalStatus
 from flex_planner.ros.messages.plans import duration_message, duration_seconds
 from flex_planner_interfaces.msg import PlanReport
+from rclpy.action import ActionClient
 from rclpy.action.client import ClientGoalHandle
 from rclpy.executors import Executor
 from rclpy.task import Future
 from trajectory_msgs.msg import JointTrajectory
-
-if TYPE_CHECKING:
-    from flex_planner.ros.planner.controller import Controller
 
 _GONE = 2.0  # [s] without a server until it counts as gone
 # error_code of a result
@@ -61,6 +59,32 @@ class ExecutionEnd:
         report.execution_time = duration_message(self.duration_ns)
 
 
+class ActionLink(NamedTuple):
+    """
+    The way to a controller.
+
+    Attributes
+    ----------
+    name : str
+        Of its action.
+    client : ActionClient
+        Of the action.
+    goal_type : type
+        Of its goals.
+    now_ns : callable
+        Returns the time that the controller goes by, maybe simulated [ns].
+    describe_absence : callable
+        Returns what is there instead of the action, in words.
+
+    """
+
+    name: str
+    client: ActionClient
+    goal_type: Any
+    now_ns: Callable[[], int]
+    describe_absence: Callable[[], str]
+
+
 class Execution:
     """
     A plan on its way to and through the controller; `advance` has to be called all the time.
@@ -72,7 +96,7 @@ class Execution:
 
     """
 
-    def __init__(self, controller: Controller, trajectory: JointTrajectory, timeout: float,
+    def __init__(self, controller: ActionLink, trajectory: JointTrajectory, timeout: float,
                  executor: Executor, on_accepted: Callable[[], None]) -> None:
         self.future = Future(executor=executor)
         self._controller, self._trajectory, self._timeout = controller, trajectory, timeout
@@ -134,7 +158,7 @@ class Execution:
                       f'published: {self._controller.name} refused the plan; why is in its log '
                       '(names of joints, no effort interface, or not active)')
             return
-        self._handle, self._accepted_ns = handle, self._clock_ns()
+        self._handle, self._accepted_ns = handle, self._controller.now_ns()
         self._server_seen = time.monotonic()
         self._answer = handle.get_result_async()
         self._step = self._await_result
@@ -148,7 +172,7 @@ class Execution:
         now, name = time.monotonic(), self._controller.name
         if self._controller.client.server_is_ready():
             self._server_seen = now
-        passed = (self._clock_ns() - self._accepted_ns) * 1e-9
+        passed = (self._controller.now_ns() - self._accepted_ns) * 1e-9
         limit = duration_seconds(self._trajectory.points[-1].time_from_start) + self._timeout
         if self._answer.done():
             self._take_result(self._answer.result())
@@ -191,9 +215,6 @@ class Execution:
     def _tell_to_cancel(self) -> None:
         if self._handle is not None:
             self._handle.cancel_goal_async()
-
-    def _clock_ns(self) -> int:
-        return int(self._controller.node.get_clock().now().nanoseconds)
 
     def _end(self, code: int, sentence: str, **result: Any) -> None:
         end = ExecutionEnd(code=code, sentence=sentence, accepted=self._handle is not None,
