@@ -24,8 +24,8 @@ rclpy.init()
 node = rclpy.create_node('impatient')
 task = MotionTask(start_positions=[1.0, -2.0], goal_positions=[1.5, -1.5], duration=100.0,
                   effort_weights=[0.1, 0.1], allowed_planning_time=600.0)
-client = ActionClient(node, PlanPath, '/flex_planner/plan_path')
-service = node.create_client(PlanService, '/flex_planner/plan_path')
+client = ActionClient(node, PlanPath, '/abandoned/plan_path')
+service = node.create_client(PlanService, '/abandoned/plan_path')
 assert client.wait_for_server(60) and service.wait_for_service(60)
 accepted = client.send_goal_async(PlanPath.Goal(task=task))
 rclpy.spin_until_future_complete(node, accepted)
@@ -41,7 +41,8 @@ rclpy.shutdown()
 
 @pytest.fixture(scope='module')
 def planner(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Planner]:
-    with Planner(tmp_path_factory.mktemp('abandoned'), 'korayem_ei50',
+    # no other test has clients of a planner of this name in this process
+    with Planner(tmp_path_factory.mktemp('abandoned'), 'korayem_ei50', 'abandoned',
                  max_waiting_time=1000.0, queue_length=3) as planner:
         yield planner
         assert planner.process.process.poll() is None
@@ -79,8 +80,8 @@ def test_second_node_of_a_name_is_warned_of(planner: Planner) -> None:
     assert 'another node is named' not in planner.log()
     log = planner.recordings.parent / 'second.log'
     with NodeProcess('flex_planner.ros.arm_simulator', {'arm': 'korayem_rigid'},
-                     {'__node': 'flex_planner'}, log) as second:
-        said = 'another node is named /flex_planner'
+                     {'__node': 'abandoned'}, log) as second:
+        said = 'another node is named /abandoned'
         planner.wait('both warnings', lambda: said in planner.log() and said in log.read_text())
         assert second.process.poll() is None
         assert second.stop(signal.SIGINT) == 0
