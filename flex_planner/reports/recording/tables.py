@@ -113,6 +113,8 @@ def _task(request: RecordedRequest) -> ReportTable:
 
 def _say_end(task: Any, name: str, is_point: bool) -> str:
     """Return start or goal in words."""
+    if name == 'start' and int(getattr(task, 'start', False)):  # that of the arm was never known
+        return 'where the arm is'
     if is_point:
         point = getattr(task, f'{name}_point')
         return f'({point.x:g}, {point.y:g}) m'
@@ -130,12 +132,26 @@ def _outcome(request: RecordedRequest) -> ReportTable:
              ('iterations', str(report.iterations)), ('intervals', str(report.mesh_intervals))]
     if report.map_cell:
         rows.append(('started from', report.map_cell))
+    rows += _arm_and_controller(report)
     if request.motion is not None:
         rows += [('payload', f'{request.motion.payload_mass:.6g} kg'),
                  ('cost J', f'{report.cost:.6g}'), ('effort', f'{report.effort:.6g} N²m²s'),
                  ('energy', f'{report.energy:.6g} J'),
                  ('switching times [s]', numbers(report.switching_times))]
     return ReportTable(title='Outcome', rows=tuple(rows))
+
+
+def _arm_and_controller(report: Any) -> list[tuple[str, str]]:
+    """Return where the arm was, and what its controller did; older recordings have neither."""
+    rows = []
+    if len(getattr(report, 'measured_positions', ())):
+        rows.append(('arm measured at', f'({numbers(np.degrees(report.measured_positions))}) deg'))
+    took = getattr(report, 'execution_time', None)
+    if took is not None and (took.sec or took.nanosec):
+        accepted = 'accepted' if report.execution_accepted else 'not accepted'
+        rows += [('controller', f'{accepted}, ended after {took.sec + took.nanosec * 1e-9:.3f} s, '
+                  f'error {report.execution_error_code} {report.execution_error_string}'.rstrip())]
+    return rows
 
 
 def _kinds(request: RecordedRequest) -> list[ReportTable]:

@@ -38,6 +38,7 @@ from flex_planner.ros.messages.classes import (
     PlanReport,
     Point,
 )
+from flex_planner.ros.messages.measured_starts import ArmStateError
 from flex_planner.ros.messages.spaces import SPACES
 from flex_planner.ros.settings.planner import PlannerSettings
 import numpy as np
@@ -144,6 +145,8 @@ def _ends(message: MotionTask, arm: Arm, settings: PlannerSettings) -> dict[str,
 
 def error_code(error: Exception) -> int:
     """Return the code of PlanReport for an exception."""
+    if isinstance(error, ArmStateError):
+        return error.code
     return next((code for kind, code in ERROR_CODES if isinstance(error, kind)),
                 int(PlanReport.UNKNOWN))
 

@@ -9,6 +9,7 @@ import time
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from flex_planner.planning.warnings import WarningKind
+from flex_planner.ros.planner.controller import Controller
 from flex_planner.ros.planner.request_queue import RequestQueue
 from flex_planner.ros.planner.streamer import Streamer
 from flex_planner_interfaces.msg import PlanReport
@@ -83,13 +84,17 @@ class Diagnostics:
         Of the trajectories, whose subscribers are counted.
     arm : str
         Name of the arm.
+    controller : Controller or None
+        Carries out plans.
 
     """
 
     def __init__(self, node: Node, queue: RequestQueue, record: Record, streamer: Streamer,
-                 trajectories: Publisher, arm: str) -> None:
+                 trajectories: Publisher, arm: str, controller: Controller | None = None
+                 ) -> None:
         self._node, self._queue, self._record, self._arm = node, queue, record, arm
         self._streamer, self._trajectories = streamer, trajectories
+        self._controller = controller
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 1)
         # whatever clock the node has: that of a simulation may stand still
         node.create_timer(_PERIOD, self._publish, callback_group=ReentrantCallbackGroup(),
@@ -127,7 +132,9 @@ class Diagnostics:
 
     def _state(self) -> str:
         active = self._queue.active
-        return f'planning: {active.progress.phase}' if active else 'idle'
+        if active:
+            return f'planning: {active.progress.phase}'
+        return 'carrying out a plan' if self._controller and self._controller.busy else 'idle'
 
     def _values(self) -> dict[str, object]:
         active, record = self._queue.active, self._record

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 from flex_planner.ros.messages.payload_searches import fill_response, search_without_result
 from flex_planner.ros.messages.plans import duration_message
+from flex_planner.ros.planner.clients import action_readers, Audience, service_readers
 from flex_planner.ros.planner.outcome import Outcome
 from flex_planner.ros.planner.request_queue import PendingRequest, Work
 from flex_planner.ros.planner.request_state import RequestState
@@ -24,7 +25,9 @@ from rclpy.qos import QoSProfile
 RESULT_TIMEOUT = 5
 # requests and answers on their way: with ROS's depth of 10, more at once would get lost
 _MANY = QoSProfile(depth=1000)
-_FEEDBACK_PERIOD = 0.1  # [s]
+_FEEDBACK_PERIOD, _PRESENCE_PERIOD = 0.1, 1.0  # [s]
+_SERVICE, _ACTION = 0, 1  # the ways by which a request comes
+_ABANDONED = 'given up: whoever sent the request has left the network'
 
 
 class RequestHandlers(NamedTuple):
@@ -36,14 +39,14 @@ class RequestHandlers(NamedTuple):
     submit : callable
         Adds a request to the queue.
     withdraw : callable
-        Cancels it.
+        Cancels it, for a reason if its client does not ask for that; returns whether it can.
     conclude : callable
         Coroutine that waits for the outcome and acts on it; never raises.
 
     """
 
-    submit: Callable[[Work], PendingRequest]
-    withdraw: Callable[[PendingRequest], None]
+    submit: Callable[[Work, MotionTask], PendingRequest]
+    withdraw: Callable[[PendingRequest, str], bool]
     conclude: Callable[[PendingRequest, MotionTask], Coroutine[Any, Any, Outcome]]
 
 
@@ -74,6 +77,8 @@ class Endpoint:
                  fill: Callable[[Any, Any, Outcome], None]) -> None:
         self._handlers, self._work, self._fill = handlers, work, fill
         self._goals: dict[bytes, tuple[ServerGoalHandle, PendingRequest]] = {}
+        self._audiences: dict[PendingRequest, tuple[int, Audience]] = {}
+        self._readers = service_readers(node, name), action_readers(node, name)
         service, self._action = kinds
         # in the group that all else is in, a request that waits would hold up the others
         group = ReentrantCallbackGroup()
@@ -84,19 +89,28 @@ class Endpoint:
             handle_accepted_callback=self._on_goal, cancel_callback=self._on_cancel,
             goal_service_qos_profile=_MANY, result_service_qos_profile=_MANY,
             cancel_service_qos_profile=_MANY, result_timeout=RESULT_TIMEOUT)
-        # whatever clock the node has: that of a simulation may stand still
-        node.create_timer(_FEEDBACK_PERIOD, self._send_feedback, callback_group=group,
-                          clock=Clock(clock_type=ClockType.STEADY_TIME))
+        # by a clock that also goes on while a simulation is paused
+        clock = Clock(clock_type=ClockType.STEADY_TIME)
+        node.create_timer(_FEEDBACK_PERIOD, self._send_feedback, group, clock)
+        node.create_timer(_PRESENCE_PERIOD, self._drop_abandoned, group, clock)
 
     async def _on_request(self, request: Any, response: Any) -> Any:
         """Serve a request of the service."""
-        pending = self._handlers.submit(partial(self._work, request))
-        self._fill(response, request, await self._handlers.conclude(pending, request.task))
+        pending = self._submit(request, _SERVICE)
+        outcome = await self._handlers.conclude(pending, request.task)
+        self._audiences.pop(pending, None)
+        self._fill(response, request, outcome)
         return response
+
+    def _submit(self, request: Any, way: int) -> PendingRequest:
+        """Submit a request, and note who may wait for the answer."""
+        pending = self._handlers.submit(partial(self._work, request), request.task)
+        self._audiences[pending] = way, Audience(self._readers[way]())
+        return pending
 
     def _on_goal(self, goal: ServerGoalHandle) -> None:
         """Submit an accepted goal, which can be canceled from now on."""
-        pending = self._handlers.submit(partial(self._work, goal.request))
+        pending = self._submit(goal.request, _ACTION)
         self._goals[_key(goal)] = goal, pending
         goal.execute()
 
@@ -104,7 +118,7 @@ class Endpoint:
         """Wait for the outcome of a goal and return its result."""
         pending = self._goals[_key(goal)][1]
         outcome = await self._handlers.conclude(pending, goal.request.task)
-        del self._goals[_key(goal)]
+        del self._goals[_key(goal)], self._audiences[pending]
         result = self._action.Result()
         self._fill(result, goal.request, outcome)
         _end(goal, outcome.report.error_code)
@@ -113,15 +127,23 @@ class Endpoint:
     def _on_cancel(self, goal: ServerGoalHandle) -> CancelResponse:
         """Cancel a goal, unless it is concluded already."""
         entry = self._goals.get(_key(goal))
-        if entry is None or entry[1].future.done():
+        if entry is None or not self._handlers.withdraw(entry[1], ''):
             return CancelResponse.REJECT
-        self._handlers.withdraw(entry[1])
         return CancelResponse.ACCEPT
+
+    def _drop_abandoned(self) -> None:
+        """Drop what waits or is being planned, and nobody waits for."""
+        if not self._audiences:
+            return
+        present = [readers() for readers in self._readers]
+        for pending, (way, audience) in list(self._audiences.items()):
+            if not pending.future.done() and audience.is_gone(present[way]):
+                self._handlers.withdraw(pending, _ABANDONED)
 
     def _send_feedback(self) -> None:
         """Send every client the progress of its goal, also if that is unchanged."""
         for goal, pending in list(self._goals.values()):
-            if not pending.future.done():
+            if pending.is_open:
                 goal.publish_feedback(_feedback(self._action, pending.state))
 
 

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+from dataclasses import replace
 import sys
 from typing import Any
 
-from flex_planner.base.errors import FlexPlannerError
+from flex_planner.base.errors import FlexPlannerError, InvalidValueError
 from flex_planner.base.processes import helper_processes
 from flex_planner.base.text import printable
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.planning.robustness import prepare_robustness
 from flex_planner.ros.messages.classes import WHY_NOT_ROS
 from flex_planner.ros.messages.markers import motion_markers
-from flex_planner.ros.messages.plans import duration_seconds
+from flex_planner.ros.messages.plans import duration_seconds, planning_time_limit
+from flex_planner.ros.planner.arm_state import ArmState
+from flex_planner.ros.planner.controller import Controller
 from flex_planner.ros.planner.diagnostics import Diagnostics, Record
 from flex_planner.ros.planner.endpoints import Endpoint, fill_plan, fill_search, RequestHandlers
+from flex_planner.ros.planner.execution import ExecutionEnd
 from flex_planner.ros.planner.map_starts import Starts
-from flex_planner.ros.planner.outcome import Outcome, unknown_failure
+from flex_planner.ros.planner.outcome import canceled_outcome, Outcome, unknown_failure
 from flex_planner.ros.planner.recorder import OutcomeRecorder
 from flex_planner.ros.planner.request_planner import RequestPlanner
 from flex_planner.ros.planner.request_queue import PendingRequest, RequestQueue, Work
@@ -55,6 +60,15 @@ class PlannerNode(Node):  # type: ignore[misc]
     ~/plan_path : flex_planner_interfaces/srv/PlanPath, flex_planner_interfaces/action/PlanPath
     ~/find_max_payload : flex_planner_interfaces/srv/FindMaxPayload, .../action/FindMaxPayload
 
+    Topics subscribed
+    -----------------
+    joint_states : sensor_msgs/msg/JointState
+        Where the arm is; the name is that of the parameter joint_states_topic.
+
+    Action called
+    -------------
+    That of the parameter execute_action : control_msgs/action/FollowJointTrajectory
+
     Topics published
     ----------------
     ~/joint_trajectory : trajectory_msgs/msg/JointTrajectory, latched
@@ -87,23 +101,26 @@ class PlannerNode(Node):  # type: ignore[misc]
         if self._settings.map_store:
             self.get_logger().info(f'requests may start from {len(starts)} motions of '
                                    f'{printable(self._settings.map_store)}')
+        self._arm_state = ArmState(self, self._settings)
+        action_name = self._settings.execute_action
+        self._controller = Controller(self, action_name) if action_name else None
         self._planner = RequestPlanner(
-            ArmModel(arm), OutcomeRecorder(arm, self.resolve_topic_name), starts)
+            ArmModel(arm), OutcomeRecorder(arm, self.resolve_topic_name), starts, self._arm_state)
         prepare_robustness(arm)
-        self._queue = RequestQueue(self._settings.queue_length)
+        self._queue = RequestQueue(self._settings.queue_length, self._settings.max_waiting_time)
         self._joints = self.create_publisher(JointTrajectory, '~/joint_trajectory', LATCHED)
         self._flexible = self.create_publisher(
             FlexibleTrajectory, '~/flexible_trajectory', LATCHED)
         self._markers = self.create_publisher(MarkerArray, '~/markers', LATCHED)
         self._record = Record()
         self._diagnostics = Diagnostics(self, self._queue, self._record, self._streamer,
-                                        self._joints, arm.name)
+                                        self._joints, arm.name, self._controller)
         self._endpoints = self._create_endpoints()
         self._streamer.wait_until_ready()
         self.get_logger().info(f'ready to plan for {arm.name}')
 
     def _create_endpoints(self) -> list[Endpoint]:
-        handlers = RequestHandlers(self._submit, self._queue.withdraw, self._conclude)
+        handlers = RequestHandlers(self._submit, self._withdraw, self._conclude)
         plan, search = self._planner.plan, self._planner.find_max_payload
         return [
             Endpoint(self, '~/plan_path', (PlanPath, action.PlanPath), handlers,
@@ -117,21 +134,56 @@ class PlannerNode(Node):  # type: ignore[misc]
     def _apply_parameters(self, changes: list[Parameter]) -> None:
         self._settings = apply_changes(self._settings, changes)
 
-    def _submit(self, work: Work) -> PendingRequest:
-        return self._queue.submit(work, self._settings, self.executor)
+    def _submit(self, work: Work, task: MotionTask) -> PendingRequest:
+        settings, seconds = self._settings, 0.0
+        with suppress(InvalidValueError):  # which takes no time to answer
+            seconds = planning_time_limit(task, settings)
+        motion = self._arm_state.motion(settings) if task.publish else ''
+        return self._queue.submit(work, settings, self.executor, seconds, motion)
+
+    def _withdraw(self, pending: PendingRequest, reason: str) -> bool:
+        """Cancel a request, also the motion that it led to; return False if it is answered."""
+        if not pending.is_open:
+            return False
+        self._queue.withdraw(pending, reason)
+        if pending.execution is not None:
+            pending.execution.cancel()
+        return True
 
     async def _conclude(self, pending: PendingRequest, task: MotionTask) -> Outcome:
         """Return the outcome of a request; an exception here would end the node."""
         try:
             outcome: Outcome = await pending.future
             if task.publish and outcome.publishable:
-                self._publish(outcome, pending.state.settings)
+                outcome = await self._hand_over(outcome, pending, task)
         except Exception as error:
             self.get_logger().error(
                 printable(f'a request failed: {type(error).__name__}: {error}'))
             outcome = unknown_failure(error)
+        pending.is_open = False
         self._record.add(outcome.report)
         self._log(outcome)
+        return outcome
+
+    async def _hand_over(self, outcome: Outcome, pending: PendingRequest,
+                         task: MotionTask) -> Outcome:
+        """Publish a plan, or let the controller carry it out, unless things have changed."""
+        state = pending.state
+        if state.withdrawn:
+            return canceled_outcome(state)
+        self._planner.check_start(outcome, state)
+        if not outcome.publishable:
+            return outcome
+        if self._controller is None:
+            self._publish(outcome, state.settings)
+            return outcome
+        state.report(replace(state.progress, phase='carrying out the plan'))
+        pending.execution = self._controller.start(
+            outcome.trajectory.joint_trajectory, state.settings.execute_timeout, self.executor,
+            lambda: self._publish(outcome, state.settings))
+        end: ExecutionEnd = await pending.execution.future
+        end.enter(outcome.report)
+        self._planner.record_execution(task, state, outcome.report)
         return outcome
 
     def _publish(self, outcome: Outcome, settings: PlannerSettings) -> None:
@@ -147,12 +199,14 @@ class PlannerNode(Node):  # type: ignore[misc]
 
     def _log(self, outcome: Outcome) -> None:
         report = outcome.report
-        seconds = duration_seconds(report.planning_time)
+        waited = duration_seconds(report.waiting_time)
+        seconds = duration_seconds(report.planning_time) - waited
         if outcome.publishable:
             search = outcome.search
             found = f'maximum payload {search.payload:.6g} kg, ' if search else ''
             self.get_logger().info(
-                f'{found}planned in {seconds:.2f} s ({report.strategy}): J = {report.cost:.6g}, '
+                f'{found}planned in {seconds:.2f} s, after {waited:.2f} s in the queue '
+                f'({report.strategy}): J = {report.cost:.6g}, '
                 f'tip error {report.tip_error * 1e3:.2g} mm, recorded in '
                 f'{report.recording or "-"}')
         else:

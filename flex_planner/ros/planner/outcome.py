@@ -53,13 +53,18 @@ def unknown_failure(error: Exception) -> Outcome:
 
 
 def canceled_outcome(state: RequestState) -> Outcome:
-    """Return the outcome of a request that its client gave up."""
-    outcome = failure_outcome(PlanReport.CANCELED, StopReason.CANCELED.value)
-    outcome.report.planning_time = duration_message(state.elapsed_ns)
+    """Return the outcome of a request that is given up."""
+    outcome = failure_outcome(PlanReport.CANCELED, state.reason or StopReason.CANCELED.value)
+    enter_times(outcome.report, state)
     return outcome
 
 
-def busy_outcome(queue_length: int) -> Outcome:
-    """Return the outcome of a request that finds the queue full."""
-    return failure_outcome(PlanReport.BUSY, f'{queue_length} requests are waiting already; '
-                           'the parameter queue_length allows no more: try again later')
+def enter_times(report: PlanReport, state: RequestState) -> None:
+    """Enter how long a request took until now, and how much of that it waited."""
+    report.planning_time = duration_message(state.elapsed_ns)
+    report.waiting_time = duration_message(state.waited_ns)
+
+
+def busy_outcome(reason: str) -> Outcome:
+    """Return the outcome of a request that finds no room in the queue."""
+    return failure_outcome(PlanReport.BUSY, reason)

@@ -8,6 +8,7 @@ import itertools
 import logging
 from pathlib import Path
 import re
+import time
 from typing import Final
 
 from flex_planner.arms.arm import Arm
@@ -26,7 +27,7 @@ from flex_planner.recording import (
     remove_oldest,
     Topic,
 )
-from flex_planner.ros.messages.classes import MotionTask, PayloadSearch, TYPES
+from flex_planner.ros.messages.classes import MotionTask, PlanReport, TYPES
 from flex_planner.ros.messages.plans import reference_state
 from flex_planner.ros.planner.outcome import Outcome
 from flex_planner.ros.planner.request_state import RequestState
@@ -34,7 +35,8 @@ from flex_planner.ros.settings.fields import as_mapping
 from flex_planner.ros.settings.planner import PlannerSettings
 
 # the groups sort by the time of the request
-NAME: Final = re.compile(r'(?:plan_path|find_max_payload)_(\d{8}T\d{6}_\d{9})_(\d{4,})')
+NAME: Final = re.compile(
+    r'(?:plan_path|find_max_payload|execution)_(\d{8}T\d{6}_\d{9})_(\d{4,})')
 
 _LOG = logging.getLogger(__name__)
 
@@ -97,7 +99,8 @@ class OutcomeRecorder:
         """
         settings, stamp, report = state.settings, state.stamp_ns, outcome.report
         ready = stamp + report.planning_time.sec * 10**9 + report.planning_time.nanosec
-        path = settings.output_folder() / self._name(stamp, outcome.search)
+        path = settings.output_folder() / self._name(
+            stamp, 'plan_path' if outcome.search is None else 'find_max_payload')
         report.recording = printable(str(path))
         with Recording.create(path.parent, path.name, TYPES,
                               custom_data={'flex_planner': VERSION},
@@ -115,21 +118,41 @@ class OutcomeRecorder:
         _remove_old(settings, path)
         return path
 
+    def write_execution(self, task: MotionTask, state: RequestState, report: PlanReport) -> None:
+        """
+        Write a recording of how a plan was carried out; the arguments are those of `write`.
+
+        Raises
+        ------
+        RecordingError
+            If it cannot be written; nothing is left behind then.
+
+        """
+        settings, now = state.settings, time.time_ns()
+        path = settings.output_folder() / self._name(now, 'execution')
+        report.execution_recording = printable(str(path))
+        with Recording.create(path.parent, path.name, TYPES,
+                              custom_data={'flex_planner': VERSION}) as recording:
+            recording.attach('scenario.yaml', self._scenario(settings).encode(),
+                             media_type='application/yaml', time_ns=now)
+            recording.write(self._task, task, now)
+            recording.write(self._report, report, now)
+        _remove_old(settings, path)
+
     def _write_states(self, recording: Recording, state: RequestState, plan: Plan,
                       reference: SampledPlan, ready: int) -> None:
         """Write the samples of a plan that is ready at a time [ns]."""
         names = [*state.settings.joint_names, *plan.arm.modal_names]
-        for k, time in enumerate(reference.times_ns):
+        for k, passed in enumerate(reference.times_ns):
             if state.stopping():
                 raise RecordingError(f'writing stopped after {k} of {len(reference.times_ns)} '
                                      'samples')
-            stamp = ready + int(time)
+            stamp = ready + int(passed)
             message = reference_state(plan, reference.samples, k, names, stamp)
             recording.write(self._states, message, stamp)
 
-    def _name(self, stamp: int, search: PayloadSearch | None) -> str:
+    def _name(self, stamp: int, kind: str) -> str:
         """Return a name that sorts by kind and time and is not used twice."""
-        kind = 'plan_path' if search is None else 'find_max_payload'
         moment = datetime.fromtimestamp(stamp // 10**9, timezone.utc)
         return f'{kind}_{moment:%Y%m%dT%H%M%S}_{stamp % 10**9:09d}_{next(self._numbers):04d}'
 

@@ -21,6 +21,7 @@ from flex_planner.planning.robustness import assess_robustness
 from flex_planner.planning.sampling import judge_execution, sample_plan
 from flex_planner.planning.strategies.initial_guesses import WARM_START
 from flex_planner.planning.warnings import WarningKind
+from flex_planner.ros.messages.measured_starts import ArmStateError, starts_at_arm, with_start
 from flex_planner.ros.messages.payload_searches import (
     report_from_search,
     search_message,
@@ -29,7 +30,6 @@ from flex_planner.ros.messages.payload_searches import (
 )
 from flex_planner.ros.messages.plans import (
     add_execution,
-    duration_message,
     error_code,
     objectives_from_message,
     planning_time_limit,
@@ -41,8 +41,14 @@ from flex_planner.ros.messages.plans import (
 )
 from flex_planner.ros.messages.spaces import add_space
 from flex_planner.ros.messages.trajectory_rules import trajectory_violations
+from flex_planner.ros.planner.arm_state import ArmState
 from flex_planner.ros.planner.map_starts import Starts
-from flex_planner.ros.planner.outcome import failure_outcome, Outcome, unknown_failure
+from flex_planner.ros.planner.outcome import (
+    enter_times,
+    failure_outcome,
+    Outcome,
+    unknown_failure,
+)
 from flex_planner.ros.planner.recorder import OutcomeRecorder
 from flex_planner.ros.planner.request_state import RequestState
 from flex_planner.ros.settings.planner import PlannerSettings
@@ -69,13 +75,16 @@ class RequestPlanner:
         Where outcomes are kept.
     starts : Starts, optional
         Motions that requests near them start from.
+    arm_state : ArmState, optional
+        Where the arm is; without it, nobody knows and nothing is checked.
 
     """
 
     def __init__(self, model: ArmModel, recorder: OutcomeRecorder,
-                 starts: Starts | None = None) -> None:
+                 starts: Starts | None = None, arm_state: ArmState | None = None) -> None:
         self._model, self._recorder = model, recorder
         self._starts = Starts('', model.arm) if starts is None else starts
+        self._arm_state = arm_state
         self._report_in_work: PlanReport | None = None
 
     def plan(self, message: MotionTask, state: RequestState) -> Outcome:
@@ -148,10 +157,14 @@ class RequestPlanner:
     def _conclude(self, work: Callable[[Task, Monitor], Outcome], message: MotionTask,
                   state: RequestState, search: PayloadSearch | None = None) -> Outcome:
         """Do the work of a request and record its outcome, with `search` where it failed."""
+        measured: list[float] = []
         try:
             if state.withdrawn:  # while it waited: only to be recorded
                 raise StoppedError(StopReason.CANCELED)
             state.report(replace(state.progress, phase='start'))
+            if starts_at_arm(message):
+                message = self._place(message, state)
+                measured = list(message.start_positions)
             task = task_from_message(message, self._model.arm, state.settings)
             monitor = Monitor(time_limit=planning_time_limit(message, state.settings),
                               canceled=state.is_canceled, report=state.report)
@@ -160,15 +173,52 @@ class RequestPlanner:
         except FlexPlannerError as error:
             outcome = failure_outcome(error_code(error), str(error))
         except StoppedError as error:
-            outcome = failure_outcome(STOP_CODES[error.reason], error.reason.value)
-            _name_limit(outcome.report, monitor)
+            outcome = failure_outcome(STOP_CODES[error.reason], state.reason or error.reason.value)
+            if error.reason is StopReason.TIMEOUT:  # else it may come before there is a limit
+                _name_limit(outcome.report, monitor)
         except Exception as error:
             _LOG.exception('planning failed')
             outcome = unknown_failure(error)
         outcome = replace(outcome, search=outcome.search or search)
+        outcome.report.measured_positions = measured
         add_space(outcome.report, message)
-        outcome.report.planning_time = duration_message(state.elapsed_ns)
+        if message.publish:
+            self.check_start(outcome, state)
+        enter_times(outcome.report, state)
         return self._record(message, state, outcome)
+
+    def check_start(self, outcome: Outcome, state: RequestState) -> None:
+        """Make an outcome a failure if the arm is not where its plan starts."""
+        if self._arm_state is None or outcome.plan is None or not outcome.publishable:
+            return
+        report = outcome.report
+        try:
+            measured = self._arm_state.check(outcome.plan.task, state.settings, state.motion)
+        except ArmStateError as error:
+            report.error_code, report.error_msg = error.code, str(error)
+        else:
+            report.measured_positions = measured or report.measured_positions
+
+    def record_execution(self, message: MotionTask, state: RequestState,
+                         report: PlanReport) -> None:
+        """Record how a plan was carried out, and enter the recording into its report."""
+        if not state.settings.record:
+            return
+        try:
+            self._recorder.write_execution(message, state, report)
+        except Exception as error:
+            expected = isinstance(error, FlexPlannerError)
+            _LOG.error('recording failed: %s', error, exc_info=not expected)
+            report.execution_recording = ''
+            sentence = f'the plan was carried out, but how could not be recorded: {error}'
+            _say_not_recorded(report, sentence, sentence, state)
+
+    def _place(self, message: MotionTask, state: RequestState) -> MotionTask:
+        """Return the task that starts where the arm is."""
+        if self._arm_state is None:
+            raise ArmStateError(PlanReport.ARM_STATE_UNKNOWN, 'nobody knows where the arm is')
+        state.report(replace(state.progress, phase='looking where the arm is'))
+        return with_start(message, self._arm_state.find_rest(state.settings, state.is_canceled))
 
     def _record(self, message: MotionTask, state: RequestState, outcome: Outcome) -> Outcome:
         """Record an outcome; one that cannot be recorded has a warning, or is a failure."""
@@ -182,7 +232,9 @@ class RequestPlanner:
         except Exception as error:
             expected = isinstance(error, FlexPlannerError)
             _LOG.error('recording failed: %s', error, exc_info=not expected)
-            _say_not_recorded(outcome.report, error, state)
+            outcome.report.recording = ''
+            _say_not_recorded(outcome.report, f'the plan could not be recorded: {error}',
+                              f'the request could not be recorded: {error}', state)
             return outcome
         finally:
             self._report_in_work = None
@@ -190,17 +242,16 @@ class RequestPlanner:
         return outcome
 
 
-def _say_not_recorded(report: PlanReport, error: Exception, state: RequestState) -> None:
+def _say_not_recorded(report: PlanReport, failure: str, warning: str,
+                      state: RequestState) -> None:
     """Add to a report that there is no recording, which may make it a failure."""
-    report.recording = ''
     required = state.settings.recording_required or state.stopping()
     if required and report.error_code == PlanReport.NONE:
         report.error_code = PlanReport.RECORDING_FAILED
-        report.error_msg = printable(f'the plan could not be recorded: {error}')
+        report.error_msg = printable(failure)
         return
     report.warning_kinds = [*report.warning_kinds, WarningKind.NOT_RECORDED.name]
-    report.warnings = [*report.warnings,
-                       printable(f'the request could not be recorded: {error}')]
+    report.warnings = [*report.warnings, printable(warning)]
 
 
 def _name_limit(report: PlanReport, monitor: Monitor) -> None:

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+import math
 import threading
+import time
 
+from flex_planner.ros.planner.execution import Execution
 from flex_planner.ros.planner.outcome import (
     busy_outcome,
     canceled_outcome,
@@ -32,11 +35,22 @@ class PendingRequest:
     executor : Executor
         Runs what awaits `future`.
 
+    Attributes
+    ----------
+    future : Future
+        Of the outcome of planning.
+    execution : Execution or None
+        Of the plan, by a controller.
+    is_open : bool
+        Whether there is no answer yet.
+
     """
 
     def __init__(self, state: RequestState, executor: Executor) -> None:
         self.state, self.future = state, Future(executor=executor)
         self.job: Job | None = None
+        self.execution: Execution | None = None
+        self.is_open = True
         self._executor, self._lock = executor, threading.Lock()
 
     def conclude(self, outcome: Outcome) -> None:
@@ -57,12 +71,13 @@ class RequestQueue:
     ----------
     queue_length : int
         Requests that may wait.
+    max_waiting_time : float
+        Largest sum of the times that they may take [s].
 
     """
 
-    def __init__(self, queue_length: int) -> None:
-        self._queue_length = queue_length
-        self._worker = Worker(queue_length)
+    def __init__(self, queue_length: int, max_waiting_time: float = math.inf) -> None:
+        self._worker = Worker(queue_length, max_waiting_time)
         self._active: PendingRequest | None = None
 
     @property
@@ -76,7 +91,8 @@ class RequestQueue:
         active = self._active
         return active.state if active else None
 
-    def submit(self, work: Work, settings: PlannerSettings, executor: Executor) -> PendingRequest:
+    def submit(self, work: Work, settings: PlannerSettings, executor: Executor,
+               seconds: float = 0.0, motion: str = '') -> PendingRequest:
         """
         Add a request.
 
@@ -88,24 +104,30 @@ class RequestQueue:
             To serve it with.
         executor : Executor
             Runs what awaits the outcome.
+        seconds : float
+            Time that it may take.
+        motion : str
+            How the arm moves, empty if it does not.
 
         """
-        state = RequestState(settings=settings, stopping=lambda: self._worker.stopping)
+        state = RequestState(settings=settings, stopping=lambda: self._worker.stopping,
+                             motion=motion)
         pending = PendingRequest(state, executor)
         pending.job = partial(self._serve, work, pending)
-        if not self._worker.submit(pending.job):
-            pending.conclude(busy_outcome(self._queue_length))
+        refusal = self._worker.submit(pending.job, seconds)
+        if refusal:
+            pending.conclude(busy_outcome(refusal))
         return pending
 
-    def withdraw(self, pending: PendingRequest) -> None:
+    def withdraw(self, pending: PendingRequest, reason: str = '') -> None:
         """
-        Cancel a request and conclude it at once.
+        Cancel a request, for a reason if not its client's, and conclude it at once.
 
         A solver that works on it stops at its next iteration. One that waits gives its place to
         others; its work is still called, which sees that it is canceled, and records that.
 
         """
-        pending.state.withdraw()
+        pending.state.withdraw(reason)
         if pending.job is not None:
             self._worker.withdraw(pending.job)
         pending.conclude(canceled_outcome(pending.state))
@@ -116,6 +138,7 @@ class RequestQueue:
 
     def _serve(self, work: Work, pending: PendingRequest) -> None:
         self._active = pending
+        pending.state.began_ns = time.monotonic_ns()
         try:
             outcome = work(pending.state)
         except Exception as error:

@@ -36,9 +36,15 @@ class RequestState:
     progress : Progress
         The latest.
     withdrawn : bool
-        Whether the client has canceled it.
+        Whether it is given up.
     ended_ns : int or None
         When that was, by the monotonic clock [ns].
+    reason : str
+        Why, where its client has not canceled it.
+    began_ns : int
+        When the worker began with it, by the monotonic clock [ns]; 0 while it waits.
+    motion : str
+        How the arm moved when it was accepted, empty if it did not or is not watched.
 
     """
 
@@ -49,6 +55,9 @@ class RequestState:
     progress: Progress = _WAITING
     withdrawn: bool = False
     ended_ns: int | None = None
+    reason: str = ''
+    began_ns: int = 0
+    motion: str = ''
 
     @property
     def elapsed_ns(self) -> int:
@@ -56,9 +65,14 @@ class RequestState:
         now = time.monotonic_ns() if self.ended_ns is None else self.ended_ns
         return now - self.accepted_ns
 
-    def withdraw(self) -> None:
-        """Let it be canceled by its client from now on."""
-        self.ended_ns, self.withdrawn = time.monotonic_ns(), True
+    def withdraw(self, reason: str = '') -> None:
+        """Let it be given up from now on, for a reason if its client has not canceled it."""
+        self.reason, self.ended_ns, self.withdrawn = reason, time.monotonic_ns(), True
+
+    @property
+    def waited_ns(self) -> int:
+        """Time that it waited for others [ns]."""
+        return min((self.began_ns or time.monotonic_ns()) - self.accepted_ns, self.elapsed_ns)
 
     def is_canceled(self) -> bool:
         """Return whether to stop working on it."""

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 import logging
+import math
 import threading
+import time
 
 from flex_planner.base.processes import return_memory
 
@@ -24,13 +26,17 @@ class Worker:
     ----------
     queue_length : int
         Jobs that may wait.
+    max_waiting_time : float
+        Largest sum of the times that waiting jobs may take [s].
 
     """
 
-    def __init__(self, queue_length: int) -> None:
-        self._queue_length = queue_length
-        self._jobs: deque[Job] = deque()
+    def __init__(self, queue_length: int, max_waiting_time: float = math.inf) -> None:
+        self._queue_length, self._max_waiting_time = queue_length, max_waiting_time
+        self._jobs: deque[tuple[Job, float]] = deque()
         self._withdrawn: deque[Job] = deque()
+        self._ends = 0.0  # when the running job ends at the latest, by the monotonic clock
+        self._running = False
         self._changed = threading.Condition()
         self._stopping = False
         # a daemon: should a job not listen, the process still ends
@@ -47,14 +53,26 @@ class Worker:
         """Return the number of waiting jobs."""
         return len(self._jobs)
 
-    def submit(self, job: Job) -> bool:
-        """Queue a job; return False if the queue is full or the worker is stopping."""
+    def submit(self, job: Job, seconds: float = 0.0) -> str:
+        """
+        Queue a job; return the reason if that cannot be, empty if it is done.
+
+        Parameters
+        ----------
+        job : callable
+            The job.
+        seconds : float
+            Time that it may take.
+
+        """
         with self._changed:
-            if self._stopping or len(self._jobs) >= self._queue_length:
-                return False
-            self._jobs.append(job)
-            self._changed.notify()
-        return True
+            if self._stopping:
+                return 'the planner is ending'
+            refusal = self._refusal(seconds)
+            if not refusal:
+                self._jobs.append((job, seconds))
+                self._changed.notify()
+        return refusal
 
     def withdraw(self, job: Job) -> bool:
         """
@@ -64,9 +82,10 @@ class Worker:
 
         """
         with self._changed:
-            if job not in self._jobs:
+            found = [entry for entry in self._jobs if entry[0] == job]
+            if not found:
                 return False
-            self._jobs.remove(job)
+            self._jobs.remove(found[0])
             if len(self._withdrawn) < _MOST_WITHDRAWN:
                 self._withdrawn.append(job)
                 self._changed.notify()
@@ -83,13 +102,38 @@ class Worker:
         self._thread.join(timeout)
         return not self._thread.is_alive()
 
+    def _refusal(self, seconds: float) -> str:
+        """Return why a job cannot wait, and for how long; empty if it can, or need not."""
+        now, times = time.monotonic(), [entry[1] for entry in self._jobs]
+        if not (times or self._running):
+            return ''
+        # what the thread is about to take does not wait
+        ends = self._ends if self._running else now + times.pop(0)
+        # when the worker takes each of those that wait, and when it has done all
+        takes = [max(ends - now, 0.0) + sum(times[:k]) for k in range(len(times) + 1)]
+        if len(times) >= self._queue_length:
+            return (f'{len(times)} requests are waiting already; the parameter queue_length '
+                    f'allows no more: {_retry(takes[len(times) - self._queue_length])}')
+        if sum(times) + seconds <= self._max_waiting_time:
+            return ''
+        fits = [k for k in range(len(times))
+                if sum(times[k + 1:]) + seconds <= self._max_waiting_time]
+        return (f'the requests that wait may take {sum(times):.3g} s and this one {seconds:.3g} '
+                f's, together more than max_waiting_time = {self._max_waiting_time:g} s: '
+                f'{_retry(takes[fits[0] if fits else -1])}, or allow less planning time')
+
     def _next(self) -> Job | None:
         """Wait for a job; None when the worker stops."""
         with self._changed:
+            self._running = False
             self._changed.wait_for(lambda: self._stopping or self._withdrawn or self._jobs)
             if self._stopping:
                 return None
-            return (self._withdrawn or self._jobs).popleft()
+            if self._withdrawn:  # takes no time worth counting
+                return self._withdrawn.popleft()
+            job, seconds = self._jobs.popleft()
+            self._running, self._ends = True, time.monotonic() + seconds
+        return job
 
     def _run(self) -> None:
         while (job := self._next()) is not None:
@@ -98,3 +142,8 @@ class Worker:
             except Exception:
                 _LOG.exception('a planning job failed')
             return_memory()
+
+
+def _retry(seconds: float) -> str:
+    """Return when to try again, in words."""
+    return f'there is room in about {math.ceil(seconds)} s at the latest, try again then'

@@ -17,6 +17,7 @@ from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.text import printable
 from flex_planner.ros.runtime.arguments import readable_arguments, unused_files
 from flex_planner.ros.runtime.logs import forward_logs
+from flex_planner.ros.runtime.namesakes import NamesakeWatch
 import rclpy
 from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -66,6 +67,7 @@ def run_node(create: Callable[[], Node], name: str, args: list[str] | None) -> N
     forward_logs(logging.getLogger('flex_planner'))
     try:
         node = create()
+        NamesakeWatch(node)
         started = True
         executor = SingleThreadedExecutor()
         executor.add_node(node)

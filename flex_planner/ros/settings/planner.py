@@ -32,6 +32,7 @@ MIN_ACCURACY, MAX_ACCURACY = 1e-6, 1e3
 # of a file of a recording, and of all recordings [bytes]: a slip in the unit must not make a file
 # of every message, nor remove all
 MIN_RECORDING_SIZE, MAX_RECORDING_SIZE = 2**16, 2**40
+MAX_WAITING = 1e6  # [s]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,6 +113,30 @@ class PlannerSettings:
     queue_length: int = parameter_field(
         8, 'Requests that may wait; more are answered BUSY.', lowest=1, highest=1000,
         read_only=True)
+    max_waiting_time: float = parameter_field(
+        300.0, 'Largest sum of the allowed planning times of requests that wait; more are '
+        'answered BUSY [s].', lowest=1e-3, highest=MAX_WAITING, read_only=True)
+    joint_states_topic: str = parameter_field(
+        'joint_states', 'Topic on which the arm says where it is, sensor_msgs/JointState; empty: '
+        'not listened to.', read_only=True)
+    check_start: bool = parameter_field(
+        True, 'Whether a plan is not published where the arm is heard, but moves or is not at the '
+        'start of the plan.')
+    start_tolerance: float = parameter_field(
+        0.05, 'Largest distance of a joint from the start of a plan that is published [rad].',
+        lowest=1e-6, highest=10.0)
+    start_speed_tolerance: float = parameter_field(
+        0.05, 'Largest difference of the speed of a joint from that at the start of such a plan '
+        '[rad/s].', lowest=1e-6, highest=10.0)
+    joint_state_timeout: float = parameter_field(
+        1.0, 'Joint states that are older do not tell where the arm is [s].', lowest=0.01,
+        highest=3600.0)
+    execute_action: str = parameter_field(
+        '', 'Action of a controller, control_msgs/FollowJointTrajectory, that published plans are '
+        'sent to; empty: none.', read_only=True)
+    execute_timeout: float = parameter_field(
+        5.0, 'Time that the controller has to appear, to accept a plan, to end after the end of '
+        'the motion, and to cancel [s].', lowest=0.1, highest=3600.0)
     recording_folder: str = parameter_field(
         '', 'Folder of the recordings; empty for $ROS_HOME/flex_planner.', read_only=True)
     record: bool = parameter_field(True, 'Whether to record every request with its outcome.')

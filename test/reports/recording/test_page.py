@@ -142,6 +142,23 @@ def test_page_lists_the_warnings_and_older_recordings_have_none(
     assert warned(replace(request_of_plan, report=older)) == []
 
 
+def test_page_tells_where_the_arm_was_and_what_its_controller_did(
+        request_of_plan: RecordedRequest) -> None:
+    def rows(**fields: object) -> dict[str, str]:
+        report = SimpleNamespace(**{name: getattr(request_of_plan.report, name)
+                                    for name in dir(request_of_plan.report) if name[0] != '_'})
+        vars(report).update(fields)
+        page = Page(report_page(replace(request_of_plan, report=report)))
+        return {row[0]: row[1] for table in page.data['tables'] for row in table['rows']}
+
+    assert not {'arm measured at', 'controller'} & rows().keys()
+    took = SimpleNamespace(sec=1, nanosec=250_000_000)
+    told = rows(measured_positions=[0.0, np.pi / 2], execution_time=took, execution_accepted=True,
+                execution_error_code=-4, execution_error_string='joint2 is 0.3 rad off')
+    assert told['arm measured at'] == '(0, 90) deg'
+    assert told['controller'] == 'accepted, ended after 1.250 s, error -4 joint2 is 0.3 rad off'
+
+
 def test_page_of_a_failure_tells_the_error(failure: Path) -> None:
     page = Page(report_page(RecordedRequest.read(failure)))
     assert page.data['plots'] == []

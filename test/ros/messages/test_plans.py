@@ -286,7 +286,7 @@ def test_report_of_a_stopped_plan_has_its_own_code(rigid_arm: Arm, rigid_model: 
 
 def test_outcomes_without_a_plan_are_not_publishable() -> None:
     for outcome, code, word in (
-            (busy_outcome(3), PlanReport.BUSY, '3 requests are waiting'),
+            (busy_outcome('3 requests wait'), PlanReport.BUSY, '3 requests wait'),
             (unknown_failure(KeyError('x')), PlanReport.UNKNOWN, "KeyError: 'x'")):
         assert not outcome.publishable
         assert outcome.report.error_code == code

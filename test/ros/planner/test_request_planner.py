@@ -335,3 +335,31 @@ def test_payload_found_is_returned_but_not_published_if_it_cannot_be_recorded(
     assert outcome.search is not None
     assert outcome.search.payload == pytest.approx(MOST, abs=ACCURACY)
     assert outcome.trajectory.points
+
+
+@pytest.mark.parametrize('required', [True, False])
+def test_execution_that_cannot_be_recorded_is_no_success_if_that_is_required(
+        worker: RequestPlanner, settings: PlannerSettings, tmp_path: Path,
+        required: bool) -> None:
+    blocked = tmp_path / 'a file'
+    blocked.write_text('')
+    state = RequestState(settings=replace(settings, recording_folder=str(blocked),
+                                          recording_required=required))
+    report = PlanReport(execution_accepted=True)
+    worker.record_execution(task(), state, report)
+    assert report.error_code == (PlanReport.RECORDING_FAILED if required else PlanReport.NONE)
+    assert report.warning_kinds == ([] if required else ['NOT_RECORDED'])
+    sentence = report.error_msg if required else report.warnings[0]
+    assert sentence.startswith('the plan was carried out, but how could not be recorded: ')
+    assert (report.execution_accepted, report.execution_recording) == (True, '')
+    aborted = PlanReport(error_code=PlanReport.EXECUTION_ABORTED, error_msg='it gave up')
+    worker.record_execution(task(), state, aborted)
+    assert (aborted.error_code, aborted.error_msg) == (
+        PlanReport.EXECUTION_ABORTED, 'it gave up')
+
+
+def test_motion_cannot_start_where_the_arm_is_if_nobody_knows_that(
+        worker: RequestPlanner, settings: PlannerSettings) -> None:
+    outcome = worker.plan(task(start=MotionTask.CURRENT), RequestState(settings=settings))
+    assert outcome.report.error_code == PlanReport.ARM_STATE_UNKNOWN
+    assert outcome.report.error_msg == 'nobody knows where the arm is'

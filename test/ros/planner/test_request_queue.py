@@ -142,3 +142,61 @@ def test_desk_that_closes_tells_the_work_and_takes_no_more(settings: PlannerSett
     wait('a request at work', lambda: queue.active)
     assert queue.close(5)
     assert code(queue.submit(until_canceled, settings, FakeExecutor())) == PlanReport.BUSY
+
+
+def test_times_of_those_that_wait_are_bounded(settings: PlannerSettings) -> None:
+    queue, executor = RequestQueue(10, 100.0), FakeExecutor()
+    first = queue.submit(until_canceled, settings, executor, 1000.0)
+    wait('a request at work', lambda: queue.active)
+    waiting = [queue.submit(until_canceled, settings, executor, 40.0) for _ in range(2)]
+    refused = queue.submit(until_canceled, settings, executor, 40.0)
+    sentence = refused.future.result().report.error_msg
+    assert code(refused) == PlanReport.BUSY
+    assert 'may take 80 s and this one 40 s, together more than max_waiting_time = 100' in sentence
+    # the one at work leaves in 1000 s, then the first of those that wait
+    assert 'there is room in about 1000 s at the latest' in sentence
+    longer = queue.submit(until_canceled, settings, executor, 200.0)
+    assert 'about 1080 s at the latest' in longer.future.result().report.error_msg
+    assert not queue.submit(until_canceled, settings, executor, 20.0).future.done()
+    queue.withdraw(waiting[0])
+    assert not queue.submit(until_canceled, settings, executor, 40.0).future.done()
+    assert not first.future.done()
+    assert queue.close(5)
+
+
+def test_request_of_any_length_is_taken_by_an_idle_queue(settings: PlannerSettings) -> None:
+    queue = RequestQueue(1, 1.0)
+    pending = queue.submit(until_canceled, settings, FakeExecutor(), 3600.0)
+    wait('a request at work', lambda: queue.active)
+    assert not pending.future.done()
+    assert queue.close(5)
+
+
+def test_full_queue_says_when_there_is_room(settings: PlannerSettings) -> None:
+    queue, executor = RequestQueue(2, 1e6), FakeExecutor()
+    queue.submit(until_canceled, settings, executor, 30.0)
+    wait('a request at work', lambda: queue.active)
+    for _ in range(2):
+        queue.submit(until_canceled, settings, executor, 500.0)
+    refused = queue.submit(until_canceled, settings, executor, 1.0)
+    assert refused.future.result().report.error_msg == (
+        '2 requests are waiting already; the parameter queue_length allows no more: '
+        'there is room in about 30 s at the latest, try again then')
+    assert queue.close(5)
+
+
+def test_time_that_a_request_waits_is_told_apart(queue: RequestQueue,
+                                                 settings: PlannerSettings) -> None:
+    executor = FakeExecutor()
+    first = queue.submit(until_canceled, settings, executor)
+    wait('a request at work', lambda: queue.active)
+    second = queue.submit(until_canceled, settings, executor)
+    time.sleep(0.05)
+    queue.withdraw(first)
+    wait('the next at work', lambda: queue.active is second.state)
+    assert 0.05e9 <= second.state.waited_ns < 10e9
+    waited = second.state.waited_ns
+    time.sleep(0.02)
+    assert second.state.waited_ns == waited < second.state.elapsed_ns
+    queue.withdraw(second, 'nobody waits for it')
+    assert second.future.result().report.error_msg == 'nobody waits for it'
