@@ -23,6 +23,7 @@ from flex_planner.optimal_control.task import MAX_PAYLOAD
 from flex_planner.optimal_control.totals import integrate_totals
 from flex_planner.planning.kinds.clusters import MOST_KINDS
 from flex_planner.planning.kinds.effort import SearchEffort
+from flex_planner.planning.kinds.kinds_strategy import as_guess
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_problem import INTERRUPTED_STATUS, plan_problem, STOP_STATUS
 from flex_planner.planning.proofs import bound_payload
@@ -33,6 +34,8 @@ import numpy as np
 
 # of the payload that the motors can just hold, kept clear of rounding
 _HELD = 1 - 1e-9
+# of it, up to which an exploration has come to it
+_REACHED = 1e-3
 # Newton iterations of a first try with that payload
 _FIRST_TRY = 15
 
@@ -70,7 +73,7 @@ def _follow(search: LimitSearch, problem: MotionProblem, solver: Solver,
     found = replace(_result(search, problem, plan.status, plan.message), plan=plan,
                     payload=last.value if plan.solved else 0.0,
                     local_upper=last.value + last.gap)
-    held = None if near else _hold(problem, last, found, solver)
+    held = None if near else _hold(problem, search, found, solver)
     if held is not None or not plan.solved:
         return _certified_so_far(search, held or found)
     if not near:
@@ -117,14 +120,21 @@ def _carry_the_most(problem: MotionProblem, solver: Solver) -> MaxPayload | None
             'motors are not the limit'))
 
 
-def _hold(problem: MotionProblem, last: Extremal, found: MaxPayload,
+def _hold(problem: MotionProblem, search: LimitSearch, found: MaxPayload,
           solver: Solver) -> MaxPayload | None:
     """Return the outcome where the goal is what the motors can just hold; None if it is not."""
     limit, joint = holding_limit(problem.model, problem.task, problem.parameters)
-    if not np.isfinite(limit) or limit * _HELD <= last.value:
+    if not np.isfinite(limit) or limit * _HELD <= search.last.value:
         return None
     heaviest = PAYLOAD.with_value(problem, limit * _HELD)
-    return _held(plan_near(heaviest, last.result.solution, solver), limit, joint, found)
+    # kinds that an exploration followed up to that payload
+    kinds = [as_guess(heaviest, kind, solver) for kind in search.kinds
+             if kind.value > (1 - _REACHED) * limit]
+    for start in (search.last.result.solution, *kinds):
+        held = _held(plan_near(heaviest, start, solver), limit, joint, found)
+        if held is not None:
+            return held
+    return None
 
 
 def _held(plan: Plan, limit: float, joint: int, found: MaxPayload) -> MaxPayload | None:

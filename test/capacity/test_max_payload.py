@@ -6,6 +6,7 @@ from dataclasses import replace
 import math
 from typing import Any
 
+from bench.random_tasks import random_task
 from factories import SearchFactory, TaskFactory
 from flex_planner.arms.arm import Arm, Joint, Link, Motor
 from flex_planner.arms.kinematics import tip_position
@@ -271,6 +272,14 @@ def test_payload_that_no_motion_was_found_to_carry_is_told_with_what_was_found_i
 
 
 # Gravity
+
+
+def test_payload_that_can_be_held_is_reached_from_where_an_exploration_came_to_it() -> None:
+    # a task of the adversary, whose price Newton's method cannot follow
+    found = find_max_payload(random_task(326, gravity=True))
+    assert (found.status, found.held) == (PlanStatus.SOLVED, True), found.message
+    assert found.payload == pytest.approx(0.947996, rel=1e-6)
+    assert found.proved_upper == pytest.approx(found.payload, rel=2e-6)
 
 
 def test_payload_that_the_motor_just_holds_at_the_goal_is_the_limit() -> None:
