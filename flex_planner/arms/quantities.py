@@ -18,15 +18,11 @@ from flex_planner.base.validation import number
 
 
 class Range(NamedTuple):
-    """Least and largest magnitude of a quantity that is not 0, and its unit."""
+    """Least magnitude of a quantity that must not vanish, the largest, and the unit."""
 
     least: float
     most: float
     unit: str
-
-    def __str__(self) -> str:
-        """Return the range in words."""
-        return f'{self.least:g} to {self.most:g} {self.unit}'.rstrip()
 
 
 QUANTITIES: Mapping[str, Range] = MappingProxyType({
@@ -51,7 +47,7 @@ QUANTITIES: Mapping[str, Range] = MappingProxyType({
 def check_quantity(field: str, value: object, kind: str, *, above: float = -math.inf,
                    at_least: float = -math.inf, infinite: bool = False, note: str = '') -> float:
     """
-    Return a value as a float within the range of its kind; 0 and infinity where the bounds let.
+    Return a value as a float within the range of its kind, or infinity where that is allowed.
 
     Parameters
     ----------
@@ -73,13 +69,10 @@ def check_quantity(field: str, value: object, kind: str, *, above: float = -math
     limits = QUANTITIES[kind]
     result = number(field, value, above=above, at_least=at_least, infinite=infinite,
                     unit=f'{limits.unit}{note}')
-    if result and math.isfinite(result) and not limits.least <= abs(result) <= limits.most:
-        raise InvalidValueError(field, result, f'a number in the range {_say(limits, at_least)}')
+    # next to nothing is harmless where nothing is
+    least = limits.least if above == 0 else 0.0
+    if math.isfinite(result) and not least <= abs(result) <= limits.most:
+        lowest = least if least or at_least == 0 else -limits.most
+        raise InvalidValueError(field, result, f'a number in the range {lowest:g} to '
+                                               f'{limits.most:g} {limits.unit}')
     return result
-
-
-def _say(limits: Range, at_least: float) -> str:
-    """Return a range with what else is allowed."""
-    if not limits.least:
-        return f'{-limits.most:g} to {limits.most:g} {limits.unit}'
-    return f'{limits}, or 0' if at_least == 0 else str(limits)

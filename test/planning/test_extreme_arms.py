@@ -51,7 +51,7 @@ def values(kind: str, *, zero: bool = False) -> st.SearchStrategy[float]:
     least, most, _ = QUANTITIES[kind]
     between = st.floats(math.log(least), math.log(most)).map(
         lambda power: min(max(math.exp(power), least), most))
-    return st.sampled_from([least, most, 1.0, *([0.0] if zero else [])]) | between
+    return st.sampled_from([least, most, 1.0, *([0.0, 5e-324, 1e-200] if zero else [])]) | between
 
 
 def links(family: str) -> st.SearchStrategy[dict[str, Any]]:

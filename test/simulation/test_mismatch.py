@@ -111,7 +111,7 @@ def test_rigid_link_stays_rigid(ei5_arm: Arm) -> None:
     ({'rigidity_scale': 0.0}, InvalidValueError, 'rigidity_scale is 0.0'),
     ({'rigidity_scale': np.nan}, NotFiniteError, 'rigidity_scale is nan'),
     ({'added_friction': [0.1, -0.1]}, InvalidValueError, r'added_friction\[1\] is -0.1'),
-    ({'added_friction': [0.1]}, InvalidSizeError, 'added_friction has 1 numbers')])
+    ({'added_friction': [0.1]}, InvalidSizeError, 'added_friction has 1 number,')])
 def test_bad_mismatch_is_refused(ei5_arm: Arm, values: dict[str, Any],
                                  error: type[Exception], text: str) -> None:
     with pytest.raises(error, match=text):
