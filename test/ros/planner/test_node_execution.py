@@ -190,7 +190,12 @@ def test_controller_that_leaves_and_one_that_is_not_there(arena: Arena, tmp_path
     assert 'but its type is flex_planner_interfaces/action/PlanPath' in report.error_msg
     arena.restart(tmp_path)
     arena.behave('carry_out')
-    assert arena.report(publish=True).error_code == PlanReport.NONE
+    codes = {PlanReport.EXECUTION_NO_SERVER}  # the planner discovers it a moment after this client
+    for _ in range(10):
+        codes.add(arena.report(publish=True).error_code)
+        if PlanReport.NONE in codes:
+            break
+    assert codes == {PlanReport.EXECUTION_NO_SERVER, PlanReport.NONE}
 
 
 def test_node_with_a_name_that_cannot_be_says_so_and_ends(arena: Arena, tmp_path: Path) -> None:
