@@ -3,9 +3,16 @@
 from __future__ import annotations
 
 from factories import SearchFactory, TaskFactory
+from flex_planner.base.processes import PROCESSES
 from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.capacity.results import MaxPayload
 import pytest
+
+
+@pytest.fixture(autouse=True)
+def count_calls(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let IPOPT run in this process: while a helper works, monitors are asked by the clock."""
+    monkeypatch.setenv(PROCESSES, '0')
 
 
 @pytest.fixture(scope='session')

@@ -37,8 +37,8 @@ def test_efforts_come_half_a_period_later_or_earlier(plan: Plan, hold: EffortHol
 def test_held_effort_of_the_last_period_has_the_impulse_of_both_torques(plan: Plan) -> None:
     # the motion ends 0.3 periods after an update of the controller
     motion, period = published(plan, EffortHold.END, 0.0), 5e-3
-    late = motion.duration + 0.7 * period
-    last = plan.sample([motion.duration]).torques[0]
+    late = motion.end + 0.7 * period
+    last = plan.sample([motion.end]).torques[0]
     expected = 0.3 * last + 0.7 * plan.problem.holding_torque
     np.testing.assert_allclose(motion.torque(np.array([late]))[0], expected, atol=1e-12)
     assert np.abs(last - plan.problem.holding_torque).max() > 1
@@ -47,8 +47,8 @@ def test_held_effort_of_the_last_period_has_the_impulse_of_both_torques(plan: Pl
 @pytest.mark.parametrize('hold', [EffortHold.START, EffortHold.MIDDLE, EffortHold.LINEAR])
 def test_other_controllers_go_to_the_holding_effort_at_once(plan: Plan, hold: EffortHold) -> None:
     motion = published(plan, hold, 0.0)
-    after = motion.torque(motion.duration + np.array([0.0, 1.1e-6]))
-    assert after[0].tolist() == plan.sample([motion.duration]).torques[0].tolist()
+    after = motion.torque(motion.end + np.array([0.0, 1.1e-6]))
+    assert after[0].tolist() == plan.sample([motion.end]).torques[0].tolist()
     assert after[1].tolist() == plan.problem.holding_torque.tolist()
 
 

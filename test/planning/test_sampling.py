@@ -206,9 +206,9 @@ def test_efforts_are_shifted_by_half_the_period_in_which_they_are_held(
 
 
 def test_steps_stay_above_a_quarter_of_a_millisecond(flexible: Plan) -> None:
-    reference = sample_plan(flexible, SamplingSettings(torque_tolerance=1e-12))
+    reference = sample_plan(flexible, SamplingSettings(torque_tolerance=1e-9))
     assert np.diff(reference.times_ns)[:-1].min() >= 250_000
-    assert reference.torque_error > 1e-12  # and the truth is told
+    assert reference.torque_error > 1e-9  # and the truth is told
 
 
 def test_plan_without_solution_has_no_samples(rigid_arm: Arm, rigid_model: ArmModel,

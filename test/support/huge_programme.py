@@ -22,7 +22,7 @@ def huge_problem() -> MotionProblem:
     return problem_of(ArmModel.of(arm), task)
 
 
-def solve_huge(problem: MotionProblem, monitor: Monitor) -> DirectResult:
+def solve_huge(problem: MotionProblem, monitor: Monitor, intervals: int = 300) -> DirectResult:
     """Run IPOPT on a mesh much finer than need be."""
-    direct = DirectProblem(problem.model, DirectSettings(intervals=300, degree=5))
+    direct = DirectProblem(problem.model, DirectSettings(intervals=intervals, degree=5))
     return direct.solve(problem.parameters, problem.start, problem.goal, 1.0, monitor=monitor)

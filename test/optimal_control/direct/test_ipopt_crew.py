@@ -151,6 +151,8 @@ sys.path[:] = {path!r}
 from flex_planner import Monitor
 from huge_programme import huge_problem, solve_huge
 problem = huge_problem()
+# Python drops a KeyboardInterrupt that comes amid some steps of an import: none is left to do
+solve_huge(problem, Monitor(), 2)
 try:
     print('begun', flush=True)
     solve_huge(problem, Monitor(report=lambda line: print(line.iteration, flush=True)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from factories import TaskFactory
 from flex_planner.collocation import Solver, SolverStatus
@@ -11,9 +11,10 @@ from flex_planner.optimal_control.direct.unknowns import Free
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.planning.kinds import kinds_strategy as module
 from flex_planner.planning.kinds.clusters import KindOfMotion
+from flex_planner.planning.kinds.explorer import ExploredMotion
 from flex_planner.planning.kinds.kinds_strategy import as_guess, explore_kinds
 from flex_planner.planning.strategies.strategy import Attempt
-from kinds_support import made_up_kind
+from kinds_support import made_up, made_up_kind
 import numpy as np
 from plan_checks import problem_of
 import pytest
@@ -35,7 +36,11 @@ def fake(monkeypatch: pytest.MonkeyPatch, rigid_model: ArmModel, paper_task: Tas
             asked.append(free)
             return [made_up_kind(twin, value) for value in values.get(free.value, ())]
 
+        def near(rigid: MotionProblem, solver: Solver) -> Iterator[ExploredMotion]:
+            return (made_up(twin, value) for value in values.get('near', ()))
+
         monkeypatch.setattr(module, 'find_kinds', find)
+        monkeypatch.setattr(module, 'explore_near_limit', near)
         return asked
 
     return install
@@ -57,6 +62,17 @@ def test_kind_that_leads_to_a_solution_is_enough(fake: Fake, rigid_model: ArmMod
     assert asked == [Free.NOTHING]
     assert ([kind.value for kind in attempt.kinds], attempt.starts) == ([0.65], 16)
     assert not (attempt.not_found or attempt.hopeless)
+
+
+@pytest.mark.parametrize(('motions', 'first'), [((0.65,), 0.5), ((0.65,) * 4, 0.65)], ids=str)
+def test_where_few_starts_lead_to_a_motion_those_of_other_payloads_are_asked(
+        fake: Fake, rigid_model: ArmModel, paper_task: TaskFactory, motions: tuple[float, ...],
+        first: float) -> None:
+    # four of sixteen starts are a quarter
+    fake(motion=motions, near=(0.5,))
+    attempt = explored(rigid_model, paper_task)
+    assert attempt.result.converged, attempt.result.message
+    assert attempt.kinds[0].value == first
 
 
 def test_motion_with_more_payload_is_a_start(fake: Fake, rigid_model: ArmModel,
