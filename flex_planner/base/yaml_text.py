@@ -134,6 +134,12 @@ class _Dumper(yaml.SafeDumper):
         """Write what two fields share twice."""
         return True
 
+    def represent_text(self, text: str) -> yaml.Node:
+        """Write halves of characters, which names of files may hold, as escapes."""
+        return self.represent_str(text.encode('utf-8', 'backslashreplace').decode())
+
+
+_Dumper.add_representer(str, _Dumper.represent_text)
 
 for _pattern in (AMBIGUOUS, DECIMAL):
     _Dumper.add_implicit_resolver(_AMBIGUOUS if _pattern is AMBIGUOUS else _TAG + 'float',

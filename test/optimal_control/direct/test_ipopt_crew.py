@@ -146,8 +146,10 @@ def test_helper_that_gives_up_is_kept(problem: MotionProblem,
 
 
 PROGRAM = """
-import sys, time
+import signal, sys, time
 sys.path[:] = {path!r}
+# a shell's background job is started with Ctrl-C ignored
+signal.signal(signal.SIGINT, signal.default_int_handler)
 from flex_planner import Monitor
 from huge_programme import huge_problem, solve_huge
 problem = huge_problem()
