@@ -294,8 +294,8 @@ def test_command_without_its_packages_says_how_to_get_them(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
         capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setitem(sys.modules, 'zarr', None)
-    monkeypatch.delitem(sys.modules, 'flex_planner.maps.store')
-    monkeypatch.delitem(sys.modules, 'flex_planner.maps.store_layout')
+    for name in ('store', 'store_layout', 'stored_map', 'zarr_groups'):
+        monkeypatch.delitem(sys.modules, f'flex_planner.maps.{name}')
     assert main(['map', 'small.yaml']) == 1
     assert "pip install 'flex_planner[maps]'" in capsys.readouterr().err
 

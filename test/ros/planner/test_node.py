@@ -317,7 +317,6 @@ def test_planning_ends_at_its_time_limit(flexible: Planner) -> None:
     report = flexible.report(**LONG, allowed_planning_time=0.5)
     assert report.error_code == PlanReport.TIMEOUT
     assert 'time limit' in report.error_msg
-    assert report.iterations > 0
 
 
 def test_every_request_is_answered_when_the_queue_is_full(flexible: Planner) -> None:

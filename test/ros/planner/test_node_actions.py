@@ -90,7 +90,9 @@ def test_goal_without_a_plan_is_aborted_with_the_reason(planner: Planner, wrong:
 
 def test_feedback_tells_again_and_again_how_far_a_plan_is(planner: Planner) -> None:
     goal = planner.plan_goal(**LONG)
-    planner.wait('ten messages of feedback', lambda: len(goal.feedback) >= 10)
+    planner.wait('ten messages of feedback and an iteration', lambda: bool(
+        len(goal.feedback) >= 10
+        and goal.feedback[-1][1].iteration > goal.feedback[0][1].iteration))
     assert not goal.answer.done()
     assert goal.cancel()
     goal.end()
