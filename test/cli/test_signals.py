@@ -17,7 +17,10 @@ import pytest
 
 # a command that hangs while a module of it is loaded, or at work, and says when it does
 HANGING = """
-import sys, time
+import signal, sys, time
+# as from a terminal: nohup and a shell's background jobs ignore some
+signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 from flex_planner.cli import main, run_command
 from flex_planner.cli.signals import SIGNALS
 

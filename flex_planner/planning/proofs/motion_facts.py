@@ -35,11 +35,11 @@ class EndEnergy:
 
     def most(self, payload: float) -> float:
         """Return the energy with a payload, or a little more [J]."""
-        return self.bare + self.per_payload * payload + self._doubt(payload)
+        return max(self.bare + self.per_payload * payload + self._doubt(payload), 0.0)
 
     def least(self, payload: float) -> float:
         """Return the energy with a payload, or a little less [J]."""
-        return self.bare + self.per_payload * payload - self._doubt(payload)
+        return max(self.bare + self.per_payload * payload - self._doubt(payload), 0.0)
 
     def ceiling(self, payload: float, tip_mass: float) -> float:
         """
