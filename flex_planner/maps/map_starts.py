@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+import logging
 from pathlib import Path
 
 from flex_planner.arms.arm import Arm
@@ -16,6 +17,8 @@ from flex_planner.maps.store_layout import MOTIONS, SIGNATURES
 from flex_planner.maps.stored_map import MapStoreError, StoredMap
 from flex_planner.optimal_control.task import Task
 import numpy as np
+
+_LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -107,6 +110,9 @@ class MapStarts:
             slice(k - k % side, min(k - k % side + side, size))
             for k, side, size in zip(index, sides, self._stored.shape, strict=True)))
         inside = tuple(k % side for k, side in zip(index, sides, strict=True))
+        if found is None:
+            _LOG.warning('the map cannot be read at %s: its motions there are damaged, and '
+                         'requests start without them', self._place(index))
         if found is None or not found[1][inside]:
             return None
         return KnownCell(place=self._place(index), motion=KeptMotion.unpack(

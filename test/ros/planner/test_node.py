@@ -533,7 +533,7 @@ def test_node_can_be_ended_while_it_starts(tmp_path: Path, number: signal.Signal
 
 def test_node_with_a_bad_parameter_says_so_and_ends(tmp_path: Path) -> None:
     wrong: list[tuple[dict[str, object], str]] = [
-        ({'arm': 'no_such_arm'}, "arm 'no_such_arm' is neither a path ending in .yaml nor one of"),
+        ({'arm': 'no_such_arm'}, "arm 'no_such_arm' is neither a file nor one of the presets"),
         ({'arm': 'korayem_rigid', 'joint_names': []}, 'joint_names'),
         ({'arm': 'korayem_rigid', 'joint_names': ['a', 'b', 'c'],
           'effort_weights': [1.0, 1.0, 1.0], 'controller_stiffness': [1.0, 1.0, 1.0],

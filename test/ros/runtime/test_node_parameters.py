@@ -88,5 +88,6 @@ def test_command_line_that_rcl_cannot_read_is_an_error_in_one_sentence(
     log = tmp_path / 'log.txt'
     with NodeProcess('flex_planner.ros.arm_simulator', log=log, **arguments) as node:
         assert node.process.wait(STARTING) == 1
-    assert f'arm_simulator: failed to initialize rcl: {reason}' in log.read_text()
+    said = log.read_text()
+    assert f'arm_simulator: ROS cannot start: failed to initialize rcl: {reason}' in said
     assert 'Traceback' not in log.read_text()
