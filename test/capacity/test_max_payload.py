@@ -188,7 +188,8 @@ def test_ipopt_carries_a_thousandth_less_and_no_thousandth_more(
     # failures take longer: on a third of the mesh
     above = by_ipopt(model, paper_task(model.arm, 1.001 * found.local_upper), 20)
     assert not above.converged
-    assert above.message == 'infeasible problem detected'
+    # on some processors it does not come so far as to see why
+    assert above.message in ('infeasible problem detected', 'maximum iterations exceeded')
 
 
 def test_ipopt_agrees_under_gravity() -> None:
