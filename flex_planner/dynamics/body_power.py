@@ -107,7 +107,7 @@ def flexible_power(body: FlexibleBody, carried: Inertia, frame: MovingFrame, mod
     unbent = Inertia.of(body) + carried
     if not body.count:
         return unbent.power(frame)
-    moments = modes.map(lambda z: apply(body.displacement, z))
+    moments = modes.apply(lambda z: apply(body.displacement, z))
     slopes = _inertia_slopes(body, q)
     bent = Inertia(unbent.mass, add(unbent.moment, moments.value),
                    _bent_inertia(unbent.matrix, body, q))
@@ -134,7 +134,7 @@ def flexible_potential(body: FlexibleBody, carried: Inertia, posture: Posture, q
 
 def tip_shift(body: FlexibleBody, modes: Motion) -> Motion:
     """Return where the tip of a body is in its frame."""
-    moved = modes.map(lambda z: apply(body.tip_displacement, z))
+    moved = modes.apply(lambda z: apply(body.tip_displacement, z))
     x, y, z = body.tip.tolist()
     return replace(moved, value=add((x, y, z), moved.value))
 

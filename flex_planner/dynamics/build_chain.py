@@ -47,7 +47,7 @@ def chain_of(mechanism: Mechanism) -> Chain:
     q, rates, a, y = (ca.SX.sym(name, n_t) for name in ('q', 'dq', 'a', 'y'))
     mass, inertia, rigidity = ca.SX.sym('m_p'), ca.SX.sym('J_p'), ca.SX.sym('EI', n)
     payload = Inertia(mass, (0.0, 0.0, 0.0), _about_z(inertia))
-    chain = _Chain(mechanism, Motion(q, rates, a, y).map(ca.vertsplit), payload,
+    chain = _Chain(mechanism, Motion(q, rates, a, y).apply(ca.vertsplit), payload,
                    ca.vertsplit(rigidity))
     return Chain(coordinates=q, rates=rates, accelerations=a, virtual_rates=y, payload_mass=mass,
                  payload_inertia=inertia, rigidity=rigidity, power=ca.SX(chain.power()),

@@ -89,7 +89,7 @@ class Motion:
     acceleration: Any
     virtual: Any
 
-    def map(self, function: Callable[[Any], Any]) -> Motion:
+    def apply(self, function: Callable[[Any], Any]) -> Motion:
         """Return a linear function of it."""
         return Motion(*map(function, (self.value, self.rate, self.acceleration, self.virtual)))
 

@@ -70,9 +70,10 @@ def build_energy_chain(arm: Arm) -> EnergyChain:
         kinetic += mass * ca.sumsqr(frame.velocity) / 2
         potential += V - mass * ca.dot(frame.gravity, frame.position)
     kinetic += (arm.nodes[-1].inertia + inertia) * (frame.rate + slope_rate)**2 / 2
-    return EnergyChain(coordinates=q, rates=rates, payload_mass=payload, payload_inertia=inertia,
-                 rigidity=rigidity, kinetic=kinetic, potential=potential,
-                 friction=_damping(arm, rigidity) * rates)
+    return EnergyChain(
+        coordinates=q, rates=rates, payload_mass=payload, payload_inertia=inertia,
+        rigidity=rigidity, kinetic=kinetic, potential=potential,
+        friction=_damping(arm, rigidity) * rates)
 
 
 def _damping(arm: Arm, rigidity: Any) -> Any:
