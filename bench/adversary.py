@@ -11,10 +11,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import islice
+import os
 import time
 
 from bench.random_tasks import link_mass, random_task, with_payload
 from flex_planner.base.errors import FlexPlannerError
+from flex_planner.base.processes import PROCESSES
 from flex_planner.base.progress import Monitor
 from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.capacity.min_duration import find_min_duration
@@ -136,7 +138,7 @@ def _best(task: Task, question: Free, starts: int) -> tuple[float, float]:
         most = holding_limit(problem.model, task, problem.parameters)[0]
     explorer = Explorer(problem, question, Monitor(), most)
     paths = random_paths(problem.start[:n], problem.goal[:n], 977 + int(task.duration * 1e6))
-    met = [explorer.explore(path) for path in islice(paths, starts)]
+    met = explorer.explore(list(islice(paths, starts)))
     kinds = cluster((one for one in met if one is not None), better)
     confirmed = [one.value for kind in kinds[:_CONFIRMED]
                  if (one := explorer.confirm(kind.motion)) is not None]
@@ -149,6 +151,7 @@ def _best(task: Task, question: Free, starts: int) -> tuple[float, float]:
 def run(seeds: Iterable[int], *, links: int = 2, starts: int = 30,
         gravities: Iterable[bool] = (False, True)) -> list[Duel]:
     """Run duels, print each, and how many the planner won."""
+    os.environ[PROCESSES] = '0'  # the CPU time is that of this process
     found: list[Duel] = []
     for seed in seeds:
         for gravity in gravities:

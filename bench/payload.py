@@ -19,8 +19,9 @@ from flex_planner import find_max_payload, find_min_duration, Monitor
 from flex_planner.arms.kinematics import tip_position
 from flex_planner.capacity.results import PayloadMethod
 from flex_planner.dynamics.integration import PiecewisePolynomial, simulate
-from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectResult, DirectSettings
+from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectSettings
 from flex_planner.optimal_control.direct.mesh import Mesh
+from flex_planner.optimal_control.direct.result import DirectResult
 from flex_planner.optimal_control.direct.unknowns import Free
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.planning.certificate import CertificateLimits

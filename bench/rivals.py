@@ -19,7 +19,8 @@ from flex_planner import Monitor, Plan
 from flex_planner.base.progress import StoppedError
 from flex_planner.base.validation import Array
 from flex_planner.collocation import GaussRule
-from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectResult, DirectSettings
+from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectSettings
+from flex_planner.optimal_control.direct.result import DirectResult
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
 import numpy as np
 from scipy.integrate import solve_bvp

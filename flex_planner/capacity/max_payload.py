@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from flex_planner.base.errors import HoldingError, InvalidTaskError
+from flex_planner.base.processes import helper_processes
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import number
 from flex_planner.capacity.extrapolation import Neighbours
@@ -86,6 +87,7 @@ def find_max_payload(task: Task, *, model: ArmModel | None = None, solver: Solve
     step = max(_STEP, accuracy) if step is None else step
     number('step', step, at_least=accuracy, at_most=MAX_PAYLOAD, unit='kg')
     effort = SearchEffort.of(search)
+    helper_processes()  # what the environment says is refused before anything is solved
     _check(task)
     model = ArmModel.for_arm(task.arm, model)  # before a clock starts
     solver = (solver or Solver()).watched_by(monitor)

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from flex_planner.base.errors import FlexPlannerError, HoldingError, InvalidTaskError
+from flex_planner.base.processes import helper_processes
 from flex_planner.base.progress import Monitor, StoppedError
 from flex_planner.base.validation import number, vector
 from flex_planner.capacity.extrapolation import Neighbours, step_ratio
@@ -70,6 +71,7 @@ def find_min_duration(task: Task, *, model: ArmModel | None = None,
 
     """
     effort = SearchEffort.of(search)
+    helper_processes()  # what the environment says is refused before anything is solved
     number('accuracy', accuracy, at_least=_MIN_ACCURACY, at_most=_MAX_ACCURACY, unit='s')
     if not np.isfinite([joint.motor.stall_torque for joint in task.arm.joints]).all():
         raise InvalidTaskError('a motor of the arm has no stall torque, so no duration is the '

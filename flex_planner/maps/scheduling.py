@@ -15,6 +15,7 @@ import time
 from typing import TypeAlias
 
 from distributed import Client, Future, get_worker, KilledWorker
+from flex_planner.base.processes import without_helpers
 from flex_planner.base.progress import Monitor
 from flex_planner.maps.axes import Block
 from flex_planner.maps.cell_results import CellCode, CellResult
@@ -138,8 +139,9 @@ class _Flight:
 
 
 def _solve_on_worker(solve: BlockSolver, study: Study, block: Block) -> Sequence[CellResult]:
-    """Solve a block on a worker."""
-    results = solve(study, block, Monitor(canceled=_withdrawal_check()))
+    """Solve a block on a worker; there is one for each processor."""
+    with without_helpers():
+        results = solve(study, block, Monitor(canceled=_withdrawal_check()))
     there = {result.index for result in results if result.code != CellCode.PENDING}
     missing = [index for index in cells(block) if index not in there]
     if missing or len(results) != len(there):

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from flex_planner.base.validation import Array
-from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectResult, DirectSettings
+from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectSettings
+from flex_planner.optimal_control.direct.result import DirectResult
 from flex_planner.optimal_control.direct.unknowns import Free
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
 from flex_planner.optimal_control.task import Task

@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import Any
 
 from flex_planner.base.errors import HoldingError, InvalidTaskError
+from flex_planner.base.processes import helper_processes
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import integer
 from flex_planner.collocation import CollocationSolution, Solver
@@ -82,6 +83,7 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
     if not strategies:
         raise ValueError('strategies must name at least one way to a solution')
     effort = SearchEffort.of(search)
+    helper_processes()  # what the environment says is refused before anything is solved
     model = ArmModel.for_arm(task.arm, model)  # before a clock starts
     solver = (solver or Solver()).watched_by(monitor)
     parameters = task_parameters(task)

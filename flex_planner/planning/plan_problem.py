@@ -75,7 +75,7 @@ def plan_problem(problem: MotionProblem, solver: Solver,
 def _look_for_cheaper(plan: Plan, attempt: Attempt, solver: Solver,
                       effort: SearchEffort) -> Plan:
     """Return the plan of the cheapest kind of motion, with the kinds that were met."""
-    cheapest = find_cheaper(plan.problem, attempt.result, solver, effort)
+    cheapest = find_cheaper(plan.problem, attempt.result, solver, effort, attempt.kinds)
     if solver.monitor.canceled():
         raise StoppedError(StopReason.CANCELED)
     others = [kind for kind in attempt.kinds if not any(

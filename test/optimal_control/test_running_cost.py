@@ -117,7 +117,7 @@ def at_all_points(model: ArmModel, parameters: Parameters, z: Array, duration: f
 
 def test_programme_has_the_same_cost_at_the_same_point(
         model: ArmModel, parameters: Parameters, points: Array) -> None:
-    programme, duration = Programme.of(model.arm, Mesh.of(*SCHEME)), 1.7
+    programme, duration = Programme.of(model.arm, Mesh.of(*SCHEME).transcription()), 1.7
     x, p, f = (programme.expressions[name] for name in ('x', 'p', 'f'))
     cost, ends = ca.Function('f', [x, p], [f]), np.zeros(4 * model.arm.n_coordinates)
     expected = model.controls(points, parameters.stack()).cost_rate

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from flex_planner.collocation import CollocationSolution, GaussRule
-from flex_planner.optimal_control.direct.ipopt import DirectResult
+from flex_planner.optimal_control.direct.result import DirectResult
 from flex_planner.optimal_control.motion_problem import MotionProblem
 import numpy as np
 

@@ -8,17 +8,19 @@ It needs no costates to start from and returns them, from the multipliers of the
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass
-from enum import Enum
 import time
-from typing import Any
 
 from flex_planner.base.errors import InvalidValueError
-from flex_planner.base.progress import Monitor, StopReason
+from flex_planner.base.progress import Monitor, StoppedError
 from flex_planner.base.validation import Array, integer, number, vector
 from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.direct.ipopt_crew import solve_each
+from flex_planner.optimal_control.direct.ipopt_start import Answer, pack_recipe, Start
 from flex_planner.optimal_control.direct.mesh import Mesh, SCHEMES
-from flex_planner.optimal_control.direct.programme import Programme
+from flex_planner.optimal_control.direct.result import DirectResult, DirectStatus
 from flex_planner.optimal_control.direct.unknowns import Free, Guess, Path, Unknowns
 from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.optimal_control.task import MAX_PAYLOAD
@@ -80,75 +82,21 @@ class DirectSettings:
         number('tolerance', self.tolerance, at_least=1e-14, at_most=1e-2)
 
 
-class DirectStatus(Enum):
-    """How a solve ended."""
-
-    CONVERGED = 'converged'
-    FAILED = 'failed'
-    STOPPED = 'stopped'
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class DirectResult:
-    """
-    The last iterate of IPOPT; a solution only if it converged.
+class _Case:
+    """The data of a motion: its parameters, the states at its ends, prices, and IPOPT's inputs."""
 
-    Attributes
-    ----------
-    status : DirectStatus
-        Only ``CONVERGED`` is a solution.
-    message : str
-        What IPOPT says, or why it was stopped.
-    cost : float
-        J of eq. (6), by the quadrature of the scheme.
-    payload, duration : float
-        m_p [kg] and t_f [s].
-    times, states, costates : numpy.ndarray, shapes (N + 1,), (N + 1, 2 n_t) twice
-        (q, q') and (psi_1, psi_2) at the nodes of the mesh.
-    point_times, point_states, point_costates : numpy.ndarray, shapes (k,), (k, 2 n_t) twice
-        The same at the collocation points. These costates belong to the torques through eq. (13);
-        except for ``gauss`` they are of lower order than those at the nodes.
-    torques : numpy.ndarray, shape (k, n)
-        At the collocation points [N m].
-    iterations : int
-        Of IPOPT.
-    seconds : float
-        Time of the solve.
-    iterate : dict of str to numpy.ndarray
-        Unknowns and multipliers of IPOPT, for a warm start.
-
-    """
-
-    status: DirectStatus
-    message: str
-    cost: float
-    payload: float
-    duration: float
-    times: Array
-    states: Array
-    costates: Array
-    point_times: Array
-    point_states: Array
-    point_costates: Array
-    torques: Array
-    iterations: int
-    seconds: float
-    iterate: dict[str, Array]
-
-    @property
-    def converged(self) -> bool:
-        """Whether this is a solution."""
-        return self.status is DirectStatus.CONVERGED
-
-    def __call__(self, times: Array) -> Array:
-        """Return z, linear between the nodes, at times (k,), shape (k, 4 n_t)."""
-        z = np.hstack([self.states, self.costates])
-        return np.stack([np.interp(times, self.times, column) for column in z.T], axis=1)
+    parameters: Parameters
+    ends: tuple[Array, Array]
+    prices: list[float]
+    inputs: dict[str, Array]
 
 
 class DirectProblem:
     """
     The motions of one arm on one mesh: derived once, solved as often as wanted.
+
+    Both happens in another process, see `ipopt_crew`.
 
     Parameters
     ----------
@@ -162,22 +110,18 @@ class DirectProblem:
     Attributes
     ----------
     build_seconds : float
-        What the derivation took.
+        What the derivation took; 0 before the first solve, and where it was known.
 
     """
 
     def __init__(self, model: ArmModel, settings: DirectSettings | None = None,
                  breaks: Array | None = None) -> None:
-        began = time.perf_counter()
         self.model, self.settings = model, settings or DirectSettings()
         self._mesh = Mesh.of(self.settings.scheme, self.settings.degree, self.settings.intervals,
                              breaks)
-        self._programme = Programme.of(model.arm, self._mesh)
         self._unknowns = Unknowns(model, self._mesh)
-        self._watch = self._programme.watch(self.settings.intervals)
-        self._solvers: dict[bool, Any] = {}
-        self._solver(warm=False)
-        self.build_seconds = time.perf_counter() - began
+        self._recipes: dict[bool, bytes] = {}
+        self.build_seconds = 0.0
 
     def solve(self, parameters: Parameters, start: Array, goal: Array, duration: float, *,
               guess: Guess | None = None, path: Path | None = None,
@@ -220,22 +164,61 @@ class DirectProblem:
             If a state or the duration is none.
 
         """
-        n_x = 2 * self.model.arm.n_coordinates
-        start, goal = vector('start', start, n_x), vector('goal', goal, n_x)
-        number('duration', duration, above=0, unit='s')
-        solver, began = self._solver(warm=warm is not None), time.perf_counter()
-        lower, upper = self._unknowns.bounds(parameters, duration, free, most_payload)
+        case = self._case(parameters, start, goal, duration, free, price, most_payload)
+        start, goal = case.ends
         iterate = warm.iterate if warm else {
             'x0': self._first(guess, path, parameters, start, goal, duration)}
+        [found] = self._solve_each(case, [iterate], warm is not None, monitor or Monitor())
+        return found
+
+    def solve_from_paths(self, paths: Sequence[Path], parameters: Parameters, start: Array,
+                         goal: Array, duration: float, *, free: Free = Free.NOTHING,
+                         price: float = 0.0, most_payload: float = MAX_PAYLOAD,
+                         monitor: Monitor | None = None) -> Iterator[DirectResult]:
+        """
+        Yield what each of several paths leads to, in their order; see `solve`.
+
+        They are solved side by side where there are processors. Once the monitor has stopped one
+        of them it is the last.
+
+        """
+        case = self._case(parameters, start, goal, duration, free, price, most_payload)
+        iterates = [{'x0': self._unknowns.on_path(path, parameters, duration)} for path in paths]
+        return self._solve_each(case, iterates, False, monitor or Monitor())
+
+    def _case(self, parameters: Parameters, start: Array, goal: Array, duration: float,
+              free: Free, price: float, most_payload: float) -> _Case:
+        """Return the data of a motion, checked."""
+        n_x = 2 * self.model.arm.n_coordinates
+        ends = vector('start', start, n_x), vector('goal', goal, n_x)
+        number('duration', duration, above=0, unit='s')
         prices = [1.0, price * (free is Free.PAYLOAD), price * (free is Free.DURATION)]
-        self._watch.follow(monitor or Monitor())
-        found = solver(**iterate, lbx=lower, ubx=upper, lbg=0, ubg=0,
-                       p=np.concatenate([parameters.stack(), start, goal, prices]))
-        if self._watch.error is not None:
-            raise self._watch.error
-        arrays = {name: np.array(found[name])[:, 0] for name in ('x', 'lam_x', 'lam_g')}
-        cost = float(found['f']) + prices[1] * arrays['x'][-2] - prices[2] * arrays['x'][-1]
-        return self._result(arrays, cost, solver.stats(), parameters, time.perf_counter() - began)
+        lower, upper = self._unknowns.bounds(parameters, duration, free, most_payload)
+        rows = np.zeros(self._mesh.P.shape[0] * n_x
+                        + self._mesh.points.size * self.model.arm.n_coordinates)
+        return _Case(parameters=parameters, ends=ends, prices=prices, inputs={
+            'lbx': lower, 'ubx': upper, 'lbg': rows, 'ubg': rows,
+            'p': np.concatenate([parameters.stack(), *ends, prices])})
+
+    def _solve_each(self, case: _Case, iterates: Sequence[dict[str, Array]], warm: bool,
+                    monitor: Monitor) -> Iterator[DirectResult]:
+        """Yield what each iterate leads to."""
+        recipe = self._recipe(warm=warm)
+        starts = [Start(recipe=recipe, inputs={**case.inputs, **iterate}) for iterate in iterates]
+        began, before = time.perf_counter(), monitor.iteration
+        with closing(solve_each(starts, monitor, self.settings.intervals)) as answers:
+            for start in starts:
+                try:
+                    answer, status = next(answers), None
+                except StoppedError as error:
+                    status = DirectStatus.STOPPED
+                    answer = Answer.failed(start, str(error), max(
+                        monitor.iteration - before - 1, 0), time.perf_counter() - began)
+                self.build_seconds = max(self.build_seconds, answer.build_seconds)
+                yield self._result(answer, case, status)
+                if status is not None:
+                    return
+                began, before = time.perf_counter(), monitor.iteration
 
     def _first(self, guess: Guess | None, path: Path | None, parameters: Parameters,
                start: Array, goal: Array, duration: float) -> Array:
@@ -246,31 +229,32 @@ class DirectProblem:
             return self._unknowns.on_motion(guess, parameters, duration)
         return self._unknowns.on_straight_line(start, goal, parameters, duration)
 
-    def _solver(self, *, warm: bool) -> Any:
-        """Return IPOPT for the programme, created once for each kind of start."""
-        if warm not in self._solvers:
+    def _recipe(self, *, warm: bool) -> bytes:
+        """Return the recipe of the programme, packed once for each kind of start."""
+        if warm not in self._recipes:
             options = {**_ALWAYS, 'max_iter': self.settings.max_iterations,
                        'tol': self.settings.tolerance, **(_WARM if warm else {}),
                        **(_EXPLORING if self.settings.exploring else {})}
-            self._solvers[warm] = self._programme.ipopt(options, self._watch)
-        return self._solvers[warm]
+            self._recipes[warm] = pack_recipe(self.model.arm, self._mesh.transcription(), options)
+        return self._recipes[warm]
 
-    def _result(self, arrays: dict[str, Array], cost: float, stats: dict[str, Any],
-                parameters: Parameters, seconds: float) -> DirectResult:
-        """Return IPOPT's solution in the terms of the problem."""
+    def _result(self, answer: Answer, case: _Case, status: DirectStatus | None) -> DirectResult:
+        """Return IPOPT's answer in the terms of the problem."""
         n_t, mesh = self.model.arm.n_coordinates, self._mesh
-        y, states, used, duration = self._unknowns.split(arrays['x'], parameters)
-        rows = arrays['lam_g'][:mesh.P.shape[0] * 2 * n_t].reshape(-1, 2 * n_t)
+        y, states, used, duration = self._unknowns.split(answer.x, case.parameters)
+        rows = answer.lam_g[:mesh.P.shape[0] * 2 * n_t].reshape(-1, 2 * n_t)
         costates, point_costates = mesh.costates(rows)
-        status, message = _outcome(stats, self._watch.stopped)
         speeds = y[:, n_t:n_t + self.model.arm.n_joints]
+        ended = DirectStatus.CONVERGED if answer.converged else DirectStatus.FAILED
         return DirectResult(
-            status=status, message=message, cost=cost, payload=used.payload_mass,
-            duration=duration, times=duration * mesh.breaks, states=states, costates=costates,
-            point_times=duration * mesh.points, point_states=y[:, :2 * n_t],
-            point_costates=point_costates, torques=y[:, 3 * n_t:] - used.torque_slope * speeds,
-            iterations=int(stats['iter_count']), seconds=seconds,
-            iterate={'x0': arrays['x'], 'lam_x0': arrays['lam_x'], 'lam_g0': arrays['lam_g']})
+            status=status or ended, message=answer.message,
+            cost=answer.objective + case.prices[1] * answer.x[-2] - case.prices[2] * answer.x[-1],
+            payload=used.payload_mass, duration=duration, times=duration * mesh.breaks,
+            states=states, costates=costates, point_times=duration * mesh.points,
+            point_states=y[:, :2 * n_t], point_costates=point_costates,
+            torques=y[:, 3 * n_t:] - used.torque_slope * speeds, iterations=answer.iterations,
+            seconds=answer.seconds,
+            iterate={'x0': answer.x, 'lam_x0': answer.lam_x, 'lam_g0': answer.lam_g})
 
 
 def solve_direct(model: ArmModel, parameters: Parameters, start: Array, goal: Array,
@@ -279,11 +263,3 @@ def solve_direct(model: ArmModel, parameters: Parameters, start: Array, goal: Ar
     """Solve a problem once, see `DirectProblem`; shapes and units are explained there."""
     return DirectProblem(model, settings).solve(parameters, start, goal, duration, guess=guess,
                                                 monitor=monitor)
-
-
-def _outcome(stats: dict[str, Any], stopped: StopReason | None) -> tuple[DirectStatus, str]:
-    """Return status and message of a solve."""
-    if stopped is not None:
-        return DirectStatus.STOPPED, stopped.value
-    message = str(stats['return_status']).replace('_', ' ').lower()
-    return (DirectStatus.CONVERGED if stats['success'] else DirectStatus.FAILED), message

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from flex_planner.base.validation import Array
 import numpy as np
@@ -12,6 +12,30 @@ from numpy.typing import NDArray
 
 SCHEMES = ('gauss', 'radau', 'hermite_simpson')
 Indices = NDArray[np.intp]
+
+
+class Columns(NamedTuple):
+    """A sparse matrix by columns, as SciPy's ``csc_matrix`` keeps it."""
+
+    shape: tuple[int, int]
+    starts: Indices
+    rows: Indices
+    values: Array
+
+    @classmethod
+    def of(cls, matrix: Any) -> Columns:
+        """Return a matrix of SciPy's in this form."""
+        by_columns = matrix.tocsc()
+        by_columns.sort_indices()
+        return cls(matrix.shape, by_columns.indptr, by_columns.indices, by_columns.data)
+
+
+class Transcription(NamedTuple):
+    """What a programme has to know of a `Mesh`, in plain arrays."""
+
+    weights: Array
+    P: Columns
+    Q: Columns
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,6 +91,10 @@ class Mesh:
              + _sparse((height, width), 1.0, values.size + np.arange(2), nodes[[0, -1]]))
         Q = _sparse((height, points.size), integrals, rows[:, :, None], index[:, None, :])
         return cls(breaks, points, weights, nodes, P, Q)
+
+    def transcription(self) -> Transcription:
+        """Return its equations and its quadrature."""
+        return Transcription(self.weights, Columns.of(self.P), Columns.of(self.Q))
 
     def costates(self, multipliers: Array) -> tuple[Array, Array]:
         """Return psi at nodes and at points from multipliers of all rows (N r + 2, 2 n_t)."""

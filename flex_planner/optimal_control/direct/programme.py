@@ -14,7 +14,7 @@ from typing import Any
 
 from flex_planner.arms.arm import Arm
 from flex_planner.base.progress import Monitor, StopReason
-from flex_planner.optimal_control.direct.mesh import Mesh
+from flex_planner.optimal_control.direct.mesh import Columns, Transcription
 from flex_planner.optimal_control.parameters import ParameterSymbols, payload_index
 
 
@@ -76,11 +76,11 @@ class Programme:
     derivatives: dict[str, Any]
 
     @classmethod
-    def of(cls, arm: Arm, mesh: Mesh) -> Programme:
+    def of(cls, arm: Arm, mesh: Transcription) -> Programme:
         """Derive it."""
         import casadi as ca
 
-        point, K, n_x = _Point.of(arm), mesh.points.size, 2 * arm.n_coordinates
+        point, K, n_x = _Point.of(arm), mesh.weights.size, 2 * arm.n_coordinates
         size, outer = point.cost.numel_in(0), (mesh.P.shape[1] - K) * n_x
         X, p = ca.MX.sym('X', K * size + outer + 2), ca.MX.sym('p', point.cost.numel_in(1))
         ends, prices = ca.MX.sym('ends', 2 * n_x), ca.MX.sym('prices', 3)
@@ -126,7 +126,7 @@ class Programme:
             'show_eval_warnings': False, 'calc_lam_p': False}
         return ca.nlpsol('direct', 'ipopt', self.expressions, every)
 
-    def watch(self, intervals: int) -> Any:
+    def watch(self) -> Any:
         """Return a callback that asks the monitor it follows after every iteration."""
         import casadi as ca
 
@@ -135,11 +135,12 @@ class Programme:
         class Watch(ca.Callback):
             def __init__(self) -> None:
                 ca.Callback.__init__(self)
-                self.follow(Monitor())
+                self.follow(Monitor(), 0, [])
                 self.construct('watch', {})
 
-            def follow(self, monitor: Monitor) -> None:
-                self.monitor = monitor
+            def follow(self, monitor: Monitor, intervals: int,
+                       raised: list[BaseException]) -> None:
+                self.monitor, self.intervals, self.raised = monitor, intervals, raised
                 self.stopped: StopReason | None = None
                 self.error: BaseException | None = None
 
@@ -151,20 +152,20 @@ class Programme:
 
             def eval(self, arg: Any) -> list[int]:  # noqa: A003,RUF100
                 try:
-                    self.monitor.step(float(ca.norm_inf(arg[2])), intervals)
+                    self.monitor.step(float(ca.norm_inf(arg[2])), self.intervals)
                     self.stopped = self.monitor.stop_reason()
                 except BaseException as error:  # CasADi would print and drop it
                     self.error = error
-                return [int(self.stopped is not None or self.error is not None)]
+                return [int(bool(self.stopped or self.error or self.raised))]
 
         return Watch()
 
 
-def _linear_rows(mesh: Mesh, n_x: int, size: int) -> tuple[Any, Any]:
+def _linear_rows(mesh: Transcription, n_x: int, size: int) -> tuple[Any, Any]:
     """Return A and B of the mesh's rows (A - t_f B) (y, nodes); x' = (q', q'') follows x in y."""
     import casadi as ca
 
-    P, Q = ca.DM(mesh.P.tocsc()), ca.DM(mesh.Q.tocsc())
+    P, Q = _sparse(mesh.P), _sparse(mesh.Q)
     value, K = ca.DM.eye(n_x), Q.size2()
     in_point = ca.horzcat(value, ca.DM(n_x, size - n_x))
     rate = ca.horzcat(ca.DM(n_x, n_x // 2), value, ca.DM(n_x, size - n_x - n_x // 2))
@@ -172,6 +173,14 @@ def _linear_rows(mesh: Mesh, n_x: int, size: int) -> tuple[Any, Any]:
     growing = ca.kron(Q, rate)
     others = constant.size2() - growing.size2()
     return constant, ca.horzcat(growing, ca.DM(growing.size1(), others))
+
+
+def _sparse(matrix: Columns) -> Any:
+    """Return CasADi's form of a sparse matrix."""
+    import casadi as ca
+
+    pattern = ca.Sparsity(*matrix.shape, matrix.starts.tolist(), matrix.rows.tolist())
+    return ca.DM(pattern, matrix.values)
 
 
 def _diagonal(blocks: Any, count: int) -> Any:

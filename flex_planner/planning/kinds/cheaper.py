@@ -8,13 +8,21 @@ itself.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from flex_planner.collocation import CollocationResult, CollocationSolution, INTERRUPTED, Solver
 from flex_planner.optimal_control.direct.unknowns import Free
 from flex_planner.optimal_control.motion_problem import MotionProblem
-from flex_planner.planning.kinds.clusters import are_alike, cluster, KindOfMotion, MOST_KINDS
+from flex_planner.planning.kinds.clusters import (
+    are_alike,
+    cluster,
+    KindOfMotion,
+    merge,
+    MOST_KINDS,
+)
 from flex_planner.planning.kinds.effort import SearchEffort
+from flex_planner.planning.kinds.explorer import ExploredMotion
 from flex_planner.planning.kinds.newton_explorer import (
     as_kind,
     explore_from_plan,
@@ -24,6 +32,7 @@ from flex_planner.planning.kinds.newton_explorer import (
 )
 from flex_planner.planning.kinds.search import is_better, rigid_twin
 from flex_planner.planning.kinds.windings import say_turns
+from flex_planner.planning.strategies.homotopies import has_weights
 from flex_planner.planning.strategies.initial_guesses import lift
 from flex_planner.planning.verdict import find_refusal
 
@@ -58,7 +67,8 @@ class CheapestMotion:
 
 
 def find_cheaper(problem: MotionProblem, found: CollocationResult, solver: Solver,
-                 effort: SearchEffort = SearchEffort.NORMAL) -> CheapestMotion:
+                 effort: SearchEffort = SearchEffort.NORMAL,
+                 known: Sequence[KindOfMotion] = ()) -> CheapestMotion:
     """
     Look for a cheaper kind of motion than one that is solved.
 
@@ -73,6 +83,9 @@ def find_cheaper(problem: MotionProblem, found: CollocationResult, solver: Solve
     effort : SearchEffort
         ``THOROUGH`` takes all starts; else they end within a budget of iterations, or once the
         cheapest kind came three times.
+    known : sequence of KindOfMotion
+        What an exploration of the rigid arm has met already: another one is not begun then,
+        unless this one was of another motion or leaves the arm's limits.
 
     """
     own, rigid = as_kind(problem, found.solution), rigid_twin(problem)
@@ -80,12 +93,18 @@ def find_cheaper(problem: MotionProblem, found: CollocationResult, solver: Solve
         return CheapestMotion(problem=problem, result=found, kinds=(own,), starts=1)
     best = _Best(problem=problem, result=found, kind=own,
                  refused=find_refusal(problem, found.solution) is not None)
-    motions, starts = explore_from_plan(
-        rigid, own if rigid is problem else None, newton_budget(problem, found), solver, effort,
-        hard=best.refused)
+    own_rigid = own if rigid is problem else None
+    met = [kind for kind in known if _is_of(kind.motion, problem)]
+    motions, starts = ([] if own_rigid is None else [own.motion]), 1
+    if not met or best.refused or effort is SearchEffort.THOROUGH:
+        motions, starts = explore_from_plan(rigid, own_rigid, newton_budget(problem, found),
+                                            solver, effort, hard=best.refused)
     ways = explore_other_ways(problem, solver)
-    kinds = [_with_turns(kind, problem, ways) for kind in cluster(
-        [*motions, *(way.motion for way in ways)], is_better(Free.NOTHING))]
+    better = is_better(Free.NOTHING)
+    every = cluster([*motions, *(way.motion for way in ways)], better)
+    for kind in met:
+        every = merge(every, kind, better)
+    kinds = [_with_turns(kind, problem, ways) for kind in every]
     for kind in _worth_solving(kinds, own, best.refused):
         home = next((way.problem for way in ways if way.motion is kind.motion), problem)
         result = solver.solve(home, _guess(home, kind.motion.solution, solver))
@@ -97,6 +116,13 @@ def find_cheaper(problem: MotionProblem, found: CollocationResult, solver: Solve
             kinds[kinds.index(kind)] = _with_exact_value(kind, solved)
     return CheapestMotion(problem=best.problem, result=best.result, starts=starts + len(ways),
                           kinds=_list_kinds(best.kind, own, kinds))
+
+
+def _is_of(motion: ExploredMotion, problem: MotionProblem) -> bool:
+    """Return whether a motion of the rigid arm is one of least effort for a problem."""
+    one, other = motion.problem.task, problem.task
+    return (not motion.price and one.duration == other.duration
+            and one.payload_mass == other.payload_mass and not has_weights(problem))
 
 
 def _list_kinds(best: KindOfMotion, own: KindOfMotion,

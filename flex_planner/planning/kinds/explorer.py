@@ -9,17 +9,20 @@ twice as fine.
 
 from __future__ import annotations
 
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationSolution
 from flex_planner.optimal_control.direct.conversion import to_solution
-from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectResult, DirectSettings
+from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectSettings
+from flex_planner.optimal_control.direct.result import DirectResult
 from flex_planner.optimal_control.direct.unknowns import Free
 from flex_planner.optimal_control.motion_problem import MotionProblem
-from flex_planner.planning.kinds.paths import JointPath
+from flex_planner.planning.kinds.paths import AnyPath
 import numpy as np
 
 # points of an interval; intervals of the first mesh, where torques are on their limits and where
@@ -94,9 +97,10 @@ class Explorer:
         self._price = _price(problem, free)
         self._directs: dict[int, DirectProblem] = {}
 
-    def explore(self, path: JointPath) -> ExploredMotion | None:
+    def explore(self, paths: Sequence[AnyPath],
+                ) -> Generator[ExploredMotion | None, None, None]:
         """
-        Return the motion that a path leads to, None if IPOPT does not converge.
+        Yield the motion that each path leads to, None if IPOPT does not converge, in their order.
 
         Raises
         ------
@@ -104,16 +108,40 @@ class Explorer:
             If the monitor stopped it.
 
         """
-        self._monitor.check()  # before a programme is derived
         problem, intervals = self._first(), min(self._finest, (
             _INTERVALS if self._free is Free.NOTHING else _LIMIT_INTERVALS))
         duration = problem.task.duration
-        found = self._direct(intervals).solve(
-            problem.parameters, problem.start, problem.goal, duration, free=self._free,
-            path=lambda times: path(times / duration, duration), price=self._price,
+        found = self._direct(intervals).solve_from_paths(
+            [partial(_in_time, path, duration) for path in paths], problem.parameters,
+            problem.start, problem.goal, duration, free=self._free, price=self._price,
             most_payload=self._most, monitor=self._monitor)
-        self._monitor.check()
-        return self._motion(found)
+        for one in found:
+            self._monitor.check()
+            yield self._motion(one)
+
+    def adapt(self, motion: ExploredMotion) -> Generator[ExploredMotion, None, None]:
+        """
+        Yield the motions that one of the same arm with another payload leads to, confirmed.
+
+        Meshes differ in where IPOPT ends from so far.
+
+        Raises
+        ------
+        StoppedError
+            If the monitor stopped it.
+
+        """
+        problem = self._first()
+        for intervals in (_INTERVALS, _LIMIT_INTERVALS):
+            found = self._direct(min(self._finest, intervals)).solve(
+                problem.parameters, problem.start, problem.goal, problem.task.duration,
+                free=self._free, guess=motion.solution, price=self._price,
+                most_payload=self._most, monitor=self._monitor)
+            self._monitor.check()
+            coarse = self._motion(found)
+            confirmed = None if coarse is None else self.confirm(coarse)
+            if confirmed is not None:
+                yield confirmed
 
     def confirm(self, motion: ExploredMotion) -> ExploredMotion | None:
         """
@@ -174,6 +202,11 @@ class Explorer:
         return ExploredMotion(value=value, price=self._price, problem=problem,
                               solution=to_solution(found, problem), angles=sample_angles(
                                   found.times, found.states, problem.model.arm.n_joints))
+
+
+def _in_time(path: AnyPath, duration: float, times: Array) -> tuple[Array, Array, Array]:
+    """Return angles, speeds and accelerations on a path, (k, n) each, at times (k,)."""
+    return path(times / duration, duration)
 
 
 def sample_angles(times: Array, states: Array, n: int) -> Array:

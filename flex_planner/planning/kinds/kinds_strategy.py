@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import reduce
 
 from flex_planner.collocation import (
     CollocationResult,
@@ -12,10 +13,15 @@ from flex_planner.collocation import (
 )
 from flex_planner.optimal_control.direct.unknowns import Free
 from flex_planner.optimal_control.motion_problem import MotionProblem
-from flex_planner.planning.kinds.clusters import KindOfMotion
+from flex_planner.planning.kinds.clusters import cluster, KindOfMotion, merge
 from flex_planner.planning.kinds.effort import SearchEffort
 from flex_planner.planning.kinds.explorer import link_mass
-from flex_planner.planning.kinds.search import find_kinds, rigid_twin
+from flex_planner.planning.kinds.search import (
+    explore_near_limit,
+    find_kinds,
+    is_better,
+    rigid_twin,
+)
 from flex_planner.planning.strategies.homotopies import (
     drop_weights,
     has_weights,
@@ -26,6 +32,9 @@ from flex_planner.planning.strategies.strategy import Attempt
 
 # kinds that Newton's method is tried from
 _TRIED = 3
+# where a smaller share of the starts leads to a motion, others are asked, too
+_SELDOM = 0.25
+_LESS = is_better(Free.NOTHING)
 # a task is out of sight if the heaviest payload found, links included, is less than this share of
 # its own, or the shortest duration more than its own by as much; of a flexible arm, whose rigid
 # twin is explored, too
@@ -35,10 +44,13 @@ _NEAR, _NEAR_FLEXIBLE = 0.98, 0.9
 def explore_kinds(problem: MotionProblem, solver: Solver) -> Attempt | None:
     """Start from motions of the rigid arm that IPOPT finds from many paths, the cheapest first."""
     bare = drop_weights(problem)
-    if rigid_twin(bare) is None:
+    rigid, starts = rigid_twin(bare), SearchEffort.NORMAL.starts
+    if rigid is None:
         return None
-    starts = SearchEffort.NORMAL.starts
     kinds = find_kinds(bare, Free.NOTHING, starts, solver)
+    if sum(kind.met for kind in kinds) < _SELDOM * starts:
+        near = cluster(explore_near_limit(rigid, solver), _LESS)
+        kinds = reduce(lambda known, kind: merge(known, kind, _LESS), near, kinds)
     attempt = _solve_first(problem, bare, kinds, solver)
     if attempt.decides:
         return attempt

@@ -7,8 +7,10 @@ It begins on paths with zero costates and takes some ten milliseconds a start.
 
 from __future__ import annotations
 
+from contextlib import closing, suppress
 from dataclasses import dataclass
 
+from flex_planner.base.progress import StoppedError
 from flex_planner.collocation import CollocationResult, CollocationSolution, Solver
 from flex_planner.optimal_control.direct.unknowns import Free
 from flex_planner.optimal_control.motion_problem import MotionProblem
@@ -18,6 +20,7 @@ from flex_planner.planning.kinds.effort import SearchEffort
 from flex_planner.planning.kinds.explorer import ExploredMotion, Explorer, sample_angles
 from flex_planner.planning.kinds.paths import JointPath
 from flex_planner.planning.kinds.search import (
+    explore_near_limit,
     has_settled,
     is_better,
     rigid_twin,
@@ -30,8 +33,8 @@ import numpy as np
 _STAGES, _INTERVALS, _MOST_INTERVALS, _TOLERANCE, _ITERATIONS, _MESHES = 4, 16, 64, 1e-2, 30, 3
 # starts at most, and Newton iterations of some 0.8 ms each
 _STARTS, _BUDGET, _LEAST_BUDGET = 16, 500, 10
-# where Newton's method converges from less than this share of the starts, IPOPT tries the first
-_FEW, _BY_IPOPT = 0.5, 4
+# where Newton's method converges from less than this share of so many starts, IPOPT goes on
+_FEW, _JUDGED, _BY_IPOPT = 0.5, 8, 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -76,16 +79,12 @@ def explore_from_plan(rigid: MotionProblem, own: KindOfMotion | None, budget: in
     thorough = effort is SearchEffort.THOROUGH
     paths = list(starting_paths(rigid, effort.starts if thorough else _STARTS))
     motions = [] if own is None else [own.motion]
-    motions, starts = _explore(rigid, paths[len(motions):], motions,
-                               None if thorough else budget, solver)
     # of an arm that bends this would take longer than its plan
-    if own is not None and (hard or len(motions) < _FEW * starts) and (
-            not solver.monitor.stop_reason()):
-        explorer = Explorer(rigid, Free.NOTHING, solver.monitor,
-                            most_intervals=solver.settings.max_intervals)
-        met = [explorer.explore(path) for path in paths[:_BY_IPOPT]]
-        motions += [motion for motion in met if motion is not None]
-        starts += _BY_IPOPT
+    by_ipopt = own is not None
+    motions, starts = _explore(rigid, paths[len(motions):], motions,
+                               None if thorough else budget, solver, patient=not by_ipopt)
+    if by_ipopt and (hard or _seldom_converges(motions, starts)):
+        motions, starts = _explore_by_ipopt(rigid, paths[:_BY_IPOPT], motions, starts, solver)
     return motions, starts
 
 
@@ -121,13 +120,21 @@ def as_kind(problem: MotionProblem, solution: CollocationSolution) -> KindOfMoti
 
 
 def _explore(rigid: MotionProblem, paths: list[JointPath], motions: list[ExploredMotion],
-             budget: int | None, solver: Solver) -> tuple[list[ExploredMotion], int]:
-    """Return motions known and met, until they have settled or the budget is used, if any."""
+             budget: int | None, solver: Solver, *, patient: bool,
+             ) -> tuple[list[ExploredMotion], int]:
+    """
+    Return motions known and met, until they have settled or the budget is used, if any.
+
+    Without patience it also ends where Newton's method seldom converges.
+
+    """
     coarse, monitor, starts = _coarse(solver), solver.monitor, len(motions)
     began = monitor.iteration
     for path in paths:
-        enough = budget is not None and (monitor.iteration - began >= budget or has_settled(
-            motions, starts, is_better(Free.NOTHING)))
+        enough = budget is not None and (
+            monitor.iteration - began >= budget
+            or has_settled(motions, starts, is_better(Free.NOTHING))
+            or not patient and starts >= _JUDGED and _seldom_converges(motions, starts))
         if enough or monitor.stop_reason():
             break
         starts += 1
@@ -136,6 +143,30 @@ def _explore(rigid: MotionProblem, paths: list[JointPath], motions: list[Explore
         if motion is not None:
             motions.append(motion)
     return motions, starts
+
+
+def _seldom_converges(motions: list[ExploredMotion], starts: int) -> bool:
+    """Return whether Newton's method finds a motion from few of its starts."""
+    return len(motions) < _FEW * starts
+
+
+def _explore_by_ipopt(rigid: MotionProblem, paths: list[JointPath], motions: list[ExploredMotion],
+                      starts: int, solver: Solver) -> tuple[list[ExploredMotion], int]:
+    """Return motions known and met, as far as it comes in time."""
+    monitor, every = solver.monitor, list(motions)
+    explorer = Explorer(rigid, Free.NOTHING, monitor,
+                        most_intervals=solver.settings.max_intervals)
+    with closing(explorer.explore(paths)) as found, suppress(StoppedError):
+        for _ in paths:
+            starts += 1
+            monitor.phase = f'kinds of motion, start {starts}'
+            motion = next(found)
+            every += [] if motion is None else [motion]
+        if len(every) == len(motions):
+            for motion in explore_near_limit(rigid, solver):
+                starts += 1
+                every.append(motion)
+    return every, starts
 
 
 def _coarse(solver: Solver) -> Solver:

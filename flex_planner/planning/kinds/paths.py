@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from flex_planner.base.validation import Array
+from flex_planner.collocation import CollocationSolution
 import numpy as np
 
 # amplitude of detours [rad]; of the first joint, where gravity can help to swing
@@ -48,6 +49,37 @@ class JointPath:
         return q, v / duration, a / duration**2
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class DetourFrom:
+    """
+    A motion that is known, with sine detours that are zero at both ends.
+
+    Attributes
+    ----------
+    motion : CollocationSolution
+        z = (q, q', ...).
+    detours : numpy.ndarray, shape (k, n)
+        As those of a `JointPath`.
+
+    """
+
+    motion: CollocationSolution
+    detours: Array
+
+    def __call__(self, share: Array, duration: float) -> tuple[Array, Array, Array]:
+        """Return angles, speeds and accelerations, (k, n) each, at shares (k,) of a duration."""
+        n, own = self.detours.shape[1], self.motion.mesh[-1]
+        z, rate = self.motion(share * own), self.motion.rate(share * own)
+        rest = np.zeros(n)
+        q, v, a = JointPath(rest, rest, self.detours)(share, duration)
+        faster = own / duration
+        return (z[:, :n] + q, z[:, n:2 * n] * faster + v,
+                rate[:, n:2 * n] * faster**2 + a)
+
+
+AnyPath = JointPath | DetourFrom
+
+
 def fixed_paths(start: Array, goal: Array, *, gravity: bool) -> Iterator[JointPath]:
     """
     Yield the paths that most often lead to the best motion, the best first.
@@ -88,13 +120,17 @@ def fixed_paths(start: Array, goal: Array, *, gravity: bool) -> Iterator[JointPa
 
 
 def random_paths(start: Array, goal: Array, seed: int = _SEED) -> Iterator[JointPath]:
-    """Yield random detours without end, the same for each task."""
+    """Yield straight paths with random detours without end, the same for each task."""
+    return (JointPath(start, goal, detours) for detours in random_detours(start.size, seed))
+
+
+def random_detours(n: int, seed: int = _SEED) -> Iterator[Array]:
+    """Yield random detours (k, n) without end."""
     generator = np.random.default_rng(seed)
     falling = 1 / np.arange(1, _TERMS + 1)[:, None]
     while True:
         for deviation in _RANDOM:
-            yield JointPath(start, goal, deviation * falling * generator.normal(
-                size=(_TERMS, start.size)))
+            yield deviation * falling * generator.normal(size=(_TERMS, n))
 
 
 # in units of the joint's own stroke: + beyond it, - back; see `fixed_paths`

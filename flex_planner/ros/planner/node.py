@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from typing import Any
 
+from flex_planner.base.processes import helper_processes
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.planning.robustness import prepare_robustness
 from flex_planner.ros.messages.markers import motion_markers
@@ -67,6 +68,7 @@ class PlannerNode(Node):  # type: ignore[misc]
 
     def __init__(self) -> None:
         super().__init__('flex_planner')
+        helper_processes()  # what the environment says is refused at once
         arm = declare_arm(self)
         self._settings = declare(self, PlannerSettings.for_arm(arm))
         self._settings.check_joints(arm.n_joints)

@@ -181,7 +181,7 @@ def test_impossible_motion_fails_with_a_free_payload(motion: MotionProblem) -> N
 
 def derivatives(arm: Arm, scheme: str) -> dict[str, tuple[Array, Array]]:
     """Return the programme's derivatives and CasADi's own of its expressions, at some point."""
-    programme = Programme.of(arm, Mesh.of(scheme, 2, 3))
+    programme = Programme.of(arm, Mesh.of(scheme, 2, 3).transcription())
     x, p, f, g = (programme.expressions[name] for name in ('x', 'p', 'f', 'g'))
     s, multipliers = ca.MX.sym('s'), ca.MX.sym('lambda', g.numel())
     lagrangian = ca.triu(ca.hessian(s * f + ca.dot(multipliers, g), x)[0])

@@ -124,6 +124,24 @@ def test_free_duration_is_that_of_the_cheaper_kind() -> None:
     assert samples.hamiltonian == pytest.approx([-0.05] * 11, rel=1e-4)
 
 
+def test_what_was_explored_for_the_plan_is_not_explored_again() -> None:
+    lines = list[Progress]()
+    plan = plan_path(level_task('S12', 1.2), monitor=Monitor(report=lines.append))
+    assert plan.solved, plan.message
+    assert plan.cost == pytest.approx(0.8235, rel=1e-3)
+    assert (plan.strategy, plan.starts) == ('kinds of motion', 16)
+    exploring = {line.phase for line in lines if line.phase.startswith('kinds of motion, start')}
+    assert all(phase.endswith(' of 16') for phase in exploring)
+
+
+def test_ipopt_goes_on_where_newtons_method_seldom_converges() -> None:
+    plan, thorough = (plan_path(level_task('S1', 20.0), search=search)
+                      for search in ('normal', 'thorough'))
+    assert plan.solved, plan.message
+    assert plan.starts == 8 + 4
+    assert plan.cost == pytest.approx(thorough.cost, rel=1e-4)
+
+
 # Never dearer
 
 
@@ -268,6 +286,13 @@ def test_time_that_is_up_while_others_are_looked_for_leaves_the_plan() -> None:
     assert plan.solved, plan.message
     assert plan.cost == pytest.approx(DEARER[1.12][0], rel=1e-3)
     assert plan.starts == 3
+
+
+def test_time_that_is_up_while_ipopt_looks_for_others_leaves_the_plan() -> None:
+    monitor = stopped_in('kinds of motion, start 18', PlanStatus.TIMEOUT)
+    plan = plan_path(level_task('S12', 1.12), monitor=monitor)
+    assert plan.solved, plan.message
+    assert plan.starts == 18
 
 
 def test_cancellation_while_others_are_looked_for_is_obeyed() -> None:

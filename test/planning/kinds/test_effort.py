@@ -36,3 +36,14 @@ def test_unknown_effort_is_refused_before_any_work(rigid_arm: Arm, paper_task: T
         call(paper_task(rigid_arm), monitor=monitor, search='hasty')
     assert str(caught.value) == MESSAGE
     assert monitor.iteration == 0
+
+
+@pytest.mark.parametrize('call', [plan_path, find_max_payload, find_min_duration])
+def test_number_of_processes_that_is_none_is_refused_before_any_work(
+        monkeypatch: pytest.MonkeyPatch, rigid_arm: Arm, paper_task: TaskFactory,
+        call: type[plan_path]) -> None:
+    monkeypatch.setenv('FLEX_PLANNER_PROCESSES', 'two')
+    monitor = Monitor()
+    with pytest.raises(InvalidValueError, match="FLEX_PLANNER_PROCESSES is 'two', but must be"):
+        call(paper_task(rigid_arm), monitor=monitor)
+    assert monitor.iteration == 0

@@ -34,7 +34,7 @@ def straight(problem: MotionProblem) -> JointPath:
 def explored(problem: MotionProblem, free: Free) -> tuple[Explorer, ExploredMotion]:
     """Return an explorer and the motion that the straight path leads to."""
     explorer = Explorer(problem, free, Monitor())
-    motion = explorer.explore(straight(problem))
+    [motion] = explorer.explore([straight(problem)])
     assert motion is not None
     return explorer, motion
 
@@ -133,7 +133,7 @@ def test_no_mesh_is_larger_than_allowed(problem: MotionProblem) -> None:
     seen: list[int] = []
     monitor = Monitor(report=lambda progress: seen.append(progress.intervals))
     explorer = Explorer(problem, Free.PAYLOAD, monitor, most_intervals=20)
-    motion = explorer.explore(straight(problem))
+    [motion] = explorer.explore([straight(problem)])
     assert motion is not None
     assert explorer.confirm(motion) is None  # 40 intervals are not allowed
     assert set(seen) == {20}
@@ -146,7 +146,7 @@ def test_payload_is_at_most_what_is_of_use() -> None:
     # what the motor can hold at the goal is carried with time to spare
     problem = problem_of(ArmModel.of((task := lifted_to(0.0, 2.0)).arm), task)
     explorer = Explorer(problem, Free.PAYLOAD, Monitor(), most_payload=0.3)
-    motion = explorer.explore(straight(problem))
+    [motion] = explorer.explore([straight(problem)])
     assert motion is not None
     assert motion.value == pytest.approx(0.3, rel=1e-3)
     assert link_mass(problem) == pytest.approx(0.3)
@@ -158,14 +158,14 @@ def test_exploration_is_stopped(problem: MotionProblem, free: Free) -> None:
     explorer = Explorer(problem, free, monitor)
     monitor.canceled = lambda: monitor.iteration >= 3
     with pytest.raises(StoppedError):
-        explorer.explore(straight(problem))
+        list(explorer.explore([straight(problem)]))
     assert monitor.iteration == 3
 
 
 def test_confirmation_is_stopped(problem: MotionProblem) -> None:
     monitor = Monitor()
     explorer = Explorer(problem, Free.PAYLOAD, monitor)
-    motion = explorer.explore(straight(problem))
+    [motion] = explorer.explore([straight(problem)])
     assert motion is not None
     monitor.time_limit = -1.0
     with pytest.raises(StoppedError):

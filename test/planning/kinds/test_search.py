@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator, Sequence
 from typing import Any
 
+from bench.random_tasks import random_task, with_payload
 from counter_examples import level_task
 from factories import TaskFactory
 from flex_planner.base.progress import Monitor, StoppedError
@@ -17,6 +18,7 @@ from flex_planner.planning.kinds import search as module
 from flex_planner.planning.kinds.explorer import ExploredMotion
 from flex_planner.planning.kinds.paths import JointPath
 from flex_planner.planning.kinds.search import (
+    explore_near_limit,
     find_kinds,
     has_settled,
     is_better,
@@ -51,6 +53,13 @@ def test_search_has_settled_once_the_best_value_came_three_times_in_eight_starts
         problem: MotionProblem, values: list[float], starts: int, settled: bool) -> None:
     motions = [made_up(problem, value) for value in values]
     assert has_settled(motions, starts, LESS) is settled
+
+
+def test_ipopt_needs_fewer_starts(problem: MotionProblem, fake: Fake) -> None:
+    monitor = Monitor()
+    fake(2.0, 1.0, 1.0, 1.0, 3.0, 0.5)
+    find_kinds(problem, Free.NOTHING, 6, Solver(monitor=monitor))
+    assert starts_of(monitor) == '5 of 6'
 
 
 def test_best_payload_is_the_largest(problem: MotionProblem) -> None:
@@ -100,10 +109,12 @@ class FakeExplorer:
     def __init__(self, problem: MotionProblem, *others: Any) -> None:
         self.problem, self.turn = problem, iter(self.values)
 
-    def explore(self, path: JointPath) -> ExploredMotion | None:
-        value = next(self.turn)
-        if value is None:
-            return None
+    def explore(self, paths: Sequence[JointPath],
+                ) -> Generator[ExploredMotion | None, None, None]:
+        for value, _ in zip(self.turn, paths, strict=False):
+            yield None if value is None else self.made_up(value)
+
+    def made_up(self, value: float) -> ExploredMotion:
         # motions of a value are alike
         straight = made_up(self.problem, value)
         bow = np.outer(np.sin(np.pi * np.linspace(0, 1, 17)), [0.0, value])
@@ -201,3 +212,22 @@ def test_pendulum_whose_motor_is_too_weak_swings_back_first() -> None:
     (kind, *_) = find_kinds(problem_of(ArmModel.of(arm), task), Free.NOTHING, 16, Solver())
     assert kind.value == pytest.approx(3.9496, rel=1e-3)
     assert kind.sentence == 'joint 1 swings back 53 deg first'
+
+
+def random_problem(seed: int, payload: float) -> MotionProblem:
+    """Return one of the adversary's tasks, whose best motions straight starts hardly meet."""
+    task = with_payload(random_task(seed), payload)
+    return problem_of(ArmModel.of(task.arm), task)
+
+
+def test_detours_from_good_motions_meet_what_straight_starts_seldom_do() -> None:
+    # of 60 straight starts with random detours two met it, of the 16 first ones none
+    kinds = find_kinds(random_problem(323, 0.0), Free.PAYLOAD, 16, Solver())
+    assert kinds[0].value == pytest.approx(5.82, abs=0.02)
+    assert kinds[0].value > 2 * kinds[1].value
+
+
+def test_motions_near_the_largest_payload_come_from_those_of_other_payloads() -> None:
+    # 3 of 60 starts led to a motion, and none of the fixed ones
+    near = list(explore_near_limit(random_problem(318, 5.5907), Solver()))
+    assert min(motion.value for motion in near) == pytest.approx(0.7692, rel=1e-3)
