@@ -64,7 +64,7 @@ def test_lifted_guess_is_the_rigid_motion_with_its_torque_and_links_bent_by_its_
     forces = ei5_model.inverse_dynamics(states, accelerations, problem.parameters.physical)
     stiffness = ei5_model.static_forces(states[:1, :6], problem.parameters.physical)[1][0]
     np.testing.assert_allclose(z[:, 2:6] @ stiffness[2:, 2:], -forces[:, 2:], atol=1e-5)
-    assert np.abs(z[:, 2:6]).max() > 1e-3  # [m]
+    assert np.abs(z[:, 2:6]).max() > 5e-4  # [m]
 
 
 def test_rigid_motion_takes_the_weights_and_velocities_of_the_joints(
