@@ -2,8 +2,8 @@
 A motion of the rigid arm as a guess for the flexible one: links bent as its forces bend them.
 
 The modes follow from the forces of the rigid motion without ringing. Costates belong to the same
-torque: with ``y = (y_rigid, 0)`` it stays ``-R^-1 B^T y``. So ``psi_2 = M(Q) y`` in the mass matrix of
-the arm itself, and psi_1 follows from eq. (12).
+torque: with ``y = (y_rigid, 0)`` it stays ``-R^-1 B^T y``. So ``psi_2 = M(Q) y`` in the mass
+matrix of the arm itself, and psi_1 follows from eq. (12).
 
 """
 
