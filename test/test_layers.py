@@ -124,13 +124,15 @@ def test_private_names_stay_in_their_module() -> None:
 def test_casadi_is_imported_only_to_derive_and_to_compile() -> None:
     users = {name.removeprefix('flex_planner.') for name in PATHS if 'casadi' in imports(name)}
     assert users == {
-        'dynamics.chain', 'dynamics.compiled_functions', 'dynamics.dynamics_functions',
-        'dynamics.planar_chain', 'optimal_control.direct.programme',
-        'optimal_control.pontryagin', 'optimal_control.running_cost',
+        'dynamics.body_power', 'dynamics.build_chain', 'dynamics.chain',
+        'dynamics.compiled_functions', 'dynamics.dynamics_functions', 'dynamics.moving_frame',
+        'optimal_control.direct.programme', 'optimal_control.pontryagin',
+        'optimal_control.rate_jacobian', 'optimal_control.running_cost',
         'optimal_control.torque_limits'}
 
 
 def test_kinematics_and_dynamics_can_check_each_other() -> None:
     assert not any(entry.startswith('flex_planner.dynamics')
                    for entry in imports('flex_planner.arms.kinematics'))
-    assert 'flex_planner.arms.kinematics' not in imports('flex_planner.dynamics.planar_chain')
+    assert not any('flex_planner.arms.kinematics' in imports(f'flex_planner.dynamics.{name}')
+                   for name in ('build_chain', 'body_power', 'moving_frame'))

@@ -1,8 +1,9 @@
 """
-The dynamics of an arm as symbols: what a kind of arm gives to all that is built on it.
+The dynamics of an arm as symbols: what all is derived from that is built on it.
 
-Whatever derives a `Chain` (see `planar_chain`) gets its compiled functions, statics, optimality
-conditions and direct transcription from it.
+The equations of motion are one scalar, the virtual power ``W(q, q', a, y) = y . (M(q) a + h(q,
+q'))``: what inertia, gravity, elasticity and friction take in a virtual motion y (Kane's form).
+Its derivatives are M and h of eq. (3), the rates of the costates and their Jacobian.
 
 """
 
@@ -21,39 +22,44 @@ class Chain:
 
     Attributes
     ----------
-    coordinates, rates : casadi.SX, shape (n_t, 1)
-        q [rad, m] and q' [rad/s, m/s].
+    coordinates, rates, accelerations, virtual_rates : casadi.SX, shape (n_t, 1)
+        q [rad, m], q', a and y.
     payload_mass, payload_inertia : casadi.SX
         m_p at the tip [kg], and its rotary inertia [kg m^2].
     rigidity : casadi.SX, shape (n, 1)
         E I of each link [N m^2].
-    kinetic, potential : casadi.SX
-        Energies [J]; potential includes bending.
-    friction : casadi.SX, shape (n_t, 1)
-        Generalized forces of viscous joint friction [N m] and modal damping [N].
+    power : casadi.SX
+        W.
+    potential : casadi.SX
+        Energy of weight and bending [J].
 
     """
 
     coordinates: Any
     rates: Any
+    accelerations: Any
+    virtual_rates: Any
     payload_mass: Any
     payload_inertia: Any
     rigidity: Any
-    kinetic: Any
+    power: Any
     potential: Any
-    friction: Any
+
+    @property
+    def kinetic(self) -> Any:
+        """Return the kinetic energy [J]."""
+        return ca.bilin(self.mass_matrix(), self.rates, self.rates) / 2
 
     def mass_matrix(self) -> Any:
         """Return M(q), shape (n_t, n_t), eq. (3)."""
-        return ca.jacobian(ca.gradient(self.kinetic, self.rates), self.rates)
+        matrix = ca.jacobian(ca.gradient(self.power, self.virtual_rates), self.accelerations)
+        return ca.triu2symm(ca.triu(matrix))
 
     def bias(self) -> Any:
         """Return h(q, q') = H + G + friction, shape (n_t, 1), eq. (3)."""
-        momentum = ca.gradient(self.kinetic, self.rates)
-        return (ca.jtimes(momentum, self.coordinates, self.rates)
-                - ca.gradient(self.kinetic - self.potential, self.coordinates) + self.friction)
+        return self.inverse_dynamics(ca.SX.zeros(self.accelerations.numel(), 1))
 
     def inverse_dynamics(self, accelerations: Any) -> Any:
         """Return M a + h, shape (n_t, 1), without forming M."""
-        momentum = ca.gradient(self.kinetic, self.rates)
-        return ca.jtimes(momentum, self.rates, accelerations) + self.bias()
+        forces = ca.gradient(self.power, self.virtual_rates)
+        return ca.substitute(forces, self.accelerations, ca.densify(accelerations))

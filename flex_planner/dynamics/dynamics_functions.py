@@ -67,7 +67,7 @@ def physical_symbols(chain: Chain) -> Any:
 
 def batch(name: str, inputs: Sequence[Any], p: Any, results: Sequence[Any]) -> BatchedFunction:
     """Return a function of points and shared parameters p with dense results."""
-    dense = [ca.densify(result) for result in results]
+    dense = ca.cse([ca.densify(result) for result in results])
     return ca.Function(name, [*inputs, p], dense), len(inputs)
 
 

@@ -1,11 +1,11 @@
 """
 Pontryagin's conditions of the minimum-effort problem as CasADi expressions.
 
-Korayem et al. 2009, eqs. (7)-(15). The dynamics enter through the inverse dynamics
-``ID = M a + h``, so no inverse of a matrix is differentiated: with ``a = M^-1 (B u - h)`` and
-``y = M^-1 psi_2`` the derivative of ``psi_2^T a`` by the state is ``-d(y^T ID)/dx`` at fixed y and
-a. So the costates follow from one gradient of ``L + psi_1^T q' - y^T ID``, which has the same
-derivatives as H at fixed u.
+Korayem et al. 2009, eqs. (7)-(15). The dynamics enter through the virtual power ``W = y . (M a +
+h)``, so no inverse of a matrix is differentiated: with ``a = M^-1 (B u - h)`` and
+``y = M^-1 psi_2`` the derivative of ``psi_2^T a`` by the state is ``-dW/dx`` at fixed y and a: the
+costates follow from one gradient of ``L + psi_1^T q' - W``, which has the same derivatives as H
+at fixed u.
 
 """
 
@@ -20,6 +20,7 @@ from flex_planner.dynamics.build_chain import build_chain
 from flex_planner.dynamics.chain import Chain
 from flex_planner.dynamics.dynamics_functions import batch, BatchedFunction, solver_of
 from flex_planner.optimal_control.parameters import ParameterSymbols
+from flex_planner.optimal_control.rate_jacobian import RateJacobian
 from flex_planner.optimal_control.running_cost import running_cost
 from flex_planner.optimal_control.torque_limits import free_torque
 
@@ -33,6 +34,8 @@ class Conditions:
     ----------
     z, rate : casadi.SX, shape (4 n_t, 1)
         (q, q', psi_1, psi_2), and z' of eqs. (11) and (12).
+    jacobian : RateJacobian
+        dz'/dz, not yet put together.
     torque, free_torque : casadi.SX, shape (n, 1)
         Eq. (14), and eq. (13) without bounds [N m].
     cost, hamiltonian : casadi.SX
@@ -46,6 +49,7 @@ class Conditions:
 
     z: Any
     rate: Any
+    jacobian: RateJacobian
     torque: Any
     free_torque: Any
     cost: Any
@@ -85,7 +89,7 @@ def build_optimality_functions(arm: Arm) -> dict[str, BatchedFunction]:
         'optimality': batch('optimality', [z], p, [F]),
         # transposed: CasADi stores columns, NumPy rows
         'optimality_jacobian': batch('optimality_jacobian', [z], p,
-                                     [F, ca.jacobian(F, z).T]),
+                                     [F, found.jacobian.assemble().T]),
         'control': batch('control', [z], p, [
             found.torque, found.free_torque, found.cost, found.hamiltonian, share,
             found.acceleration]),
@@ -96,26 +100,30 @@ def build_optimality_functions(arm: Arm) -> dict[str, BatchedFunction]:
 
 def derive_conditions(chain: Chain, parameters: ParameterSymbols) -> Conditions:
     """Derive eqs. (8) and (11)-(14) for a chain."""
-    q, rates = chain.coordinates, chain.rates
+    q, rates, a, y = (chain.coordinates, chain.rates, chain.accelerations, chain.virtual_rates)
     n_t, n = q.numel(), chain.rigidity.numel()
-    psi_1, psi_2 = ca.SX.sym('psi_1', n_t), ca.SX.sym('psi_2', n_t)
-    u, a, y = (ca.SX.sym(name, size) for name, size in (('u', n), ('a', n_t), ('y', n_t)))
+    psi_1, psi_2, u = (ca.SX.sym(name, size) for name, size in (
+        ('psi_1', n_t), ('psi_2', n_t), ('u', n)))
     solve, limits, R = solver_of(chain.mass_matrix()), parameters.torque_limits, parameters[
         'effort_weights']
-    y_value = solve(psi_2)
-    free = free_torque(R, y_value[:n])
+    virtual = solve(psi_2)
+    free = free_torque(R, virtual[:n])
     torque = limits.bound(free, rates[:n])
     acceleration = solve(ca.vertcat(torque, ca.SX(n_t - n, 1)) - chain.bias())
 
-    cost = running_cost(parameters, q, rates, u)
-    stand_in = cost + ca.dot(psi_1, rates) - ca.dot(y, chain.inverse_dynamics(a))
-    x = ca.vertcat(q, rates)
+    def at_point(*expressions: Any) -> Any:
+        return ca.substitute(list(expressions), [u, a, y], [torque, acceleration, virtual])
+
+    cost, x = running_cost(parameters, q, rates, u), ca.vertcat(q, rates)
+    stand_in = cost + ca.dot(psi_1, rates) - chain.power
     gradient = ca.gradient(stand_in, ca.vertcat(x, chain.payload_mass))
-    cost, gradient = ca.substitute([cost, gradient], [u, a, y], [torque, acceleration, y_value])
-    costate_rate = -gradient[:2 * n_t]
+    cost, slope = at_point(cost, gradient)
+    costate_rate = -slope[:2 * n_t]
     costate_rate[n_t:n_t + n] += limits.multiplier(R, free, torque)
     return Conditions(
         z=ca.vertcat(x, psi_1, psi_2), rate=ca.vertcat(rates, acceleration, costate_rate),
-        torque=torque, free_torque=free, cost=cost, payload_share=gradient[-1],
+        jacobian=RateJacobian.of(chain, gradient[:2 * n_t], at_point, solve,
+                                 limits.sensitivity(R, free, rates[:n])),
+        torque=torque, free_torque=free, cost=cost, payload_share=slope[-1],
         hamiltonian=cost + ca.dot(psi_1, rates) + ca.dot(psi_2, acceleration),
         acceleration=acceleration)

@@ -77,6 +77,40 @@ class TorqueLimits:
         """
         return self.slope * weights * (torque - free)
 
+    def sensitivity(self, weights: Any, free: Any, speeds: Any) -> TorqueSensitivity:
+        """Return how the bounded torque changes, of symbols; see `bound`."""
+        import casadi as ca
+
+        lower, upper = self.bounds(speeds)
+        inside = ca.if_else(ca.logic_and(free > lower, free < upper), 1, 0)
+        lost = (1 - inside) * self.slope
+        return TorqueSensitivity(inside=inside, by_costate=inside / weights, by_speed=lost,
+                                 of_costate=lost * self.slope * weights)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TorqueSensitivity:
+    """
+    How the torque of eq. (14) and its share in eq. (12) change, as CasADi symbols of shape (n, 1).
+
+    Attributes
+    ----------
+    inside : casadi.SX
+        1 for a motor between its bounds, else 0.
+    by_costate : casadi.SX
+        -du/dy, 1/R between the bounds.
+    by_speed : casadi.SX
+        -du/dq', K_2 on a bound.
+    of_costate : casadi.SX
+        What the multiplier of a bound falls by with the speed.
+
+    """
+
+    inside: Any
+    by_costate: Any
+    by_speed: Any
+    of_costate: Any
+
 
 def free_torque(weights: Any, y: Any) -> Any:
     """

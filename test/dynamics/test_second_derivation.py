@@ -4,7 +4,7 @@ A second derivation of the dynamics, from positions alone, by automatic differen
 Points of the links at Gauss stations are differentiated by autograd: velocities, energies, then
 the Euler-Lagrange equations. No link frame moves, no integral is taken by hand and CasADi is not
 used, so that little but the mode shapes is in common with
-:mod:`flex_planner.dynamics.planar_chain`.
+:mod:`flex_planner.dynamics.build_chain`.
 
 """
 

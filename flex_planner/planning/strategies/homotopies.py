@@ -25,6 +25,8 @@ import numpy as np
 _FIRST_WEIGHT, _STIFFER = 1.0, 10.0
 # first price of the kinetic energy of bending [1/s], and how far it falls before it is dropped
 _CALM, _DECADES = 1.0, 5.0
+# the same of all kinetic energy, in units of the effort that holding and moving the arm takes
+_FIRST_SPEED_PRICE, _SPEED_DECADES = 10.0, 4.0
 # of the first mesh of a homotopy
 _FIRST_INTERVALS = 60
 
@@ -86,6 +88,29 @@ def lower_vibration_price(problem: MotionProblem, solver: Solver) -> Attempt | N
     if not problem.model.arm.n_modes:
         return None
     return _follow_from_line(_calm(problem), solver, first_step=1 / _DECADES)
+
+
+def lower_speed_price(problem: MotionProblem, solver: Solver) -> Attempt:
+    """
+    Start with a price on the kinetic energy of all coordinates, and lower it.
+
+    Motions that swing, through the hanging posture for example, are dear while it is high.
+
+    """
+    mass = np.diag(problem.model.mass_and_energy(
+        problem.start[None], problem.parameters.physical)[0][0])
+    n, duration = problem.model.arm.n_joints, problem.task.duration
+    speeds = (problem.goal - problem.start)[:n] / duration
+    effort = float(problem.parameters.effort_weights @ problem.holding_torque**2) + (
+        float(problem.parameters.effort_weights @ (mass[:n] * speeds / duration)**2))
+    first = _FIRST_SPEED_PRICE * effort / max(float(mass[:n] @ speeds**2), np.finfo(float).tiny)
+
+    def at(share: float) -> MotionProblem:
+        price = first * 10.0 ** (-_SPEED_DECADES * share) if share < 1 else 0.0
+        weights = problem.parameters.velocity_weights + price * mass
+        return _with(problem, velocity_weights=weights)
+
+    return _follow_from_line(at, solver, first_step=1 / _SPEED_DECADES)
 
 
 def soften_links(problem: MotionProblem, solver: Solver) -> Attempt | None:

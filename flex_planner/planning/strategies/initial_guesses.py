@@ -10,12 +10,20 @@ from __future__ import annotations
 from dataclasses import replace
 
 from flex_planner.base.errors import InvalidTaskError
-from flex_planner.base.validation import Array
-from flex_planner.collocation import CollocationSolution, Solver, SolverStatus
+from flex_planner.collocation import (
+    CollocationResult,
+    CollocationSolution,
+    INTERRUPTED,
+    Solver,
+    SolverStatus,
+)
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.direct.conversion import to_solution
 from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectSettings
 from flex_planner.optimal_control.motion_problem import MotionProblem
+from flex_planner.optimal_control.totals import integrate_totals
+from flex_planner.planning.strategies.homotopies import lower_speed_price
+from flex_planner.planning.strategies.quasi_static_lift import bend_quasi_statically
 from flex_planner.planning.strategies.strategy import Attempt, Strategy
 import numpy as np
 
@@ -40,39 +48,40 @@ def _straight(problem: MotionProblem, solver: Solver) -> CollocationSolution:
 
 
 def lift_rigid_motion(problem: MotionProblem, solver: Solver) -> Attempt | None:
-    """Start from the motion of the same arm made rigid, bent as gravity bends the ends."""
+    """Start from the motion of the same arm made rigid, bent as its forces bend the links."""
+    motion = _solve_rigid(problem, solver)
+    if motion is None or not motion.converged:
+        return None if motion is None else Attempt(result=motion)
+    return Attempt(result=solver.solve(problem, lift(problem, motion.solution, solver)))
+
+
+def _solve_rigid(problem: MotionProblem, solver: Solver) -> CollocationResult | None:
+    """
+    Return the cheaper of two motions of the same arm made rigid, or the failure of the first.
+
+    Under gravity the straight start may lead to a swing that costs several times as much as the
+    motion that a price on all speeds leads to, and the other way round. None for an arm that is
+    rigid itself.
+
+    """
     if not problem.task.arm.n_modes:
         return None
     try:
-        rigid = cold_start(rigid_problem(problem), solver).result
+        rigid = rigid_problem(problem)
     except InvalidTaskError:  # motors that hold the bent arm may be too weak for the straight one
         return None
-    if not rigid.converged:
-        return Attempt(result=rigid)
-    guess = lift(problem, rigid.solution, solver)
-    return Attempt(result=solver.solve(problem, guess))
+    first = cold_start(rigid, solver).result
+    if first.status in INTERRUPTED:
+        return first
+    solved = [each for each in (first, lower_speed_price(rigid, solver).result) if each.converged]
+    return min(solved, default=first, key=lambda each: integrate_totals(rigid, each.solution).cost)
 
 
 def lift(problem: MotionProblem, rigid: CollocationSolution,
          solver: Solver) -> CollocationSolution:
     """Return a motion of the rigid arm as a guess for the flexible one."""
-    arm = problem.task.arm
-    mesh = _straight(problem, solver).mesh
-    coarse = rigid.on_mesh(mesh, solver.settings.rule)
-    n, n_t = arm.n_joints, arm.n_coordinates
-    joints = (np.arange(4)[:, None] * n_t + np.arange(n)).ravel()
-
-    def widen(values: Array) -> Array:
-        full = np.zeros((*values.shape[:-1], 4 * n_t))
-        full[..., joints] = values
-        return full
-
-    nodes, stages = widen(coarse.nodes), widen(coarse.stages)
-    bends = problem.start[n:n_t], problem.goal[n:n_t]  # as gravity bends the arm
-    share = (mesh / mesh[-1])[:, None]
-    nodes[:, n:n_t] = bends[0] + share * (bends[1] - bends[0])
-    stages[..., n:n_t] = (bends[1] - bends[0]) / mesh[-1]
-    return CollocationSolution(mesh, nodes, stages, coarse.rule)
+    return bend_quasi_statically(problem, rigid, _straight(problem, solver).mesh,
+                                 solver.settings.rule)
 
 
 def coarse_mesh(problem: MotionProblem, solver: Solver) -> Attempt:
@@ -128,7 +137,8 @@ def direct_collocation(problem: MotionProblem, solver: Solver) -> Attempt | None
     """
     Start from a coarse transcription solved by IPOPT, whose multipliers are the costates.
 
-    Its scheme is a Gauss rule too, so that it gives a solution of the coarse equations.
+    Its scheme is a Gauss rule too, so that it gives a solution of the coarse equations. A flexible
+    arm starts from the rigid motion that is bent by its forces, if there is one.
 
     """
     if np.isfinite(problem.goal_weights).any():
@@ -138,8 +148,10 @@ def direct_collocation(problem: MotionProblem, solver: Solver) -> Attempt | None
     direct = DirectProblem(problem.model, DirectSettings(
         scheme='gauss', degree=_DIRECT_STAGES, intervals=intervals, tolerance=1e-6,
         max_iterations=_DIRECT_ITERATIONS))
+    rigid = _solve_rigid(problem, solver)
+    guess = lift(problem, rigid.solution, solver) if rigid and rigid.converged else None
     found = direct.solve(problem.parameters, problem.start, problem.goal,
-                         problem.task.duration, monitor=solver.monitor)
+                         problem.task.duration, guess=guess, monitor=solver.monitor)
     solver.monitor.check()
     return Attempt(result=solver.solve(problem, to_solution(found, problem)))
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
+from energy_chain import EnergyChain
 from flex_planner.arms.arm import Arm, Link
-from flex_planner.dynamics.chain import Chain
 
 
 @dataclass(slots=True)
@@ -41,7 +41,7 @@ class _Frame:
         return _Frame(velocity, position, self.gravity, w)
 
 
-def build_planar_chain(arm: Arm) -> Chain:
+def build_energy_chain(arm: Arm) -> EnergyChain:
     """
     Return the symbolic dynamics of an arm.
 
@@ -70,9 +70,10 @@ def build_planar_chain(arm: Arm) -> Chain:
         kinetic += mass * ca.sumsqr(frame.velocity) / 2
         potential += V - mass * ca.dot(frame.gravity, frame.position)
     kinetic += (arm.nodes[-1].inertia + inertia) * (frame.rate + slope_rate)**2 / 2
-    return Chain(coordinates=q, rates=rates, payload_mass=payload, payload_inertia=inertia,
-                 rigidity=rigidity, kinetic=kinetic, potential=potential,
-                 friction=_damping(arm, rigidity) * rates)
+    return EnergyChain(
+        coordinates=q, rates=rates, payload_mass=payload, payload_inertia=inertia,
+        rigidity=rigidity, kinetic=kinetic, potential=potential,
+        friction=_damping(arm, rigidity) * rates)
 
 
 def _damping(arm: Arm, rigidity: Any) -> Any:
