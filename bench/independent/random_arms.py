@@ -90,9 +90,9 @@ def _flexible(draw: np.random.Generator, plain: Arm, index: int, family: str) ->
     frequency = draw.uniform(*_FREQUENCIES) * (0.4 if family == 'pinned_pinned' else 1.0)
     rigidity = frequency**2 * (carried * link.length**3 / 3
                                + link.mass * link.length**3 / 12.4)
-    shape_load = {'shape_mass': carried} if family == 'clamped_mass' else {}
     return replace(link, flexural_rigidity=float(rigidity), mode_family=family,
-                   modes=int(draw.choice([1, 2])), **shape_load,
+                   modes=int(draw.choice([1, 2])),
+                   shape_mass=carried if family == 'clamped_mass' else 0.0,
                    damping_ratio=float(draw.choice([0.0, draw.uniform(0.005, 0.03)])))
 
 

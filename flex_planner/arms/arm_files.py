@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 import math
 import os
@@ -10,14 +10,12 @@ from pathlib import Path
 import sys
 from typing import Any, NoReturn
 
-from flex_planner.arms.arm import Arm, Joint, Link, Motor, Node
-from flex_planner.arms.quantities import check_quantity
+from flex_planner.arms.arm import Arm, BeamSection, Elasticity, Joint, Link, Motor, Node
+from flex_planner.arms.arm_fields import read_joint, read_link, read_node, read_payload
 from flex_planner.base.errors import FlexPlannerError, InvalidValueError
 from flex_planner.base.paths import expand_path, PathError, STANDARD_INPUT
 from flex_planner.base.text_files import say_file
 from flex_planner.base.yaml_files import read_yaml, YamlFileError, YamlSection
-
-_KINDS = {'shape_mass': 'mass', 'shape_inertia': 'inertia'}
 
 
 class ArmFileError(FlexPlannerError):
@@ -136,10 +134,11 @@ def arm_from_mapping(content: object, path: str = '') -> Arm:
     top = YamlSection(path, content)
     arm: Arm = top.build(
         Arm, name=top.text('name'), source=top.text('source', ''),
-        links=tuple(_link(section) for section in top.sections('links')),
-        joints=tuple(_joint(section) for section in top.sections('joints')),
-        nodes=tuple(_node(section) for section in top.sections('nodes', optional=True)),
-        gravity=top.take('gravity', (0.0, 0.0)))
+        links=tuple(read_link(section) for section in top.sections('links')),
+        joints=tuple(read_joint(section) for section in top.sections('joints')),
+        nodes=tuple(read_node(section) for section in top.sections('nodes', optional=True)),
+        gravity=top.take('gravity', (0.0, 0.0)),
+        **(read_payload(top.section('payload')) if top.has('payload') else {}))
     return arm
 
 
@@ -151,87 +150,40 @@ def plain_arm(arm: Arm) -> dict[str, Any]:
     recordings and maps; an arm file may say the same in other quantities.
 
     """
-    return {**asdict(arm), 'gravity': arm.gravity.tolist()}
+    return {**asdict(arm), 'gravity': arm.gravity.tolist(),
+            'payload_com': arm.payload_com.tolist()}
 
 
-def _link(section: YamlSection) -> Link:
-    length = _number(section, 'length')
-    area, second_moment = _cross_section(section)
-    density = _one_of(section, {
-        'linear_density': lambda value: value, 'mass': lambda value: value / length,
-        'density': lambda value: value * area}, {'mass': 'length', 'density': 'section'})
-    modes = section.take('modes', 0)
-    rigidity = math.inf
-    if modes or section.has('flexural_rigidity') or section.has('youngs_modulus'):
-        rigidity = _one_of(section, {
-            'flexural_rigidity': lambda value: value,
-            'youngs_modulus': lambda value: value * second_moment},
-            {'youngs_modulus': 'second moment of area'})
-    family = section.take('mode_family', 'pinned_pinned')
-    shape = {name: _number(section, name, above=-math.inf)
-             for name in ('shape_mass', 'shape_inertia') if family == 'clamped_mass'}
-    link: Link = section.build(
-        Link, length=length, linear_density=density, modes=modes, flexural_rigidity=rigidity,
-        mode_family=family, damping_ratio=section.take('damping_ratio', 0.0), **shape)
-    return link
-
-
-def _number(section: YamlSection, key: str, above: float = 0.0) -> float:
-    """Return a quantity within its range."""
-    return check_quantity(section.name(key), section.take(key), _KINDS.get(key, key), above=above)
-
-
-def _cross_section(section: YamlSection) -> tuple[float, float]:
-    """Return area [m^2] and second moment [m^4] of the section; NaN where they are not given."""
-    if section.has('section'):
-        part = section.section('section')
-        width, thickness = _number(part, 'width'), _number(part, 'thickness')
-        part.finish()
-        return width * thickness, width * thickness**3 / 12
-    if section.has('second_moment_of_area'):
-        return math.nan, _number(section, 'second_moment_of_area')
-    return math.nan, math.nan
-
-
-def _one_of(section: YamlSection, conversions: Mapping[str, Callable[[float], float]],
-            others: Mapping[str, str]) -> float:
+def arm_from_plain(fields: Mapping[str, Any]) -> Arm:
     """
-    Return a quantity that a file may give by several fields, but must give by one.
+    Return the arm whose values `plain_arm` has written.
 
-    It is the first of `conversions`; `others` are what it is computed from besides the given.
+    Those of before motors had a largest torque say nothing of one: the line was the only limit.
+
+    Raises
+    ------
+    FlexPlannerError
+        If a value breaks its bound.
+    KeyError, TypeError
+        If a field is unknown or missing.
 
     """
-    given = [name for name in conversions if section.has(name)]
-    if len(given) != 1:
-        raise InvalidValueError(section.name(' or '.join(conversions)),
-                                ' and '.join(given) or None, 'given, exactly one of them')
-    result = conversions[given[0]](_number(section, given[0]))
-    if math.isnan(result):
-        needs = 'section' if given[0] == 'density' else 'section or second_moment_of_area'
-        raise InvalidValueError(section.name(needs), None, f'given with {given[0]}')
-    kind = next(iter(conversions))
-    name = f'{kind} (of {given[0]} and {others[given[0]]})' if given[0] in others else kind
-    return check_quantity(section.name(name), result, kind, above=0)
+    return Arm(**{**fields, 'links': tuple(_link(entry) for entry in fields['links']),
+                  'joints': tuple(_joint(entry) for entry in fields['joints']),
+                  'nodes': tuple(Node(**entry) for entry in fields['nodes'])})
 
 
-def _joint(section: YamlSection) -> Joint:
-    motor = Motor()
-    if section.has('motor'):
-        part = section.section('motor')
-        # a motor may have a largest speed alone
-        torque = (part.take('stall_torque', math.inf) if part.has('max_speed')
-                  else part.take('stall_torque'))
-        motor = part.build(Motor, stall_torque=torque,
-                           no_load_speed=part.take('no_load_speed', math.inf),
-                           max_speed=part.take('max_speed', math.inf))
-    joint: Joint = section.build(
-        Joint, motor=motor, viscous_friction=section.take('viscous_friction', 0.0),
-        lower_limit=section.take('lower_limit', -math.inf),
-        upper_limit=section.take('upper_limit', math.inf))
-    return joint
+def _link(fields: Mapping[str, Any]) -> Link:
+    """Return a link of its plain values."""
+    sections = tuple(BeamSection(**entry) for entry in fields.get('sections', ()))
+    return Link(**{**fields, 'sections': sections})
 
 
-def _node(section: YamlSection) -> Node:
-    node: Node = section.build(Node, mass=section.take('mass', 0.0),
-                               inertia=section.take('inertia', 0.0))
-    return node
+def _joint(fields: Mapping[str, Any]) -> Joint:
+    """Return a joint of its plain values."""
+    parts: dict[str, Any] = {'motor': Motor(**{'max_torque': math.inf, **fields['motor']})}
+    if fields.get('elasticity') is not None:
+        parts['elasticity'] = Elasticity(**fields['elasticity'])
+    if 'housing' in fields:
+        parts['housing'] = Node(**fields['housing'])
+    return Joint(**{**fields, **parts})

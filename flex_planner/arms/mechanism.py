@@ -181,7 +181,7 @@ def planar_beam(link: Link) -> FlexibleBody:
         displacement=_row(Y, rho * modes.area), inertia_slope=slope, inertia_bend=bend,
         moment=_row(Z, rho * modes.moment), cross_moment=np.zeros((m, m, 3)),
         gram=rho * modes.gram, stiffness=modes.stiffness,
-        damping=2 * link.damping_ratio * np.sqrt(
+        damping=2 * link.damping_ratios * np.sqrt(
             np.diag(modes.stiffness) * rho * np.diag(modes.gram)),
         tip=np.array([L, 0.0, 0.0]), tip_displacement=_row(Y, modes.tip_deflection),
         tip_turn=_row(Z, modes.tip_slope))

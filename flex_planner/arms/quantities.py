@@ -35,8 +35,11 @@ QUANTITIES: Mapping[str, Range] = MappingProxyType({
     'youngs_modulus': Range(1.0, 1e15, 'N/m^2'),
     'width': Range(1e-7, 1e3, 'm'),
     'thickness': Range(1e-7, 1e3, 'm'),
+    'diameter': Range(1e-7, 1e3, 'm'),
     'second_moment_of_area': Range(1e-30, 1e6, 'm^4'),
-    'stall_torque': Range(1e-12, 1e9, 'N m'),
+    'torque': Range(1e-12, 1e9, 'N m'),
+    'stiffness': Range(1e-12, 1e15, 'N m/rad'),
+    'gear_ratio': Range(1e-6, 1e6, ''),
     'speed': Range(1e-6, 1e6, 'rad/s'),
     'viscous_friction': Range(1e-18, 1e9, 'N m s/rad'),
     'angle': Range(0.0, 1e6, 'rad'),
@@ -74,5 +77,5 @@ def check_quantity(field: str, value: object, kind: str, *, above: float = -math
     if math.isfinite(result) and not least <= abs(result) <= limits.most:
         lowest = least if least or at_least == 0 else -limits.most
         raise InvalidValueError(field, result, f'a number in the range {lowest:g} to '
-                                               f'{limits.most:g} {limits.unit}')
+                                               f'{limits.most:g} {limits.unit}'.rstrip())
     return result

@@ -162,7 +162,7 @@ def draw_tip(axes: Axes, arm: Arm, motion: Motion,
 
 def _draw_modes(axes: Axes, arm: Arm, motion: Motion) -> None:
     """Draw the modal displacements."""
-    for j, name in enumerate(arm.modal_names):
+    for j, name in enumerate(arm.passive_names):
         axes.plot(motion.times, motion.coordinates[:, arm.n_joints + j] * _MILLI,
                   label=name.replace('_', ', '))
     if not arm.n_modes:

@@ -122,7 +122,7 @@ class ArmSimulator(Node):  # type: ignore[misc]
             self._plant.torque))
         if self._arm.n_modes:
             self._modes.publish(_state_message(
-                stamp, self._arm.modal_names, state[n:n_t], state[n_t + n:], np.zeros(0)))
+                stamp, self._arm.passive_names, state[n:n_t], state[n_t + n:], np.zeros(0)))
         tip = PointStamped()
         tip.header.stamp, tip.header.frame_id = stamp, self._settings.base_frame
         tip.point.x, tip.point.y = (float(v) for v in tip_position(self._arm, state[:n_t]))

@@ -92,7 +92,8 @@ MISTAKES: list[tuple[str, object, str, str]] = [
     ('joints/0/motor/max_speed', 0, 'joints[0].motor.max_speed', '> 0 rad/s'),
     ('joints/0/motor/power', 8.0, 'joints[0].motor.power', 'no such field'),
     ('joints/0/viscous_friction', -0.1, 'joints[0].viscous_friction', '>= 0 N m s/rad'),
-    ('joints/1/friction', 0.1, 'joints[1].friction', 'no such field'),
+    ('joints/1/frction', 0.1, 'joints[1].frction', 'no such field'),
+    ('joints/1/friction', 0.1, 'joints[1].friction', 'a mapping of fields'),
     ('nodes', [{}], 'number of nodes', '0 or 3'),
     ('nodes/0/mass', -1, 'nodes[0].mass', '>= 0 kg'),
     ('nodes/2/inertia', -1, 'nodes[2].inertia', '>= 0 kg m^2'),
@@ -100,7 +101,8 @@ MISTAKES: list[tuple[str, object, str, str]] = [
     ('gravity', [0.0, 0.0, -9.81], 'gravity', 'a list of 2 numbers'),
     ('gravity', -9.81, 'gravity', 'a list of 2 numbers'),
     ('gravity', [0.0, 'down'], 'gravity', 'a list of 2 numbers'),
-    ('payload', 1.0, 'payload', 'no such field'),
+    ('payload', 1.0, 'payload', 'a mapping of fields'),
+    ('payloads', 1.0, 'payloads', 'no such field'),
 ]
 
 

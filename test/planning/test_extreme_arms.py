@@ -66,7 +66,7 @@ def links(family: str) -> st.SearchStrategy[dict[str, Any]]:
 
 JOINTS = st.fixed_dictionaries({}, optional={
     'motor': st.fixed_dictionaries(
-        {'stall_torque': values('stall_torque')},
+        {'stall_torque': values('torque')},
         optional={'no_load_speed': values('speed'), 'max_speed': values('speed')}),
     'viscous_friction': values('viscous_friction', zero=True)})
 NODES = st.fixed_dictionaries({'mass': values('mass', zero=True),

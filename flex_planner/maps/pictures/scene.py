@@ -8,7 +8,8 @@ import logging
 import math
 from typing import Any
 
-from flex_planner.arms.arm import Arm, Joint, Link, Motor, Node
+from flex_planner.arms.arm import Arm
+from flex_planner.arms.arm_files import arm_from_plain
 from flex_planner.arms.inverse_kinematics import workspace
 from flex_planner.arms.kinematics import link_points
 from flex_planner.base.errors import FlexPlannerError
@@ -88,7 +89,7 @@ def study_of(dataset: xr.Dataset) -> Study | None:
         quantity = Quantity[str(dataset.attrs['quantity']).upper()]
         return Study(
             name=str(dataset.attrs['title']), quantity=quantity, text=dataset.attrs['study'],
-            arm=_arm(parse_yaml(dataset.attrs['arm'])),
+            arm=arm_from_plain(parse_yaml(dataset.attrs['arm'])),
             axes=tuple(Axis(name=str(name), values=dataset[name].values)
                        for name in dataset['code'].dims),
             motion=StudyMotion(start=_end('start', content), goal=_end('goal', content),
@@ -98,14 +99,6 @@ def study_of(dataset: xr.Dataset) -> Study | None:
         _log.warning('the arm is not drawn, because the study of the map cannot be read: %s',
                      error)
         return None
-
-
-def _arm(fields: dict[str, Any]) -> Arm:
-    """Return the arm of a store."""
-    return Arm(**{**fields, 'links': tuple(Link(**link) for link in fields['links']),
-                  'joints': tuple(Joint(**{**joint, 'motor': Motor(**joint['motor'])})
-                                  for joint in fields['joints']),
-                  'nodes': tuple(Node(**node) for node in fields['nodes'])})
 
 
 def _end(name: str, content: Mapping[str, Any]) -> End:

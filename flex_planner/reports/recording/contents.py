@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from flex_planner.arms.arm import Arm, Joint, Link, Motor, Node
+from flex_planner.arms.arm import Arm
+from flex_planner.arms.arm_files import arm_from_plain
 from flex_planner.base.errors import FlexPlannerError, RecordingError
 from flex_planner.base.paths import expand_path
 from flex_planner.base.validation import Array
@@ -191,7 +192,7 @@ class RecordedRequest:
         trajectory = found.messages.get('FlexibleTrajectory')
         scenario = _scenario(path)
         try:
-            arm = arm_from_scenario(scenario['arm'])
+            arm = arm_from_plain(scenario['arm'])
             settings = dict(scenario['parameters'])
             # older recordings do not know of it
             begin = float(getattr(found.messages['PlanReport'], 'start_hold', 0.0))
@@ -242,24 +243,6 @@ class RecordedRequest:
             effort_weights=weights(self.report.effort_weights, n),
             position_weights=weights(self.task.position_weights, n_t),
             velocity_weights=weights(self.report.velocity_weights, n_t))
-
-
-def arm_from_scenario(content: Mapping[str, Any]) -> Arm:
-    """
-    Return the arm that a scenario describes by the fields of the dataclasses in `arm`.
-
-    Raises
-    ------
-    FlexPlannerError
-        If a value breaks its bound.
-    TypeError
-        If a field is unknown or missing.
-
-    """
-    joints = [Joint(**{**entry, 'motor': Motor(**entry['motor'])}) for entry in content['joints']]
-    return Arm(**{**content, 'joints': tuple(joints),
-                  'links': tuple(Link(**entry) for entry in content['links']),
-                  'nodes': tuple(Node(**entry) for entry in content['nodes'])})
 
 
 def _scenario(path: Path | str) -> Mapping[str, Any]:

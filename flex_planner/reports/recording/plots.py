@@ -107,7 +107,7 @@ def plots(request: RecordedRequest, check: MotionCheck | None = None,
 def _motion_plots(request: RecordedRequest, motion: RecordedMotion, check: MotionCheck | None,
                   bands: Bands | None) -> list[Plot]:
     arm, n = request.arm, request.arm.n_joints
-    joints, modes, t = request.joint_names, arm.modal_names, motion.times
+    joints, modes, t = request.joint_names, arm.passive_names, motion.times
     found = [
         _torques(request, motion),
         _over_time('positions', 'Joint angles', 'angle [rad]', t, motion.coordinates[:, :n],

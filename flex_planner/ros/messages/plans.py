@@ -257,7 +257,7 @@ def flexible_trajectory(plan: Plan, reference: SampledPlan, joints: JointTraject
     """Return the trajectory with the bending of the links, costates and the tip's path."""
     samples = reference.samples
     message = FlexibleTrajectory(
-        joint_trajectory=joints, modal_names=list(plan.arm.modal_names),
+        joint_trajectory=joints, modal_names=list(plan.arm.passive_names),
         points=[_flexible_point(plan.arm.n_joints, samples, k, time)
                 for k, time in enumerate(reference.times_ns)],
         tip_path=[Point(x=float(x), y=float(y), z=0.0) for x, y in samples.tip],

@@ -142,7 +142,7 @@ class OutcomeRecorder:
     def _write_states(self, recording: Recording, state: RequestState, plan: Plan,
                       reference: SampledPlan, ready: int) -> None:
         """Write the samples of a plan that is ready at a time [ns]."""
-        names = [*state.settings.joint_names, *plan.arm.modal_names]
+        names = [*state.settings.joint_names, *plan.arm.passive_names]
         for k, passed in enumerate(reference.times_ns):
             if state.stopping():
                 raise RecordingError(f'writing stopped after {k} of {len(reference.times_ns)} '

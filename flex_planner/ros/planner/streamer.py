@@ -45,7 +45,7 @@ class Streamer:
         """Stream a plan from now on, in place of the one before; that it fails is logged."""
         samples = reference.samples
         streamed = StreamedPlan(
-            names=[*settings.joint_names, *plan.arm.modal_names], rate=settings.reference_rate,
+            names=[*settings.joint_names, *plan.arm.passive_names], rate=settings.reference_rate,
             stamp_ns=self._node.get_clock().now().nanoseconds, began_ns=time.monotonic_ns(),
             by_clock=self._node.get_clock().ros_time_is_active,
             times_ns=reference.times_ns, coordinates=samples.coordinates,

@@ -358,7 +358,7 @@ def test_messages_hold_the_samples(plan: Plan, reference: SampledPlan) -> None:
 
 
 def test_reference_state_has_joints_and_modes(plan: Plan, reference: SampledPlan) -> None:
-    names = [*NAMES, *plan.arm.modal_names]
+    names = [*NAMES, *plan.arm.passive_names]
     state = reference_state(plan, reference.samples, 5, names, 1_700_000_000_123_456_789)
     assert (state.header.stamp.sec, state.header.stamp.nanosec) == (1_700_000_000, 123_456_789)
     assert state.name == names
