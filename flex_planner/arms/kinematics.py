@@ -1,7 +1,7 @@
 """
 Position and velocity of the arm: frames, bent links, tip.
 
-Written with array operations and apart from :mod:`flex_planner.dynamics.planar_chain`, so that
+Written with array operations and apart from :mod:`flex_planner.dynamics.build_chain`, so that
 each can check the other.
 
 """
@@ -25,7 +25,9 @@ def frame_angles(arm: Arm, coordinates: Array) -> Array:
         q.
 
     """
-    turns = np.array(coordinates[..., :arm.n_joints])
+    n, turning = arm.n_joints, list(arm.elastic_joints)
+    turns = np.array(coordinates[..., :n])
+    turns[..., turning] += coordinates[..., n:n + len(turning)]
     for i, (link, modal) in enumerate(zip(arm.links[:-1], arm.modal_slices, strict=False)):
         turns[..., i + 1] += coordinates[..., modal] @ link.mode_shapes().tip_slope
     angles: Array = np.cumsum(turns, axis=-1)

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from flex_planner.arms.arm import Arm, Link, Node
+from flex_planner.arms.arm import Arm, Elasticity, Link, Node
 from flex_planner.base.validation import Array
 import numpy as np
 
@@ -113,6 +113,10 @@ class MechanismLink:
         The link between; without modes it is rigid.
     tip_order : tuple of int
         Axes about which the bent tip turns, one after the other.
+    rotor : float
+        Inertia that turns with the joint's own rate [kg m^2].
+    elasticity : Elasticity, optional
+        Of the joint: the link turns by a twist more than the motor.
 
     """
 
@@ -123,6 +127,8 @@ class MechanismLink:
     rotation: Array = field(default_factory=lambda: np.eye(3))
     axis: int = Z
     tip_order: tuple[int, ...] = (Y, X, Z)
+    rotor: float = 0.0
+    elasticity: Elasticity | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -138,23 +144,44 @@ class Mechanism:
         Viscous, of the joints [N m s/rad].
     gravity : numpy.ndarray, shape (3,)
         In the axes of the base [m/s^2].
+    coulomb : tuple of int
+        Joints with Coulomb friction, whose sizes are free parameters.
+    payload_com : numpy.ndarray, shape (3,)
+        Centre of mass of the payload in the frame of the tip [m].
 
     """
 
     links: Sequence[MechanismLink]
     friction: Array
     gravity: Array
+    coulomb: tuple[int, ...] = ()
+    payload_com: Array = field(default_factory=lambda: np.zeros(3))
+
+    @property
+    def elastic(self) -> tuple[int, ...]:
+        """Return the joints that are elastic."""
+        return tuple(i for i, link in enumerate(self.links) if link.elasticity is not None)
+
+    @property
+    def n_coordinates(self) -> int:
+        """Return the number of coordinates: joints, twists of the elastic ones, modes."""
+        return (len(self.links) + len(self.elastic)
+                + sum(link.beam.count for link in self.links))
 
     @classmethod
     def of(cls, arm: Arm) -> Mechanism:
         """Return a planar arm: in the plane of x and y."""
-        last = arm.n_joints - 1
+        # what is fixed to the tip of each link: the housing of the next motor, or the last node
+        ends = [*(joint.housing for joint in arm.joints[1:]), arm.nodes[-1]]
         return cls(
-            links=[MechanismLink(base=_node(arm.nodes[i]), beam=planar_beam(link),
-                                 end=_node(arm.nodes[-1] if i == last else Node()))
-                   for i, link in enumerate(arm.links)],
+            links=[MechanismLink(base=_node(node), beam=planar_beam(link), end=_node(end),
+                                 rotor=joint.motor.reflected_inertia, elasticity=joint.elasticity)
+                   for link, joint, node, end in zip(arm.links, arm.joints, arm.nodes, ends,
+                                                     strict=False)],
             friction=np.array([joint.viscous_friction for joint in arm.joints]),
-            gravity=np.append(arm.gravity, 0.0))
+            gravity=np.append(arm.gravity, 0.0),
+            coulomb=tuple(i for i, joint in enumerate(arm.joints) if joint.coulomb_friction),
+            payload_com=np.append(arm.payload_com, 0.0))
 
 
 def _node(node: Node) -> RigidBody:

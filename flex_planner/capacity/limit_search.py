@@ -185,7 +185,7 @@ class LimitSearch:
     @property
     def explored_best(self) -> KindOfMotion | None:
         """Return the best kind if the search ended worse than it: it was not finished."""
-        if not self.kinds or not self.extremals or self._problem.model.arm.n_modes:
+        if not self.kinds or not self.extremals or self._problem.model.arm.n_passive:
             return None
         best = self.kinds[0]
         return best if self._parameter.falls_short(self.last.value, best.value, KEPT) else None

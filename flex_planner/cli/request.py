@@ -197,7 +197,7 @@ def _ends(options: argparse.Namespace, arm: Arm) -> dict[str, Any]:
 def _start(options: argparse.Namespace, arm: Arm) -> dict[str, Any]:
     """Return what is given of the state at the start besides positions."""
     sizes = {'start_velocities': sorted({arm.n_joints, arm.n_coordinates}),
-             'start_modal_displacements': [arm.n_modes]}
+             'start_modal_displacements': [arm.n_passive]}
     return {name: numbers(f'--{name.replace("_", "-")}', getattr(options, name), size)
             for name, size in sizes.items() if getattr(options, name) is not None}
 

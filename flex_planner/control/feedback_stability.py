@@ -27,7 +27,7 @@ def feedback_growth(arm: ControlledArm, positions: Array) -> float:
         Joint angles at which to look [rad].
 
     """
-    straight = np.zeros((len(positions), arm.dynamics.arm.n_modes))
+    straight = np.zeros((len(positions), arm.dynamics.arm.n_passive))
     return max(float(np.log(_spectral_radius(arm, posture))) / arm.controller.period
                for posture in np.hstack([positions, straight]))
 

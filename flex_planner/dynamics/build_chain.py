@@ -8,7 +8,7 @@ motion, and every body adds its power. Neither energies nor accelerations are di
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,6 +22,7 @@ from flex_planner.dynamics.body_power import (
     tip_shift,
 )
 from flex_planner.dynamics.chain import Chain
+from flex_planner.dynamics.joint_power import JointPowers, link_angle
 from flex_planner.dynamics.moving_frame import MovingFrame, Posture
 from flex_planner.dynamics.vectors import Motion, product, total
 import numpy as np
@@ -43,15 +44,18 @@ def build_chain(arm: Arm) -> Chain:
 def chain_of(mechanism: Mechanism) -> Chain:
     """Return the symbolic dynamics of a mechanism."""
     n = len(mechanism.links)
-    n_t = n + sum(link.beam.count for link in mechanism.links)
+    n_t = mechanism.n_coordinates
     q, rates, a, y = (ca.SX.sym(name, n_t) for name in ('q', 'dq', 'a', 'y'))
-    mass, inertia, rigidity = ca.SX.sym('m_p'), ca.SX.sym('J_p'), ca.SX.sym('EI', n)
-    payload = Inertia(mass, (0.0, 0.0, 0.0), _about_z(inertia))
-    chain = _Chain(mechanism, Motion(q, rates, a, y).apply(ca.vertsplit), payload,
+    mass, inertia = ca.SX.sym('m_p'), ca.SX.sym('J_p')
+    rigidity, coulomb, fading = (ca.SX.sym(name, n) for name in ('EI', 'tau_c', 'v_s'))
+    motion = Motion(q, rates, a, y).apply(ca.vertsplit)
+    chain = _Chain(mechanism, motion, _payload(mechanism.payload_com.tolist(), mass, inertia),
                    ca.vertsplit(rigidity))
+    joints = JointPowers(mechanism, motion, ca.vertsplit(coulomb), ca.vertsplit(fading))
     return Chain(coordinates=q, rates=rates, accelerations=a, virtual_rates=y, payload_mass=mass,
-                 payload_inertia=inertia, rigidity=rigidity, power=ca.SX(chain.power()),
-                 potential=ca.SX(chain.potential()))
+                 payload_inertia=inertia, rigidity=rigidity, coulomb_friction=coulomb,
+                 coulomb_speed=fading, power=ca.SX(total([*chain.powers(), *joints.powers()])),
+                 potential=ca.SX(total([*chain.potentials(), *joints.potentials()])))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,30 +67,27 @@ class _Chain:
     payload: Inertia
     rigidity: list[Any]
 
-    def power(self) -> Any:
-        """Return W."""
+    def powers(self) -> Iterator[Any]:
+        """Yield the power of every body."""
         frame = MovingFrame.at_base(self.mechanism.gravity)
-        bodies = (flexible_power(beam, carried, at, modes, rigidity)
-                  if beam else carried.power(at)
-                  for at, beam, carried, modes, rigidity in self._walk(frame))
-        friction = (product(float(c), product(self.motion.rate[i], self.motion.virtual[i]))
-                    for i, c in enumerate(self.mechanism.friction))
-        return total([*bodies, *friction])
+        for at, beam, carried, modes, rigidity in self._walk(frame):
+            yield (flexible_power(beam, carried, at, modes, rigidity) if beam
+                   else carried.power(at))
 
-    def potential(self) -> Any:
-        """Return the potential energy."""
+    def potentials(self) -> Iterator[Any]:
+        """Yield the potential energy of every body."""
         frame = Posture.at_base(self.mechanism.gravity)
-        return total(flexible_potential(beam, carried, at, modes.value, rigidity)
-                     if beam else carried.potential(at)
-                     for at, beam, carried, modes, rigidity in self._walk(frame))
+        for at, beam, carried, modes, rigidity in self._walk(frame):
+            yield (flexible_potential(beam, carried, at, modes.value, rigidity) if beam
+                   else carried.potential(at))
 
     def _walk(self, frame: Any) -> Iterator[tuple[Any, FlexibleBody | None, Inertia, Motion, Any]]:
         """Yield every body with its frame, modes and rigidity; bodies of tips are rigid."""
-        at = len(self.mechanism.links)
+        at = len(self.mechanism.links) + len(self.mechanism.elastic)
         pending: list[tuple[int, Motion]] = []
         for i, link in enumerate(self.mechanism.links):
             frame, pending = _to_joint(frame, pending, link)
-            pending = _merge(pending, link.axis, self.motion.take(i))
+            pending = _merge(pending, link.axis, link_angle(self.mechanism, self.motion, i))
             frame, pending = _settle(frame, pending), []
             modes = self.motion.take(slice(at, at + link.beam.count))
             at += link.beam.count
@@ -138,6 +139,10 @@ def _for_body(frame: Any, pending: list[tuple[int, Motion]], body: Inertia) -> A
     return frame.spin(axis, angle) if body.spins_about(axis) else frame.turn(axis, angle)
 
 
-def _about_z(inertia: Any) -> list[list[Any]]:
-    """Return the matrix of a rotary inertia in the plane."""
-    return [[inertia if i == k == Z else 0.0 for k in range(3)] for i in range(3)]
+def _payload(com: Sequence[float], mass: Any, inertia: Any) -> Inertia:
+    """Return a payload about the tip: a mass at a point, with a rotary inertia in the plane."""
+    square = sum(entry**2 for entry in com)
+    matrix = [[total([product((square if i == k else 0.0) - com[i] * com[k], mass),
+                      inertia if i == k == Z else 0.0]) for k in range(3)] for i in range(3)]
+    x, y, z = (product(entry, mass) for entry in com)
+    return Inertia(mass, (x, y, z), matrix)

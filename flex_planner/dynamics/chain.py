@@ -28,6 +28,8 @@ class Chain:
         m_p at the tip [kg], and its rotary inertia [kg m^2].
     rigidity : casadi.SX, shape (n, 1)
         E I of each link [N m^2].
+    coulomb_friction, coulomb_speed : casadi.SX, shape (n, 1)
+        Of each joint [N m], and the speed below which it fades [rad/s].
     power : casadi.SX
         W.
     potential : casadi.SX
@@ -42,6 +44,8 @@ class Chain:
     payload_mass: Any
     payload_inertia: Any
     rigidity: Any
+    coulomb_friction: Any
+    coulomb_speed: Any
     power: Any
     potential: Any
 

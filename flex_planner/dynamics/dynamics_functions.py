@@ -45,7 +45,7 @@ def build_dynamics_functions(arm: Arm) -> dict[str, BatchedFunction]:
     x, p = ca.vertcat(q, rates), physical_symbols(chain)
     u, a = ca.SX.sym('u', arm.n_joints), ca.SX.sym('a', arm.n_coordinates)
     M = chain.mass_matrix()
-    forces = ca.vertcat(u, ca.SX(arm.n_modes, 1))
+    forces = ca.vertcat(u, ca.SX(arm.n_passive, 1))
     acceleration = solver_of(M)(forces - chain.bias())
     rate = batch('forward_dynamics', [x, u], p, [ca.vertcat(rates, acceleration)])
     return {
@@ -62,7 +62,8 @@ def build_dynamics_functions(arm: Arm) -> dict[str, BatchedFunction]:
 
 def physical_symbols(chain: Chain) -> Any:
     """Return the free parameters of a chain in the order of `PhysicalParameters.physical`."""
-    return ca.vertcat(chain.payload_mass, chain.payload_inertia, chain.rigidity)
+    return ca.vertcat(chain.payload_mass, chain.payload_inertia, chain.rigidity,
+                      chain.coulomb_friction, chain.coulomb_speed)
 
 
 def batch(name: str, inputs: Sequence[Any], p: Any, results: Sequence[Any]) -> BatchedFunction:

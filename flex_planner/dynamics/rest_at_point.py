@@ -93,7 +93,7 @@ class _BentArm:
         n, dynamics = self.arm.n_joints, self._dynamics
         q, torque = equilibrium(dynamics, self._angles(turned), self._parameters)
         moves = tip_jacobian(dynamics.arm, q)
-        if not dynamics.arm.n_modes:
+        if not dynamics.arm.n_passive:
             return q, torque, moves
         stiffness = dynamics.static_forces(q[None], self._parameters.physical)[1][0]
         sagging = np.linalg.solve(stiffness[n:, n:], stiffness[n:, :n])

@@ -41,10 +41,10 @@ def equilibrium(dynamics: ArmDynamics, positions: Array,
 
     """
     n, p = dynamics.arm.n_joints, parameters.physical
-    q = np.concatenate([positions, np.zeros(dynamics.arm.n_modes)])
+    q = np.concatenate([positions, np.zeros(dynamics.arm.n_passive)])
     for _ in range(_MAX_ITERATIONS):
         force, stiffness = dynamics.static_forces(q[None], p)
-        if not dynamics.arm.n_modes:
+        if not dynamics.arm.n_passive:
             return q, force[0]
         change = np.linalg.solve(stiffness[0, n:, n:], force[0, n:])
         q[n:] -= change
@@ -125,10 +125,10 @@ def residual_vibration(dynamics: ArmDynamics, state: Array, rest: Array,
     """
     Return how far the links still bend after the joints are locked [m].
 
-    The largest distance of any point of a link from its place at rest, with all modes of the
-    locked arm in phase: what the free vibration may reach but not exceed. What stops joints that
-    still turn acts on them alone, so the momenta of the modes stay as they are, and their rates
-    jump.
+    The largest distance of any point of a link from its place at rest, or of the stretched arm's
+    tip by the twist of an elastic joint, with all modes of the locked arm in phase: what the free
+    vibration may reach but not exceed. What stops joints that still turn acts on them alone, so
+    the momenta of the modes stay as they are, and their rates jump.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def residual_vibration(dynamics: ArmDynamics, state: Array, rest: Array,
     """
     arm = dynamics.arm
     n, n_t = arm.n_joints, arm.n_coordinates
-    if not arm.n_modes:
+    if not arm.n_passive:
         return 0.0
     frequencies, vectors = natural_modes(dynamics, rest, parameters, locked=True)
     mass = dynamics.mass_and_energy(state[None], parameters.physical)[0][0, n:]
@@ -152,8 +152,12 @@ def residual_vibration(dynamics: ArmDynamics, state: Array, rest: Array,
     displacement = np.linalg.solve(vectors, state[n:n_t] - rest[n:])
     rate = np.linalg.solve(vectors, np.linalg.solve(mass[:, n:], momenta))
     amplitude = np.hypot(displacement, rate / frequencies)
-    return max(float((np.abs(_bending(dynamics, link, vectors)) @ amplitude).max())
-               for link in range(n) if arm.links[link].modes)
+    twisting = np.abs(vectors[:len(arm.elastic_joints)]) @ amplitude
+    beyond = np.cumsum([link.length for link in reversed(arm.links)])[::-1]
+    away = [*(np.abs(_bending(dynamics, link, vectors)) @ amplitude
+              for link in range(n) if arm.links[link].modes),
+            twisting * beyond[list(arm.elastic_joints)]]
+    return float(np.concatenate(away).max())
 
 
 def _bending(dynamics: ArmDynamics, index: int, vectors: Array) -> Array:

@@ -2,14 +2,14 @@
 The straight arm by NumPy alone: mass matrix, stiffness, and how it rings with its joints free.
 
 For estimates of arms that nobody has compiled, such as the same arm with more modes. Written apart
-from :mod:`flex_planner.dynamics.planar_chain`, which it agrees with where the links are not bent.
+from :mod:`flex_planner.dynamics.build_chain`, which it agrees with where the links are not bent.
 Neither gravity nor damping is in it.
 
 """
 
 from __future__ import annotations
 
-from flex_planner.arms.arm import Arm, Link
+from flex_planner.arms.arm import Arm, Link, Node
 from flex_planner.base.validation import Array
 import numpy as np
 
@@ -40,8 +40,11 @@ def mass_matrix(arm: Arm, positions: Array, payload_mass: float,
     turning: Array = np.zeros(n_t)  # rate of its frame
     slope: Array = np.zeros(n_t)
     for i, (link, modal) in enumerate(zip(arm.links, arm.modal_slices, strict=True)):
+        mass[i, i] += arm.joints[i].motor.reflected_inertia
         turning = turning + slope
         turning[i] += 1
+        if i in arm.elastic_joints:
+            turning[arm.n_joints + arm.elastic_joints.index(i)] += 1
         angle = positions[:i + 1].sum()
         across = np.array([-np.sin(angle), np.cos(angle)])
         mass += _link_mass(link, modal, base, across @ base, turning)
@@ -50,11 +53,28 @@ def mass_matrix(arm: Arm, positions: Array, payload_mass: float,
         deflection, slope = np.zeros(n_t), np.zeros(n_t)
         deflection[modal], slope[modal] = shapes.tip_deflection, shapes.tip_slope
         base = base + np.outer(across, link.length * turning + deflection)
-        carried = payload_mass if i == arm.n_joints - 1 else 0.0
-        mass += (arm.nodes[i + 1].mass + carried) * base.T @ base
-    turning = turning + slope
-    mass += (arm.nodes[-1].inertia + payload_inertia) * np.outer(turning, turning)
-    return mass
+        end, spin = _end_body(arm, i), turning + slope
+        mass += end.mass * base.T @ base + end.inertia * np.outer(spin, spin)
+    return mass + _payload_mass(arm, positions.sum(), base, turning + slope, payload_mass,
+                                payload_inertia)
+
+
+def _end_body(arm: Arm, index: int) -> Node:
+    """Return what is fixed to the tip of a link, with the mass at the next joint."""
+    if index == arm.n_joints - 1:
+        return arm.nodes[-1]
+    housing = arm.joints[index + 1].housing
+    return Node(mass=arm.nodes[index + 1].mass + housing.mass, inertia=housing.inertia)
+
+
+def _payload_mass(arm: Arm, angle: float, tip: Array, turning: Array, mass: float,
+                  inertia: float) -> Array:
+    """Return the part of a payload whose centre of mass may be off the tip."""
+    along, across = arm.payload_com
+    c, s = np.cos(angle), np.sin(angle)
+    moves = tip + np.outer([-s * along - c * across, c * along - s * across], turning)
+    part: Array = mass * moves.T @ moves + inertia * np.outer(turning, turning)
+    return part
 
 
 def _link_mass(link: Link, modal: slice, base: Array, lift: Array, turning: Array) -> Array:
@@ -75,8 +95,11 @@ def _link_mass(link: Link, modal: slice, base: Array, lift: Array, turning: Arra
 
 
 def bending_stiffness(arm: Arm) -> Array:
-    """Return the stiffness of the links, eq. (23), shape (n_t, n_t); zero at the joints."""
+    """Return the stiffness of links, eq. (23), and twists, (n_t, n_t); zero at the joints."""
     stiffness = np.zeros((arm.n_coordinates, arm.n_coordinates))
+    for place, i in enumerate(arm.elastic_joints, arm.n_joints):
+        elasticity = arm.joints[i].elasticity
+        stiffness[place, place] = elasticity.stiffness if elasticity else 0.0
     for link, modal in zip(arm.links, arm.modal_slices, strict=True):
         if link.modes:
             stiffness[modal, modal] = link.flexural_rigidity * link.mode_shapes().stiffness

@@ -140,7 +140,7 @@ class MotionProblem:
         check_inertia(mass)
         inertia = np.abs(mass[:, :n]) @ (4 * travel / duration**2)
         bend = np.zeros(0)
-        if arm.n_modes:
+        if arm.n_passive:
             coordinates = self.start[None, :arm.n_coordinates]
             stiffness = self.model.static_forces(coordinates, self.parameters.physical)[1][0, n:,
                                                                                            n:]

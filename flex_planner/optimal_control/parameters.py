@@ -13,7 +13,7 @@ from typing import Any, TYPE_CHECKING
 
 from flex_planner.arms.arm import Arm
 from flex_planner.base.validation import Array
-from flex_planner.dynamics.physical_parameters import PhysicalParameters
+from flex_planner.dynamics.physical_parameters import coulomb_frictions, PhysicalParameters
 from flex_planner.optimal_control.torque_limits import TorqueLimits
 import numpy as np
 
@@ -58,7 +58,7 @@ class Parameters(PhysicalParameters):
             return fallback if weights is None else weights
 
         return cls(payload_mass=payload_mass, payload_inertia=payload_inertia,
-                   rigidity=arm.flexural_rigidities(),
+                   rigidity=arm.flexural_rigidities(), **coulomb_frictions(arm),
                    stall_torque=limits.stall, torque_slope=limits.slope,
                    effort_weights=default(effort_weights, np.ones(arm.n_joints)),
                    position_weights=default(position_weights, np.zeros(arm.n_coordinates)),
@@ -121,7 +121,8 @@ class ParameterSymbols:
                  'position_weights': n_t, 'velocity_weights': n_t}
         own = {name: create(name, size) for name, size in sizes.items()}
         return cls({'payload_mass': chain.payload_mass, 'payload_inertia': chain.payload_inertia,
-                    'rigidity': chain.rigidity, **own})
+                    'rigidity': chain.rigidity, 'coulomb_friction': chain.coulomb_friction,
+                    'coulomb_speed': chain.coulomb_speed, **own})
 
     def __getitem__(self, name: str) -> Any:
         return self.values[name]

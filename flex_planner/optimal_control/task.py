@@ -212,7 +212,7 @@ class Task:
     def _set_bending(self) -> None:
         """Check the modal displacements at the start."""
         name = 'start_modal_displacements'
-        bending = vector(name, getattr(self, name), (0, self.arm.n_modes),
+        bending = vector(name, getattr(self, name), (0, self.arm.n_passive),
                          at_least=-MAX_DISPLACEMENT, at_most=MAX_DISPLACEMENT, unit='m')
         self._set(name, bending)
         if bending.size and self.start_point.size:

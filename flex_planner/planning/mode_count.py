@@ -73,7 +73,7 @@ def _kept(arm: Arm, richer: Arm) -> NDArray[np.intp]:
     """Return the places of an arm's coordinates among those of the one with more modes."""
     modal = [np.arange(part.start, part.start + link.modes)
              for link, part in zip(arm.links, richer.modal_slices, strict=True)]
-    return np.concatenate([np.arange(arm.n_joints), *modal])
+    return np.concatenate([np.arange(arm.n_coordinates - arm.n_modes), *modal])
 
 
 def _vibration_after(mass: Array, stiffness: Array, left: Array, forces: Array) -> Array:

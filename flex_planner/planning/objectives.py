@@ -165,7 +165,7 @@ def _peaks(objective: Objective, problem: MotionProblem,
     n, n_t = problem.model.arm.n_joints, problem.model.arm.n_coordinates
     z = solution.values_at(_POINTS).reshape(-1, problem.size)
     if objective is Objective.MODAL_RATES:
-        return _largest(z[:, n_t + n:2 * n_t])
+        return _largest(z[:, 2 * n_t - problem.model.arm.n_modes:2 * n_t])
     rates = z[:, n_t:n_t + n]
     if objective is Objective.JOINT_SPEEDS:
         return _largest(rates)
@@ -267,7 +267,8 @@ def minimum_vibration(task: Task, weight: float) -> Task:
     number('weight', weight, above=0, at_most=_MAX_WEIGHT)
     if not task.arm.n_modes:
         raise InvalidTaskError('the links of the arm are rigid: there is no vibration')
-    weights = np.concatenate([np.zeros(task.arm.n_joints), np.full(task.arm.n_modes, weight)])
+    weights = np.zeros(task.arm.n_coordinates)
+    weights[-task.arm.n_modes:] = weight
     return replace(minimum_effort(task), velocity_weights=weights)
 
 

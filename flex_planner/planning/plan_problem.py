@@ -208,7 +208,7 @@ def describe_choice(plan: Plan) -> str:
     if len(plan.kinds) < 2:
         return PlanStatus.SOLVED.value
     others = ', '.join(f'{kind.value:.4g}' for kind in plan.kinds[1:])
-    rigid = ', if the arm were rigid,' if plan.arm.n_modes else ''
+    rigid = ', if the arm were rigid,' if plan.arm.n_passive else ''
     return (f'{PlanStatus.SOLVED.value}; the cheapest of {len(plan.kinds)} kinds of motion found '
             f'from {plan.starts} starts (J = {plan.cost:.4g}; of the others{rigid} {others})')
 

@@ -9,7 +9,7 @@ and payloads lighter and heavier, by a tenth.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 from flex_planner.arms.arm import Arm, MAX_MODES
 from flex_planner.base.errors import NoEquilibriumError
@@ -73,20 +73,20 @@ def assess_robustness(plan: Plan, sampled: SampledPlan,
 
     nominal = sampled.execution.residual_vibration
     more, growth = nominal, sampled.execution.feedback_growth
-    if plan.arm.n_modes:
+    if plan.arm.n_passive:
         other = replace(execution, dynamics=ArmDynamics.of(with_more_modes(plan.arm)))
         more = _vibration(execution, other.dynamics, _physical(given), sampled, monitor)
         positions = plan.uniform_samples(_POSTURES).coordinates[:, :plan.arm.n_joints]
         growth = feedback_growth(other.arm, positions)
     return Robustness(
         nominal=nominal, more_modes=more, more_modes_growth=growth,
-        stiffness_differs=worst(*_scaled(given, rigidity=True)) if plan.arm.n_modes else nominal,
+        stiffness_differs=worst(*_scaled(given, rigidity=True)) if plan.arm.n_passive else nominal,
         payload_differs=worst(*_scaled(given, rigidity=False)) if payload else nominal)
 
 
 def prepare_robustness(arm: Arm) -> None:
     """Compile what `assess_robustness` takes for an arm, or load it."""
-    if arm.n_modes:
+    if arm.n_passive:
         ArmDynamics.of(with_more_modes(arm))
 
 
@@ -167,8 +167,8 @@ def _scaled(given: PhysicalParameters, *, rigidity: bool) -> list[PhysicalParame
 
 def _physical(given: PhysicalParameters) -> PhysicalParameters:
     """Return the part of a plan's parameters that is about the arm."""
-    return PhysicalParameters(payload_mass=given.payload_mass, rigidity=given.rigidity,
-                              payload_inertia=given.payload_inertia)
+    return PhysicalParameters(**{one.name: getattr(given, one.name)
+                                 for one in fields(PhysicalParameters)})
 
 
 def _vibration(nominal: Execution, dynamics: ArmDynamics, parameters: PhysicalParameters,
@@ -192,7 +192,8 @@ def _start(nominal: Execution, dynamics: ArmDynamics, parameters: PhysicalParame
     away = nominal.start - np.concatenate([rest, np.zeros_like(rest)])
     for half in (0, 1):
         own, theirs = half * planned.n_coordinates, half * arm.n_coordinates
-        start[theirs:theirs + arm.n_joints] += away[own:own + arm.n_joints]
+        first = arm.n_joints + len(arm.elastic_joints)
+        start[theirs:theirs + first] += away[own:own + first]
         for mine, its in zip(planned.modal_slices, arm.modal_slices, strict=True):
             count = mine.stop - mine.start
             start[theirs + its.start:theirs + its.start + count] += (

@@ -71,12 +71,12 @@ class StiffLinks:
         finest = _EXACT * problem.fewest_intervals(settings.stages)
         self._most = _UNRESOLVED if finest > settings.max_intervals else NEGLIGIBLE
         owners = np.repeat(np.arange(arm.n_joints), [link.modes for link in arm.links])
-        shares = np.bincount(owners, _bends(problem), arm.n_joints) / np.array(
+        shares = np.bincount(owners, _bends(problem)[-owners.size:], arm.n_joints) / np.array(
             [link.length for link in arm.links])
         stiff = [i for i, link in enumerate(arm.links)
                  if link.modes and _DOUBT * shares[i] < self._most]
-        self._kept: Mask = np.concatenate([np.ones(arm.n_joints, dtype=bool),
-                                           ~np.isin(owners, stiff)])
+        self._kept: Mask = np.concatenate([
+            np.ones(arm.n_coordinates - arm.n_modes, dtype=bool), ~np.isin(owners, stiff)])
         self.indices = tuple(stiff) if stiff and self._is_free() else ()
 
     def task(self) -> Task:
@@ -252,7 +252,7 @@ def _derivatives(theta: Array) -> Array:
 
 
 def _bends(problem: MotionProblem) -> Array:
-    """Return by how much each mode bends, roughly: under gravity and in motion, (n_f,) [m]."""
+    """Return how far each passive coordinate goes, roughly: at rest and in motion, (n_f,)."""
     n, n_t = problem.model.arm.n_joints, problem.model.arm.n_coordinates
     at_rest = np.abs([problem.start[n:n_t], problem.goal[n:n_t]]).max(axis=0)
     moving = 10 * problem.scale[n:n_t]

@@ -63,7 +63,7 @@ def _find_bent_link(problem: MotionProblem,
                     solution: CollocationSolution) -> tuple[PlanStatus, str] | None:
     """Refuse a motion whose links bend further than their model holds."""
     arm = problem.model.arm
-    if not arm.n_modes:
+    if not arm.n_passive:
         return None
     z = np.concatenate([solution.stage_values().reshape(-1, problem.size), solution.nodes])
     found = find_largest_bending(arm, z[:, :arm.n_coordinates])

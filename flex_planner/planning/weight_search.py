@@ -310,7 +310,7 @@ class _Search:
             elif objective is Objective.JOINT_SPEEDS:
                 velocity[:n] += added
             else:
-                velocity[n:] += added
+                velocity[-arm.n_modes:] += added
         heavier = replace(task, velocity_weights=velocity, effort_weights=effort)
         return MotionProblem(self._base.model, heavier, task_parameters(heavier))
 

@@ -120,7 +120,7 @@ class ArmSimulator(Node):  # type: ignore[misc]
         self._joints.publish(_state_message(
             stamp, self._settings.joint_names, sensor.positions, sensor.speeds,
             self._plant.torque))
-        if self._arm.n_modes:
+        if self._arm.n_passive:
             self._modes.publish(_state_message(
                 stamp, self._arm.passive_names, state[n:n_t], state[n_t + n:], np.zeros(0)))
         tip = PointStamped()
@@ -149,7 +149,7 @@ class ArmSimulator(Node):  # type: ignore[misc]
             self.get_logger().warning(
                 f'the simulation is {late:.2f} s late: this machine is too slow for '
                 f'control_rate = {self._settings.control_rate:g} Hz with '
-                f'{self._arm.n_modes} modes: lower one of them',
+                f'{self._arm.n_passive} modes: lower one of them',
                 throttle_duration_sec=_WARNING_PERIOD)
 
     def _now(self) -> float:

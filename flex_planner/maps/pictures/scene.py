@@ -66,7 +66,7 @@ class Scene:
 
     def joint_points(self, posture: Array) -> Array:
         """Return the ends of the unbent links in a posture, shape (n + 1, 2) [m]."""
-        bent = np.concatenate([posture, np.zeros(self.arm.n_modes)])
+        bent = np.concatenate([posture, np.zeros(self.arm.n_passive)])
         points = link_points(self.arm, bent)
         return np.concatenate([np.zeros((1, 2)), points[:, -1]])
 

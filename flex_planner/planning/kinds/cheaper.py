@@ -186,4 +186,4 @@ def _worth_solving(kinds: list[KindOfMotion], own: KindOfMotion,
 def _guess(problem: MotionProblem, rigid: CollocationSolution,
            solver: Solver) -> CollocationSolution:
     """Return a rigid arm's motion as a guess for the arm itself."""
-    return lift(problem, rigid, solver) if problem.model.arm.n_modes else rigid
+    return lift(problem, rigid, solver) if problem.model.arm.n_passive else rigid

@@ -81,7 +81,7 @@ class _Limits:
     def hopeless(self) -> bool:
         """Return whether both limits speak against the task."""
         task = self.bare.task
-        near = _NEAR_FLEXIBLE if self.bare.model.arm.n_modes else _NEAR
+        near = _NEAR_FLEXIBLE if self.bare.model.arm.n_passive else _NEAR
         late = bool(self.shortest) and near * self.shortest[0].value > task.duration
         if not self.heaviest:
             return late
@@ -98,7 +98,7 @@ class _Limits:
         if self.shortest:
             parts.append(f'the shortest duration found with {task.payload_mass:g} kg is '
                          f'{self.shortest[0].value:.4g} s')
-        rigid = ' (of the arm made rigid)' if self.bare.model.arm.n_modes else ''
+        rigid = ' (of the arm made rigid)' if self.bare.model.arm.n_passive else ''
         found = f'{", ".join(parts)}{rigid}' if parts else 'nor near it'
         return (f'no motion with {task.payload_mass:g} kg in {task.duration:g} s was found from '
                 f'{self.starts} starts; {found}. This does not show that there is none')

@@ -42,7 +42,7 @@ def solve_best_kind(parameter: FreeParameter, problem: MotionProblem,
         If its monitor interrupts it, the extremal says so.
 
     """
-    if not problem.model.arm.n_modes:
+    if not problem.model.arm.n_passive:
         solved = (_solve_rigid(parameter, problem, kind.motion, solver) for kind in kinds)
         return next((one for one in solved if one is not None), None)
     best: Extremal | None = None
@@ -115,7 +115,7 @@ def walk_back(parameter: FreeParameter, known: Extremal, least: float,
     """
     front: list[Extremal] = []
     here = known
-    while not known.problem.model.arm.n_modes and len(front) < _MOST_BACK:
+    while not known.problem.model.arm.n_passive and len(front) < _MOST_BACK:
         try:
             found = parameter.solve_at_price(here.problem, here.result.solution,
                                              here.price / _BACK, solver)

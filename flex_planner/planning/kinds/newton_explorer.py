@@ -104,7 +104,7 @@ def explore_other_ways(problem: MotionProblem, solver: Solver) -> list[OtherWay]
 
 def newton_budget(problem: MotionProblem, found: CollocationResult) -> int:
     """Return as many iterations for a rigid arm as take about as long as a plan's own did."""
-    if not problem.model.arm.n_modes:
+    if not problem.model.arm.n_passive:
         return _BUDGET
     points = found.solution.intervals * found.solution.rule.stages
     own = found.iterations * points / (_INTERVALS * _STAGES)

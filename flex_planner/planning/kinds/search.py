@@ -124,7 +124,7 @@ def rigid_twin(problem: MotionProblem) -> MotionProblem | None:
     """Return the problem of the arm made rigid; None where that is no motion to explore."""
     if np.isfinite(problem.goal_weights).any():
         return None
-    if not problem.model.arm.n_modes:
+    if not problem.model.arm.n_passive:
         return problem
     try:
         return rigid_problem(problem)

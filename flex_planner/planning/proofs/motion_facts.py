@@ -92,7 +92,7 @@ class MotionFacts:
         # K_1 |w| - drag w^2 is largest at half the speed where it vanishes
         self.power = float((self.stall**2 / (4 * self.drag)).sum()) if (
             self.limited and self.drag.all()) else np.inf
-        self.rigid, self.weightless = not self.arm.n_modes, not self.arm.gravity.any()
+        self.rigid, self.weightless = not self.arm.n_passive, not self.arm.gravity.any()
         hard = np.isinf(problem.goal_weights)
         self.hard_joints = hard[:self.arm.n_joints]
         self.reaches = bool(hard[:n_t].all())

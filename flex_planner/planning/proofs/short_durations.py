@@ -45,7 +45,7 @@ def check_duration(problem: MotionProblem) -> None:
 
 def find_doubt(problem: MotionProblem) -> str | None:
     """Return why a motion of an arm that bends is not worth looking for; None if it is."""
-    if not problem.model.arm.n_modes or problem.task.time_weight:
+    if not problem.model.arm.n_passive or problem.task.time_weight:
         return None
     asked, needed = problem.task.duration, rigid_bound(problem)
     if asked * _FASTER >= needed:
@@ -58,7 +58,7 @@ def find_doubt(problem: MotionProblem) -> str | None:
 def rigid_bound(problem: MotionProblem) -> float:
     """Return a duration [s] that the arm made rigid does not undercut; 0 if none is proved."""
     try:
-        rigid = problem if not problem.model.arm.n_modes else rigid_problem(problem)
+        rigid = problem if not problem.model.arm.n_passive else rigid_problem(problem)
     except InvalidTaskError:  # motors that hold the bent arm may be too weak for the straight one
         return 0.0
     facts = MotionFacts(rigid)

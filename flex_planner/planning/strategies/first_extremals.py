@@ -47,7 +47,7 @@ def approach_limit(parameter: FreeParameter, problem: MotionProblem, solver: Sol
     `transfer_extremal`, spares all that.
 
     """
-    if first is None and problem.model.arm.n_modes:
+    if first is None and problem.model.arm.n_passive:
         rigid = _rigid_extremals(parameter, problem, solver)
         first = lift_extremal(parameter, problem, rigid, solver)
         if first is None and rigid and parameter is PAYLOAD:

@@ -85,7 +85,7 @@ def lower_vibration_price(problem: MotionProblem, solver: Solver) -> Attempt | N
     without is alone.
 
     """
-    if not problem.model.arm.n_modes:
+    if not problem.model.arm.n_passive:
         return None
     return _follow_from_line(_calm(problem), solver, first_step=1 / _DECADES)
 
@@ -115,7 +115,7 @@ def lower_speed_price(problem: MotionProblem, solver: Solver) -> Attempt:
 
 def soften_links(problem: MotionProblem, solver: Solver) -> Attempt | None:
     """Start with stiffer links and a price on the bending rates; soften, then lower the price."""
-    if not problem.model.arm.n_modes:
+    if not problem.model.arm.n_passive:
         return None
     calmed = _calm(problem)(0.0)
 

@@ -64,7 +64,7 @@ def _solve_rigid(problem: MotionProblem, solver: Solver) -> CollocationResult | 
     rigid itself.
 
     """
-    if not problem.task.arm.n_modes:
+    if not problem.task.arm.n_passive:
         return None
     try:
         rigid = rigid_problem(problem)

@@ -66,7 +66,7 @@ def continue_in_price(parameter: FreeParameter, problem: MotionProblem,
     except NoEquilibriumError:  # the links buckle with hardly more payload
         return
     here = Extremal(value=parameter.value(problem), result=first, problem=problem, price=price)
-    factor = _FACTOR if problem.model.arm.n_modes else _LARGEST_FACTOR
+    factor = _FACTOR if problem.model.arm.n_passive else _LARGEST_FACTOR
     jumps = _MOST_JUMPS
     while factor > _SMALLEST_FACTOR:
         solver.monitor.payload = here.problem.task.payload_mass

@@ -286,7 +286,7 @@ def _flexible_point(n: int, samples: Samples, k: int, time: int) -> FlexiblePoin
 def reference_state(plan: Plan, samples: Samples, k: int, names: Sequence[str],
                     stamp_ns: int) -> JointState:
     """Return one sample as a JointState: joints and modal coordinates, with the torque."""
-    torque = np.concatenate([samples.torques[k], np.zeros(plan.arm.n_modes)])
+    torque = np.concatenate([samples.torques[k], np.zeros(plan.arm.n_passive)])
     message = JointState(name=list(names), position=samples.coordinates[k].tolist(),
                          velocity=samples.rates[k].tolist(), effort=torque.tolist())
     stamp = duration_message(stamp_ns)
