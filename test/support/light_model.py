@@ -14,6 +14,7 @@ import casadi as ca
 from flex_planner.arms.arm import Arm
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.build_chain import build_chain
+from flex_planner.dynamics.dynamics_functions import physical_symbols
 import numpy as np
 
 
@@ -23,7 +24,7 @@ class LightModel:
     def __init__(self, arm: Arm) -> None:
         self.arm, chain = arm, build_chain(arm)
         q, x = chain.coordinates, ca.vertcat(chain.coordinates, chain.rates)
-        p = ca.vertcat(chain.payload_mass, chain.payload_inertia, chain.rigidity)
+        p = physical_symbols(chain)
         M, V = chain.mass_matrix(), chain.potential
         self._dynamics = ca.Function('dynamics', [x, p], [M, chain.bias()])
         self._energy = ca.Function('energy', [x, p], [M, chain.kinetic, V])
@@ -31,7 +32,10 @@ class LightModel:
 
     def _each(self, function: object, points: Array, p: Array) -> list[Array]:
         """Evaluate points one by one; each output is stacked."""
-        rows = [function(x, p[:2 + self.arm.n_joints]) for x in points]  # type: ignore
+        count = 2 + 3 * self.arm.n_joints
+        if p.size < count:  # without friction
+            p = np.concatenate([p, np.zeros(self.arm.n_joints), np.ones(self.arm.n_joints)])
+        rows = [function(x, p[:count]) for x in points]  # type: ignore
         return [np.stack([np.array(value) for value in column])
                 for column in zip(*rows, strict=True)]
 
