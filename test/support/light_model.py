@@ -32,12 +32,15 @@ class LightModel:
 
     def _each(self, function: object, points: Array, p: Array) -> list[Array]:
         """Evaluate points one by one; each output is stacked."""
-        count = 2 + 3 * self.arm.n_joints
-        if p.size < count:  # without friction
-            p = np.concatenate([p, np.zeros(self.arm.n_joints), np.ones(self.arm.n_joints)])
-        rows = [function(x, p[:count]) for x in points]  # type: ignore
+        rows = [function(x, self._physical(p)) for x in points]  # type: ignore
         return [np.stack([np.array(value) for value in column])
                 for column in zip(*rows, strict=True)]
+
+    def _physical(self, p: Array) -> Array:
+        """Return the parameters of the dynamics; without those of friction there is none."""
+        n = self.arm.n_joints
+        count = 2 + 3 * n
+        return p[:count] if p.size >= count else np.concatenate([p, np.zeros(n), np.ones(n)])
 
     def mass_and_energy(self, x: Array, p: Array) -> tuple[Array, Array, Array]:
         mass, kinetic, potential = self._each(self._energy, x, p)
@@ -56,7 +59,7 @@ class LightModel:
         n, n_t = self.arm.n_joints, self.arm.n_coordinates
 
         def rate(x: Array, torque: Array) -> Array:
-            mass, bias = (np.array(value) for value in self._dynamics(x, p[:2 + n]))
+            mass, bias = (np.array(value) for value in self._dynamics(x, self._physical(p)))
             forces = np.concatenate([torque, np.zeros(n_t - n)]) - bias[:, 0]
             return np.concatenate([x[n_t:], np.linalg.solve(mass, forces)])
 
