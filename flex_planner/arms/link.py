@@ -153,6 +153,7 @@ class Link:
         if self.modes and all(math.isinf(one.rigidity) for one in self.sections):
             raise InvalidValueError('sections', 'rigid ones only',
                                     'at least one that bends in a link with modes')
+        self.mode_shapes()  # refuses sections with too little mass for so many modes
 
     def _check_body(self) -> None:
         """Refuse a centre of mass or an inertia of a link that bends."""
@@ -199,7 +200,8 @@ class Link:
         along, across = self.first_moment
         if self.inertia is not None:
             return self.inertia + (along**2 + across**2) / self.mass
-        about_joint = self.linear_density * self._integrate(3) * self.length**3
+        about_joint = (self.linear_density * self._integrate(3) * self.length**3 if self.sections
+                       else self.linear_density * self.length**3 / 3)
         if self.center_of_mass is None:
             return about_joint
         # the inertia of the sections about their own centre, moved to the one that is given
@@ -218,7 +220,8 @@ class Link:
         """Return the link's mode shapes and their integrals."""
         load = TipLoad(mass_ratio=self.shape_mass / self.mass,
                        inertia_ratio=self.shape_inertia / (self.mass * self.length**2))
-        return mode_shapes(self.mode_family, self.length, self.modes, load)
+        pieces = tuple((one.share, one.density, one.rigidity) for one in self.sections)
+        return mode_shapes(self.mode_family, self.length, self.modes, load, pieces)
 
     def rigid(self) -> Link:
         """Return the same link without modes."""

@@ -191,20 +191,21 @@ def _node(node: Node) -> RigidBody:
 
 def planar_beam(link: Link) -> FlexibleBody:
     """
-    Return a uniform link along x that bends across, along y.
+    Return a link along x that bends across, along y.
 
     Eqs. (19), (21) and (23) of Korayem et al. 2009; the integrals are those of its mode shapes.
 
     """
     rho, L, modes = link.linear_density, link.length, link.mode_shapes()
+    inertia = link.rotary_inertia
     m = modes.count
     slope, bend = np.zeros((m, 3, 3)), np.zeros((m, m, 3, 3))
     slope[:, Y, X] = -rho * modes.moment
     # a displacement across moves mass away from the axes x and z
     bend[:, :, X, X] = bend[:, :, Z, Z] = rho * modes.gram
     return FlexibleBody(
-        mass=rho * L, first_moment=np.array([rho * L**2 / 2, 0.0, 0.0]),
-        inertia=np.diag([0.0, rho * L**3 / 3, rho * L**3 / 3]),
+        mass=rho * L, first_moment=np.array([*link.first_moment, 0.0]),
+        inertia=np.diag([0.0, inertia, inertia]),
         displacement=_row(Y, rho * modes.area), inertia_slope=slope, inertia_bend=bend,
         moment=_row(Z, rho * modes.moment), cross_moment=np.zeros((m, m, 3)),
         gram=rho * modes.gram, stiffness=modes.stiffness,

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from functools import cache
 
 from flex_planner.arms.beam_eigenmodes import ClampedMode, TipLoad
+from flex_planner.arms.stepped_beam import Pieces, stepped_modes
+from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.validation import Array
 import numpy as np
 
@@ -24,6 +26,9 @@ _ROUNDING = 1e-13
 class LinkModes:
     """
     Mode shapes phi_j of a link of length L, with their integrals over ``[0, L]``.
+
+    Of a link in sections, `area`, `moment` and `gram` are weighted with the density over the mean
+    one, and `stiffness` with the rigidity over that of the link.
 
     Attributes
     ----------
@@ -176,7 +181,46 @@ FAMILIES: dict[str, Family] = {
 }
 
 
+# share, density and rigidity of each piece, relative to the link
+Sections = tuple[tuple[float, float, float], ...]
+
+
 @cache
-def mode_shapes(family: str, length: float, count: int, load: TipLoad) -> LinkModes:
-    """Return the modes of a family; they are computed once."""
+def mode_shapes(family: str, length: float, count: int, load: TipLoad,
+                sections: Sections = ()) -> LinkModes:
+    """
+    Return the modes of a family; they are computed once.
+
+    Raises
+    ------
+    InvalidValueError
+        If the sections have so little mass where they bend that there are fewer modes.
+
+    """
+    if sections and count:
+        return _stepped(family, length, count, load, sections)
     return FAMILIES[family](length, count, load)
+
+
+def _stepped(family: str, length: float, count: int, load: TipLoad,
+             sections: Sections) -> LinkModes:
+    """Return the modes of a link in sections, scaled as those of a uniform one."""
+    pinned = family == 'pinned_pinned'
+    carried = load if family == 'clamped_mass' else TipLoad()
+    found = stepped_modes(Pieces(*np.array(sections, dtype=float).T), count, carried,
+                          pinned=pinned)
+    if found is None:
+        raise InvalidValueError('modes', count, 'fewer: what bends of the link has too little '
+                                'mass for so many')
+    factors = 1 / np.sqrt(found.square * (2 if pinned else 1))
+    modes, pairs = found.modes.scale(factors), np.outer(factors, factors)
+    # without a load the shapes are orthogonal: what is beside the diagonal is rounding
+    gram = found.gram if carried != TipLoad() else np.diag(np.diag(found.gram))
+    tip = np.zeros(count) if pinned else modes(np.ones(1))[0]
+    slope = np.zeros(count) if pinned else modes(np.ones(1), 1)[0] / length
+    return LinkModes(
+        shape=lambda x: modes(np.asarray(x) / length),
+        curvature=lambda x: modes(np.asarray(x) / length, 2) / length**2,
+        area=length * found.area * factors, moment=length**2 * found.moment * factors,
+        gram=length * _clean(gram * pairs), stiffness=np.diag(factors**2) / length**3,
+        tip_deflection=tip, tip_slope=slope)
