@@ -87,6 +87,7 @@ class MotionFacts:
         self.problem, self.arm = problem, problem.model.arm
         given, n_t = problem.parameters, self.arm.n_coordinates
         friction = np.array([joint.viscous_friction for joint in self.arm.joints])
+        # of the line, which a cap only makes narrower
         self.stall, self.drag = given.stall_torque, given.torque_slope + friction
         self.limited = bool(np.isfinite(self.stall).all())
         # K_1 |w| - drag w^2 is largest at half the speed where it vanishes
