@@ -25,7 +25,7 @@ from flex_planner.base.validation import Array
 import numpy as np
 
 _HEADER = 'values.json'
-_FORMAT = 1
+_FORMAT = 2
 
 
 def save_value(path: str | os.PathLike[str], value: object) -> None:

@@ -128,8 +128,8 @@ def add_task(parser: argparse.ArgumentParser, payload: str) -> None:
         help='duration of the motion')
     add('--payload', dest='payload_mass', type=number_argument, default=0.0, metavar='KG',
         help=payload)
-    add('--payload-inertia', type=number_argument, default=0.0, metavar='KG_M2',
-        help='rotary inertia of the payload about the tip (default: 0)')
+    add('--payload-inertia', type=number_argument, default=None, metavar='KG_M2',
+        help='rotary inertia of the payload (default: as the arm file says, or 0)')
     for name, what in (('effort', 'R: torques (default: ones)'),
                        ('velocity', 'W_2: velocities (default: zeros)'),
                        ('position', 'W_1: positions (default: zeros)')):

@@ -46,7 +46,9 @@ class Task:
     payload_mass : float
         m_p, >= 0 and at most 1e6 [kg].
     payload_inertia : float
-        Rotary inertia of the payload about the tip, >= 0 and at most 1e6 [kg m^2].
+        Rotary inertia of the payload about its centre of mass, which is at the tip unless
+        `Arm.payload_com` says otherwise, >= 0 and at most 1e6 [kg m^2]; by default
+        `Arm.payload_inertia`.
     effort_weights : array_like, shape (n,)
         Diagonal of R, 1e-18 to 1e18; empty for ones.
     position_weights, velocity_weights : array_like, shape (n,) or (n_t,)
@@ -81,7 +83,7 @@ class Task:
     goal_positions: Array
     duration: float
     payload_mass: float = 0.0
-    payload_inertia: float = 0.0
+    payload_inertia: float = None  # type: ignore[assignment]  # set to that of the arm
     effort_weights: Array = field(default_factory=lambda: np.zeros(0))
     position_weights: Array = field(default_factory=lambda: np.zeros(0))
     velocity_weights: Array = field(default_factory=lambda: np.zeros(0))
@@ -100,7 +102,7 @@ class Task:
         # arrays are made of anything like one; type checkers would insist on arrays
         def __init__(
                 self, *, arm: Arm, start_positions: ArrayLike, goal_positions: ArrayLike,
-                duration: float, payload_mass: float = ..., payload_inertia: float = ...,
+                duration: float, payload_mass: float = ..., payload_inertia: float | None = ...,
                 effort_weights: ArrayLike = ..., position_weights: ArrayLike = ...,
                 velocity_weights: ArrayLike = ..., start_velocities: ArrayLike = ...,
                 goal_velocities: ArrayLike = ..., start_modal_displacements: ArrayLike = ...,
@@ -174,6 +176,9 @@ class Task:
         number('duration', self.duration, above=0, at_most=MAX_DURATION, unit='s')
         number('duration', self.duration, at_least=MIN_DURATION, unit='s')
         number('payload_mass', self.payload_mass, at_least=0, at_most=MAX_PAYLOAD, unit='kg')
+        given: float | None = self.payload_inertia
+        object.__setattr__(self, 'payload_inertia',
+                           self.arm.payload_inertia if given is None else given)
         number('payload_inertia', self.payload_inertia, at_least=0, at_most=MAX_PAYLOAD,
                unit='kg m^2')
         number('tolerance', self.tolerance, above=0, at_most=1)

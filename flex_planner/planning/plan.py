@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 import os
 
-from flex_planner.arms.arm import Arm, Joint, Link, Motor, Node
+from flex_planner.arms.arm import Arm, BeamSection, Elasticity, Joint, Link, Motor, Node
 from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.errors import InvalidValueError, ValueFileError
 from flex_planner.base.validation import Array
@@ -264,9 +264,9 @@ class Plan:
 
 
 # what a file of a plan may hold
-_SAVED = (Plan, PlanStatus, Certificate, Task, Arm, Link, Joint, Motor, Node, ArmModel,
-          MotionProblem, BoundaryConditions, Parameters, CollocationSolution, GaussRule,
-          ObjectiveSearch, Objectives, Objective, WeightTrial, Margin, KindOfMotion,
+_SAVED = (Plan, PlanStatus, Certificate, Task, Arm, Link, BeamSection, Joint, Elasticity, Motor,
+          Node, ArmModel, MotionProblem, BoundaryConditions, Parameters, CollocationSolution,
+          GaussRule, ObjectiveSearch, Objectives, Objective, WeightTrial, Margin, KindOfMotion,
           ExploredMotion, PlanWarning, WarningKind)
 
 

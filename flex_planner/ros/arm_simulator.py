@@ -83,7 +83,7 @@ class ArmSimulator(Node):  # type: ignore[misc]
         settings = self._settings
         return Plant(ArmDynamics(self._arm), settings.control,
                      payload_mass=settings.payload_mass,
-                     payload_inertia=settings.payload_inertia,
+                     payload_inertia=settings.payload_inertia or self._arm.payload_inertia,
                      positions=np.asarray(settings.initial_positions))
 
     def _on_trajectory(self, trajectory: JointTrajectory) -> None:

@@ -6,10 +6,12 @@ from dataclasses import replace
 from typing import Any
 
 import casadi as ca
+from data_sheet_arms import data_sheet_arm
 from flex_planner.arms.arm_files import load_arm, preset_files
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.build_chain import build_chain, chain_of
 from flex_planner.dynamics.chain import Chain
+from flex_planner.dynamics.dynamics_functions import physical_symbols
 import numpy as np
 from planar_energies import build_energy_chain
 from point_mechanisms import point_energies, point_mechanism, PointLink
@@ -26,12 +28,13 @@ def links_of(seed: int) -> tuple[list[PointLink], np.random.Generator]:
     return [PointLink.draw(rng, modes) for modes in [(2, 1), (0, 3), (2, 0, 2)][seed % 3]], rng
 
 
-def evaluate(chain: Chain, x: Array, rigidity: Array, *expressions: Any) -> list[Array]:
+def evaluate(chain: Chain, x: Array, rigidity: Array, *expressions: Any,
+             inertia: float = 0.0) -> list[Array]:
     """Return expressions of a chain at a state."""
     state = ca.vertcat(chain.coordinates, chain.rates)
-    p = ca.vertcat(chain.payload_mass, chain.payload_inertia, chain.rigidity)
-    function = ca.Function('f', [state, p], list(expressions))
-    values = function.call([x, np.concatenate([[PAYLOAD, 0.0], rigidity])])
+    friction = np.linspace(0.1, 0.3, rigidity.size)  # of joints that have any
+    function = ca.Function('f', [state, physical_symbols(chain)], list(expressions))
+    values = function.call([x, np.concatenate([[PAYLOAD, inertia], rigidity, friction, friction])])
     return [np.array(value) for value in values]
 
 
@@ -83,17 +86,17 @@ def test_power_does_not_depend_on_the_axes_of_the_base(seed: int) -> None:
     np.testing.assert_allclose(same_bias, bias, rtol=0, atol=1e-12 * np.abs(bias).max())
 
 
-@pytest.mark.parametrize('name', sorted(preset_files()))
-def test_presets_have_the_dynamics_of_their_energies(name: str) -> None:
-    arm = load_arm(name)
+@pytest.mark.parametrize('name', [*sorted(preset_files()), *range(4)])
+def test_arms_have_the_dynamics_of_their_energies(name: str | int) -> None:
+    arm = load_arm(name) if isinstance(name, str) else data_sheet_arm(name)
     chain, energies = build_chain(arm), build_energy_chain(arm)
     rng = np.random.default_rng(0)
     for _ in range(5):
         x = np.concatenate([rng.uniform(-np.pi, np.pi, arm.n_joints),
-                            rng.uniform(-0.05, 0.05, arm.n_modes),
+                            rng.uniform(-0.05, 0.05, arm.n_passive),
                             rng.normal(size=arm.n_coordinates)])
         found, wanted = (evaluate(each, x, arm.flexural_rigidities(), each.mass_matrix(),
-                                  each.bias(), each.kinetic, each.potential)
+                                  each.bias(), each.kinetic, each.potential, inertia=0.02)
                          for each in (chain, energies))
         for value, other in zip(found, wanted, strict=True):
             np.testing.assert_allclose(value, other, rtol=0, atol=1e-12 * np.abs(other).max())

@@ -22,7 +22,11 @@ import pytest
 def parameters(workshop_arm: Arm) -> Parameters:
     """Return parameters in which no two numbers are alike."""
     n_t = workshop_arm.n_coordinates
-    return Parameters.of(workshop_arm, payload_mass=1.3, payload_inertia=0.07,
+    joints = tuple(replace(joint, coulomb_friction=0.31 + 0.01 * i,
+                           coulomb_speed=0.41 + 0.01 * i)
+                   for i, joint in enumerate(workshop_arm.joints))
+    return Parameters.of(replace(workshop_arm, joints=joints),
+                         payload_mass=1.3, payload_inertia=0.07,
                          effort_weights=np.array([0.25, 0.125]),
                          position_weights=0.2 + 0.1 * np.arange(n_t),
                          velocity_weights=10.7 + 0.2 * np.arange(n_t))
@@ -31,7 +35,7 @@ def parameters(workshop_arm: Arm) -> Parameters:
 def test_no_two_numbers_are_alike(parameters: Parameters) -> None:
     # or the tests below would not see that two are exchanged
     stack = parameters.stack()
-    assert np.unique(stack).size == stack.size == 20
+    assert np.unique(stack).size == stack.size == 24
 
 
 @pytest.mark.parametrize('name', NAMES)
@@ -73,7 +77,7 @@ def test_compiled_conditions_read_the_payload_at_its_index(workshop_model: ArmMo
 def test_dynamics_take_the_first_of_them_in_the_same_order(parameters: Parameters) -> None:
     physical = parameters.physical
     assert physical.tolist() == parameters.stack()[:physical.size].tolist()
-    assert physical.tolist() == [1.3, 0.07, 30.0, 12.0]
+    assert physical.tolist() == [1.3, 0.07, 30.0, 12.0, 0.31, 0.32, 0.41, 0.42]
 
 
 def test_parameters_default_to_the_arm_and_effort_alone(workshop_arm: Arm) -> None:

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import casadi as ca
+from data_sheet_arms import data_sheet_arm
 from flex_planner.arms.arm_files import load_arm, preset_files
 from flex_planner.dynamics.build_chain import build_chain
+from flex_planner.dynamics.physical_parameters import coulomb_frictions
 from flex_planner.optimal_control.parameters import Parameters, ParameterSymbols
 from flex_planner.optimal_control.pontryagin import derive_conditions
 import numpy as np
 import pytest
 
 
-@pytest.mark.parametrize('name', sorted(preset_files()))
-def test_structured_jacobian_is_the_derivative_of_the_conditions(name: str) -> None:
-    arm = load_arm(name)
+@pytest.mark.parametrize('name', [*sorted(preset_files()), 0, 1])
+def test_structured_jacobian_is_the_derivative_of_the_conditions(name: str | int) -> None:
+    arm = load_arm(name) if isinstance(name, str) else data_sheet_arm(name)
     chain = build_chain(arm)
     symbols = ParameterSymbols.of(chain)
     found = derive_conditions(chain, symbols)
@@ -26,6 +28,7 @@ def test_structured_jacobian_is_the_derivative_of_the_conditions(name: str) -> N
         z = np.concatenate([rng.uniform(-np.pi, np.pi, n), rng.uniform(-0.05, 0.05, n_t - n),
                             rng.normal(size=3 * n_t)])
         p = Parameters(
+            **coulomb_frictions(arm),
             payload_mass=1.3, payload_inertia=0.07, rigidity=arm.flexural_rigidities(),
             stall_torque=rng.uniform(0.05, 3.0, n), torque_slope=rng.uniform(0.1, 0.5, n),
             effort_weights=rng.uniform(0.5, 2.0, n), position_weights=rng.uniform(0, 1, n_t),

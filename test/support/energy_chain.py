@@ -21,10 +21,12 @@ class EnergyChain:
         m_p at the tip [kg], and its rotary inertia [kg m^2].
     rigidity : casadi.SX, shape (n, 1)
         E I of each link [N m^2].
+    coulomb_friction, coulomb_speed : casadi.SX, shape (n, 1)
+        Of each joint [N m], and the speed below which it fades [rad/s].
     kinetic, potential : casadi.SX
         Energies [J]; potential includes bending.
     friction : casadi.SX, shape (n_t, 1)
-        Generalized forces of viscous joint friction [N m] and modal damping [N].
+        Generalized forces of joint friction [N m] and damping [N].
 
     """
 
@@ -33,6 +35,8 @@ class EnergyChain:
     payload_mass: Any
     payload_inertia: Any
     rigidity: Any
+    coulomb_friction: Any
+    coulomb_speed: Any
     kinetic: Any
     potential: Any
     friction: Any

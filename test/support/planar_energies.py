@@ -14,7 +14,7 @@ from typing import Any
 
 import casadi as ca
 from energy_chain import EnergyChain
-from flex_planner.arms.arm import Arm, Link
+from flex_planner.arms.arm import Arm, Link, Node
 
 
 @dataclass(slots=True)
@@ -53,38 +53,64 @@ def build_energy_chain(arm: Arm) -> EnergyChain:
     """
     q, rates = ca.SX.sym('q', arm.n_coordinates), ca.SX.sym('dq', arm.n_coordinates)
     payload, inertia = ca.SX.sym('m_p'), ca.SX.sym('J_p')
-    rigidity = ca.SX.sym('EI', arm.n_joints)
+    rigidity, coulomb, fading = (ca.SX.sym(name, arm.n_joints)
+                                 for name in ('EI', 'tau_c', 'v_s'))
     zero = ca.SX(2, 1)
     frame = _Frame(zero, zero, ca.SX(ca.sparsify(ca.DM(arm.gravity))), ca.SX(1, 1))
     kinetic, potential, slope, slope_rate = ca.SX(0), ca.SX(0), ca.SX(0), ca.SX(0)
     for i, (link, modal) in enumerate(zip(arm.links, arm.modal_slices, strict=True)):
-        frame = frame.turn(q[i] + slope, rates[i] + slope_rate)
+        turn, turn_rate = _link_turn(arm, i, q), _link_turn(arm, i, rates)
+        frame = frame.turn(turn + slope, turn_rate + slope_rate)
         bend, bend_rate = q[modal], rates[modal]
         T, V = _link_energies(link, frame, bend, bend_rate, rigidity[i])
         shapes = link.mode_shapes()
         slope, slope_rate = _dot(shapes.tip_slope, bend), _dot(shapes.tip_slope, bend_rate)
         kinetic += T + arm.nodes[i].inertia * frame.rate**2 / 2
+        kinetic += arm.joints[i].motor.reflected_inertia * rates[i]**2 / 2
         frame = frame.move(link.length, _dot(shapes.tip_deflection, bend),
                            _dot(shapes.tip_deflection, bend_rate))
-        mass = arm.nodes[i + 1].mass + (payload if i == arm.n_joints - 1 else 0)
+        housing = arm.joints[i + 1].housing if i + 1 < arm.n_joints else Node()
+        kinetic += housing.inertia * (frame.rate + slope_rate)**2 / 2
+        mass = arm.nodes[i + 1].mass + housing.mass
         kinetic += mass * ca.sumsqr(frame.velocity) / 2
         potential += V - mass * ca.dot(frame.gravity, frame.position)
     kinetic += (arm.nodes[-1].inertia + inertia) * (frame.rate + slope_rate)**2 / 2
+    carried = frame.turn(slope, slope_rate).move(*map(float, arm.payload_com), ca.SX(0))
+    kinetic += payload * ca.sumsqr(carried.velocity) / 2
+    potential += _spring_energy(arm, q) - payload * ca.dot(carried.gravity, carried.position)
     return EnergyChain(
         coordinates=q, rates=rates, payload_mass=payload, payload_inertia=inertia,
         rigidity=rigidity, kinetic=kinetic, potential=potential,
-        friction=_damping(arm, rigidity) * rates)
+        coulomb_friction=coulomb, coulomb_speed=fading,
+        friction=_damping(arm, rigidity) * rates + ca.vertcat(
+            *(coulomb[i] * ca.tanh(rates[i] / fading[i]) if joint.coulomb_friction else ca.SX(1, 1)
+              for i, joint in enumerate(arm.joints)), ca.SX(arm.n_passive, 1)))
+
+
+def _link_turn(arm: Arm, index: int, coordinates: Any) -> Any:
+    """Return the angle by which a joint turns its link: that of an elastic one twists."""
+    if index not in arm.elastic_joints:
+        return coordinates[index]
+    return coordinates[index] + coordinates[arm.n_joints + arm.elastic_joints.index(index)]
+
+
+def _spring_energy(arm: Arm, q: Any) -> Any:
+    """Return the energy of the springs in the joints."""
+    springs = [joint.elasticity.stiffness for joint in arm.joints if joint.elasticity]
+    return sum((stiffness * q[arm.n_joints + k]**2 / 2 for k, stiffness in enumerate(springs)),
+               ca.SX(0))
 
 
 def _damping(arm: Arm, rigidity: Any) -> Any:
     """Return the damping coefficient of each coordinate: joints, then modes."""
     coefficients = [ca.SX(ca.sparsify(ca.DM(joint.viscous_friction))) for joint in arm.joints]
+    coefficients += [ca.SX(joint.elasticity.damping) for joint in arm.joints if joint.elasticity]
     for i, link in enumerate(arm.links):
-        modes, ratio = link.mode_shapes(), link.damping_ratio
-        for j in range(link.modes if ratio else 0):
+        modes, ratios = link.mode_shapes(), link.damping_ratios
+        for j, ratio in enumerate(ratios.tolist()):
             mass = link.linear_density * modes.gram[j, j]
-            coefficients.append(2 * ratio * ca.sqrt(rigidity[i] * modes.stiffness[j, j] * mass))
-        coefficients += [ca.SX(1, 1)] * (0 if ratio else link.modes)
+            coefficients.append(2 * ratio * ca.sqrt(rigidity[i] * modes.stiffness[j, j] * mass)
+                                if ratio else ca.SX(1, 1))
     return ca.vertcat(*coefficients)
 
 

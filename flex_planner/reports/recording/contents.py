@@ -239,7 +239,8 @@ class RecordedRequest:
             return np.append(given, np.zeros(count - given.size)) if given.size else None
 
         return Parameters.of(
-            self.arm, payload_mass=payload, payload_inertia=self.task.payload_inertia,
+            self.arm, payload_mass=payload,
+            payload_inertia=self.task.payload_inertia or self.arm.payload_inertia,
             effort_weights=weights(self.report.effort_weights, n),
             position_weights=weights(self.task.position_weights, n_t),
             velocity_weights=weights(self.report.velocity_weights, n_t))

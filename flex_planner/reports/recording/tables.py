@@ -95,7 +95,8 @@ def _task(request: RecordedRequest) -> ReportTable:
     ends = [_say_end(task, 'start', task.space == task.CARTESIAN),
             _say_end(task, 'goal', task.space != task.JOINT)]
     rows = [('start', ends[0]), ('goal', ends[1]), ('duration', f'{task.duration:g} s'),
-            ('payload', f'{task.payload_mass:g} kg, {task.payload_inertia:g} kg m²'),
+            ('payload', f'{task.payload_mass:g} kg, '
+             f'{task.payload_inertia or request.arm.payload_inertia:g} kg m²'),
             ('weights R', numbers(task.effort_weights)),
             ('weights W1', numbers(task.position_weights)),
             ('weights W2', numbers(task.velocity_weights)),

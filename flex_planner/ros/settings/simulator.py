@@ -40,8 +40,8 @@ class SimulatorSettings:
         1.0, 'Mass at the tip of the simulated arm, whatever was planned for [kg].', lowest=0.0,
         highest=_FAR, read_only=True)
     payload_inertia: float = parameter_field(
-        0.0, 'Rotary inertia of that mass about the tip [kg m^2].', lowest=0.0, highest=_FAR,
-        read_only=True)
+        0.0, 'Rotary inertia of that mass [kg m^2]; 0: as in the arm file.', lowest=0.0,
+        highest=_FAR, read_only=True)
     modes: int = parameter_field(
         AS_GIVEN, 'Modes of every flexible link; -1: as in the arm file.', lowest=-1, highest=8,
         read_only=True)
