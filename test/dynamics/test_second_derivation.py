@@ -15,6 +15,7 @@ from collections.abc import Callable
 import autograd
 from autograd.differential_operators import make_jvp
 import autograd.numpy as anp
+from data_sheet_arms import stepped_arm
 from flex_planner.arms.arm import Arm, BeamSection, Joint, Link, Node
 from flex_planner.base.validation import Array
 from flex_planner.optimal_control.parameters import Parameters
@@ -136,25 +137,6 @@ def pinned_in_the_middle() -> Arm:
                gravity=[0.0, -9.81])
 
 
-def stepped() -> Arm:
-    """Return links in sections, bent and rigid, and a rigid body with its centre off its axis."""
-    hub = (BeamSection(share=0.1, density=0.0, rigidity=np.inf),
-           BeamSection(share=0.4, density=1.5, rigidity=6.0),
-           BeamSection(share=0.3, density=0.5), BeamSection(share=0.2, density=1.25,
-                                                            rigidity=np.inf))
-    tapered = BeamSection(share=0.5, density=1.2, rigidity=3.0), BeamSection(share=0.5, density=0.8)
-    links = (Link(length=0.6, linear_density=4.0, flexural_rigidity=60.0, modes=2, sections=hub,
-                  mode_family='clamped_mass', shape_mass=4.0, damping_ratio=(0.07, 0.03)),
-             Link(length=0.5, linear_density=2.0, center_of_mass=(0.3, -0.08), inertia=0.05),
-             Link(length=0.3, linear_density=3.0, sections=tapered),
-             Link(length=0.4, linear_density=2.0, flexural_rigidity=6.0, modes=2,
-                  sections=tapered),
-             Link(length=0.4, linear_density=1.0, flexural_rigidity=6.0, modes=3, sections=hub,
-                  mode_family='clamped_free'))
-    return Arm(name='stepped', links=links, joints=(Joint(),) * 5, gravity=[1.3, -9.81],
-               nodes=tuple(Node(mass=0.3 * i, inertia=0.02) for i in range(6)))
-
-
 def states(arm: Arm, count: int, seed: int) -> tuple[Array, Array, Array]:
     """Return coordinates, rates and accelerations."""
     n, f = arm.n_joints, arm.n_modes
@@ -166,7 +148,7 @@ def states(arm: Arm, count: int, seed: int) -> tuple[Array, Array, Array]:
 
 @pytest.fixture(scope='module', params=['workshop', 'crane', 'three', 'mixed', 'stepped'])
 def arm(request: pytest.FixtureRequest) -> Arm:
-    made = {'three': three_links, 'mixed': pinned_in_the_middle, 'stepped': stepped}
+    made = {'three': three_links, 'mixed': pinned_in_the_middle, 'stepped': stepped_arm}
     found: Arm = (made[request.param]() if request.param in made
                   else request.getfixturevalue(f'{request.param}_arm'))
     return found
