@@ -75,6 +75,34 @@ def tip_position(arm: Arm, coordinates: Array) -> Array:
     return position
 
 
+def payload_position(arm: Arm, coordinates: Array) -> Array:
+    """Return the position of the payload's centre of mass, shape (..., 2) [m]."""
+    tip = tip_position(arm, coordinates)
+    if not arm.payload_com.any():
+        return tip
+    c, s, _ = _tip_frame(arm, coordinates)
+    x, y = arm.payload_com
+    position: Array = tip + np.stack([c * x - s * y, s * x + c * y], -1)
+    return position
+
+
+def payload_velocity(arm: Arm, coordinates: Array, rates: Array) -> Array:
+    """Return the velocity of the payload's centre of mass, shape (..., 2) [m/s]."""
+    velocity = tip_velocity(arm, coordinates, rates)
+    if not arm.payload_com.any():
+        return velocity
+    c, s, _ = _tip_frame(arm, coordinates)
+    turning, (x, y) = _tip_frame(arm, rates)[2], arm.payload_com
+    return velocity + turning[..., None] * np.stack([-s * x - c * y, c * x - s * y], -1)
+
+
+def _tip_frame(arm: Arm, coordinates: Array) -> tuple[Array, Array, Array]:
+    """Return cosine, sine and angle of the frame that the bent tip carries."""
+    slope = coordinates[..., arm.modal_slices[-1]] @ arm.links[-1].mode_shapes().tip_slope
+    angle: Array = frame_angles(arm, coordinates)[..., -1] + slope
+    return np.cos(angle), np.sin(angle), angle
+
+
 def jacobian(arm: Arm, positions: Array) -> Array:
     """
     Return the Jacobian of the tip of the unbent arm, shape (2, n) [m/rad].

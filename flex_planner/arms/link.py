@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 
 from flex_planner.arms.beam_eigenmodes import MAX_LOAD_RATIO, TipLoad
@@ -222,6 +222,32 @@ class Link:
                        inertia_ratio=self.shape_inertia / (self.mass * self.length**2))
         pieces = tuple((one.share, one.density, one.rigidity) for one in self.sections)
         return mode_shapes(self.mode_family, self.length, self.modes, load, pieces)
+
+    def with_modes(self, count: int) -> Link:
+        """
+        Return the same link with another number of modes.
+
+        Further modes are damped as the last one that has a ratio.
+
+        Raises
+        ------
+        InvalidValueError
+            If there are not so many.
+
+        """
+        given = self.damping_ratio
+        if isinstance(given, tuple):
+            given = (given + given[-1:] * count)[:count] or 0.0
+        return replace(self, modes=count, damping_ratio=given)
+
+    def with_more_modes(self, more: int) -> Link:
+        """Return the same link with so many modes more, or as many as there can be."""
+        for count in range(min(self.modes + more, MAX_MODES), self.modes, -1):
+            try:
+                return self.with_modes(count)
+            except InvalidValueError:  # too little of its mass bends
+                pass
+        return self
 
     def rigid(self) -> Link:
         """Return the same link without modes."""

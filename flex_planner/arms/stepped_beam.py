@@ -73,11 +73,11 @@ class SteppedModes:
 
     def __call__(self, x: Array, derivative: int = 0) -> Array:
         """Return a derivative, 0 to 2, at stations x (...) from 0 to 1, shape (..., m)."""
-        x = np.asarray(x, dtype=float)
+        x = np.asarray(x)
         starts, shares = self.pieces.starts, self.pieces.shares
-        piece = np.clip(np.searchsorted(starts, x, side='right') - 1, 0, starts.size - 1)
+        piece = np.clip(np.searchsorted(starts, x.real, side='right') - 1, 0, starts.size - 1)
         series = self.curvatures if derivative == 2 else self.deflections
-        values = np.zeros((*x.shape, series.shape[-1]))
+        values: Array = np.zeros((*x.shape, series.shape[-1]), dtype=np.result_type(x, float))
         for k in range(starts.size):
             here = piece == k
             local = 2 * (x[here] - starts[k]) / shares[k] - 1

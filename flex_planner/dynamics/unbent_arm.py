@@ -46,8 +46,11 @@ def mass_matrix(arm: Arm, positions: Array, payload_mass: float,
         if i in arm.elastic_joints:
             turning[arm.n_joints + arm.elastic_joints.index(i)] += 1
         angle = positions[:i + 1].sum()
-        across = np.array([-np.sin(angle), np.cos(angle)])
+        along, across = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
         mass += _link_mass(link, modal, base, across @ base, turning)
+        # of a rigid link whose centre of mass is beside its axis
+        aside = link.first_moment[1] * np.outer(along @ base, turning)
+        mass -= aside + aside.T
         mass += arm.nodes[i].inertia * np.outer(turning, turning)
         shapes = link.mode_shapes()
         deflection, slope = np.zeros(n_t), np.zeros(n_t)
@@ -85,13 +88,14 @@ def _link_mass(link: Link, modal: slice, base: Array, lift: Array, turning: Arra
     plane and across the link, `turning` is the rate of its frame.
 
     """
-    L, shapes = link.length, link.mode_shapes()
+    rho, shapes = link.linear_density, link.mode_shapes()
     area, moment = np.zeros_like(turning), np.zeros_like(turning)
-    area[modal], moment[modal] = shapes.area, shapes.moment
-    mixed = np.outer(lift, L**2 / 2 * turning + area) + np.outer(turning, moment)
-    part: Array = L * base.T @ base + mixed + mixed.T + L**3 / 3 * np.outer(turning, turning)
-    part[modal, modal] += shapes.gram
-    return link.linear_density * part
+    area[modal], moment[modal] = rho * shapes.area, rho * shapes.moment
+    mixed = np.outer(lift, link.first_moment[0] * turning + area) + np.outer(turning, moment)
+    part: Array = (link.mass * base.T @ base + mixed + mixed.T
+                   + link.rotary_inertia * np.outer(turning, turning))
+    part[modal, modal] += rho * shapes.gram
+    return part
 
 
 def bending_stiffness(arm: Arm) -> Array:

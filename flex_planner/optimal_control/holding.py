@@ -85,10 +85,13 @@ def knows_holding(arm: Arm) -> bool:
     Return whether the torque that holds an arm is known for every payload: a polynomial.
 
     It is if only the last link moves the payload by its own bending: the load of a link with
-    pinned modes does not bend it, and the links before a clamped one do not feel its slope.
+    pinned modes does not bend it, and the links before a clamped one do not feel its slope. It is
+    not where a payload off the tip turns with that slope, nor where joints give way.
 
     """
-    return not any(_carries(arm, i) for i in range(arm.n_joints - 1))
+    turned = arm.payload_com.any() and arm.links[-1].mode_shapes().tip_slope.any()
+    return not (turned or arm.elastic_joints
+                or any(_carries(arm, i) for i in range(arm.n_joints - 1)))
 
 
 def _carries(arm: Arm, index: int) -> bool:

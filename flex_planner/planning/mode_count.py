@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from flex_planner.arms.arm import Arm, MAX_MODES
+from flex_planner.arms.arm import Arm
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.unbent_arm import bending_stiffness, free_vibrations, mass_matrix
 from flex_planner.optimal_control.task import Task
@@ -65,8 +65,7 @@ def estimate_left_out(task: Task, times: Array, weights: Array, torques: Array) 
 def _with_another_mode(arm: Arm) -> Arm:
     """Return the arm with one mode more in every link that has any, and can have another."""
     return replace(arm, links=tuple(
-        replace(link, modes=link.modes + 1) if 0 < link.modes < MAX_MODES else link
-        for link in arm.links))
+        link.with_more_modes(1) if link.modes else link for link in arm.links))
 
 
 def _kept(arm: Arm, richer: Arm) -> NDArray[np.intp]:

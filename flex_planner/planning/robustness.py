@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import fields, replace
 
-from flex_planner.arms.arm import Arm, MAX_MODES
+from flex_planner.arms.arm import Arm
 from flex_planner.base.errors import NoEquilibriumError
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
@@ -93,7 +93,7 @@ def prepare_robustness(arm: Arm) -> None:
 def with_more_modes(arm: Arm) -> Arm:
     """Return an arm whose flexible links have two more modes, as far as links may have them."""
     return replace(arm, links=tuple(
-        replace(link, modes=min(link.modes + MORE_MODES, MAX_MODES)) if link.modes else link
+        link.with_more_modes(MORE_MODES) if link.modes else link
         for link in arm.links))
 
 

@@ -105,7 +105,7 @@ def find_arm_warnings(arm: Arm) -> tuple[PlanWarning, ...]:
     """Return what is to be known of an arm before any motion; a hint where planning fails."""
     light = [str(i) for i, (link, node) in enumerate(zip(arm.links, arm.nodes, strict=False), 1)
              if link.modes and link.mode_family.startswith('clamped')
-             and node.inertia < _LIGHT_JOINT * link.mass * link.length**2 / 3]
+             and node.inertia < _LIGHT_JOINT * link.rotary_inertia]
     if not light:
         return ()
     joints = (f'joints {" and ".join(light)} have hardly any rotary inertia, but links are '

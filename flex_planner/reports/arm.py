@@ -73,9 +73,16 @@ def _describe_link(link: Link) -> str:
     text = f'{link.length:.4g} m, {link.mass:.4g} kg ({link.linear_density:.4g} kg/m), '
     if not link.modes:
         return text + 'rigid'
-    damping = f', damping ratio {link.damping_ratio:g}' if link.damping_ratio else ''
+    damping = f', damping ratio {damping_text(link)}' if link.damping_ratios.any() else ''
     return (f'{text}EI {link.flexural_rigidity:.4g} N m^2, {link.modes} {link.mode_family} '
             f'mode{"s" if link.modes > 1 else ""}{damping}')
+
+
+def damping_text(link: Link) -> str:
+    """Return the damping ratio of a link, or those of its modes."""
+    given = link.damping_ratio
+    return ' and '.join(f'{ratio:g}' for ratio in (
+        given if isinstance(given, tuple) else (given,))) or '0'
 
 
 def _describe_joint(joint: Joint) -> str:

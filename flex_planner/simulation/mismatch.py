@@ -64,9 +64,8 @@ class Mismatch:
         """Return a link with its own stiffness and number of modes; a rigid one stays."""
         if not link.modes:
             return link
-        modes = link.modes if self.modes == AS_GIVEN else self.modes
-        return replace(link, modes=modes,
-                       flexural_rigidity=link.flexural_rigidity * self.rigidity_scale)
+        changed = link if self.modes == AS_GIVEN else link.with_modes(self.modes)
+        return replace(changed, flexural_rigidity=link.flexural_rigidity * self.rigidity_scale)
 
 
 def _with_friction(joint: Joint, more: float) -> Joint:

@@ -15,7 +15,8 @@ from collections.abc import Callable
 import autograd
 from autograd.differential_operators import make_jvp
 import autograd.numpy as anp
-from flex_planner.arms.arm import Arm, Joint, Link, Node
+from data_sheet_arms import stepped_arm
+from flex_planner.arms.arm import Arm, BeamSection, Joint, Link, Node
 from flex_planner.base.validation import Array
 from flex_planner.optimal_control.parameters import Parameters
 from light_model import LightModel
@@ -26,13 +27,33 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(30)  # exact to rounding for mo
 PAYLOAD, INERTIA = 1.3, 0.07
 
 
+def quadrature(link: Link) -> tuple[Array, Array, Array, Array]:
+    """Return points of a link, along and across it, with their masses and rigidities."""
+    if link.center_of_mass is not None and link.inertia is not None:
+        # two points with the mass, centre and inertia of a rigid body
+        x, y = link.center_of_mass
+        apart = np.sqrt(link.inertia / link.mass) * np.array([-1.0, 1.0])
+        return x + apart, np.full(2, y), np.full(2, link.mass / 2), np.zeros(2)
+    sections = link.sections or (BeamSection(share=1.0),)
+    ends = link.length * np.cumsum([0.0, *(one.share for one in sections)])
+    stations, rule = (np.concatenate(part) for part in zip(*(
+        (low + (high - low) * (NODES + 1) / 2, WEIGHTS * (high - low) / 2)
+        for low, high in zip(ends[:-1], ends[1:], strict=True)), strict=True))
+    density, rigidity = np.repeat([[one.density, one.rigidity] for one in sections],
+                                  NODES.size, axis=0).T
+    bends = np.isfinite(rigidity) & bool(link.modes)  # rigid pieces have no curvature
+    stiff = link.flexural_rigidity * np.where(bends, rigidity, 0.0) if link.modes else 0 * rule
+    return stations, 0 * stations, link.linear_density * density * rule, stiff * rule
+
+
 class SecondDerivation:
     """Energies and Euler-Lagrange equations of an arm."""
 
     def __init__(self, arm: Arm) -> None:
         self.arm, ends = arm, [np.array([link.length]) for link in arm.links]
         shapes = [link.mode_shapes() for link in arm.links]
-        self._stations = [link.length * (NODES + 1) / 2 for link in arm.links]
+        rules = [quadrature(link) for link in arm.links]
+        self._stations, self._aside, density, self._rigidity = zip(*rules, strict=True)
         self._shapes = [modes.shape(x) for modes, x in zip(shapes, self._stations, strict=True)]
         self._bends = [modes.curvature(x) for modes, x in zip(shapes, self._stations, strict=True)]
         self._tips = [modes.shape(end)[0] for modes, end in zip(shapes, ends, strict=True)]
@@ -40,7 +61,6 @@ class SecondDerivation:
         self._slopes = [0 * modes.tip_slope if link.mode_family == 'pinned_pinned'
                         else modes.shape(end + 1e-20j)[0].imag / 1e-20
                         for link, modes, end in zip(arm.links, shapes, ends, strict=True)]
-        density = [link.linear_density * link.length / 2 * WEIGHTS for link in arm.links]
         masses = [node.mass for node in arm.nodes[1:]]
         masses[-1] += PAYLOAD
         self._masses = np.concatenate([*density, masses])
@@ -55,7 +75,7 @@ class SecondDerivation:
             angles.append(angle)
             e, normal = (anp.array([anp.cos(angle), anp.sin(angle)]),
                          anp.array([-anp.sin(angle), anp.cos(angle)]))
-            deflection = anp.dot(self._shapes[i], bend)
+            deflection = anp.dot(self._shapes[i], bend) + self._aside[i]
             points.append(base + anp.outer(self._stations[i], e) + anp.outer(deflection, normal))
             base = base + self.arm.links[i].length * e + anp.dot(self._tips[i], bend) * normal
             angle = angle + anp.dot(self._slopes[i], bend)
@@ -70,21 +90,20 @@ class SecondDerivation:
 
     def potential(self, q: Array) -> Array:
         total = -anp.dot(self._masses, anp.dot(self.places(q)[0], self.arm.gravity))
-        for link, bends, part in zip(self.arm.links, self._bends, self.arm.modal_slices,
-                                     strict=True):
+        for link, rigidity, bends, part in zip(self.arm.links, self._rigidity, self._bends,
+                                               self.arm.modal_slices, strict=True):
             if link.modes:
                 curvature = anp.dot(bends, q[part])
-                total += (link.flexural_rigidity * link.length / 4
-                          * anp.dot(WEIGHTS, curvature**2))
+                total += anp.dot(rigidity, curvature**2) / 2
         return total
 
     def damping(self) -> Array:
         coefficients = [joint.viscous_friction for joint in self.arm.joints]
-        for link, shapes, bends in zip(self.arm.links, self._shapes, self._bends, strict=True):
+        for i, link in enumerate(self.arm.links):
             if link.modes:
-                squares = [link.length / 2 * WEIGHTS @ part**2 for part in (shapes, bends)]
-                product = link.linear_density * link.flexural_rigidity * squares[0] * squares[1]
-                coefficients += [*2 * link.damping_ratio * np.sqrt(product)]
+                product = (quadrature(link)[2] @ self._shapes[i]**2
+                           * (self._rigidity[i] @ self._bends[i]**2))
+                coefficients += [*2 * np.array(link.damping_ratio) * np.sqrt(product)]
         return np.array(coefficients)
 
     def inverse_dynamics(self, q: Array, rates: Array, a: Array) -> Array:
@@ -127,9 +146,9 @@ def states(arm: Arm, count: int, seed: int) -> tuple[Array, Array, Array]:
     return q, rates, a
 
 
-@pytest.fixture(scope='module', params=['workshop', 'crane', 'three', 'mixed'])
+@pytest.fixture(scope='module', params=['workshop', 'crane', 'three', 'mixed', 'stepped'])
 def arm(request: pytest.FixtureRequest) -> Arm:
-    made = {'three': three_links, 'mixed': pinned_in_the_middle}
+    made = {'three': three_links, 'mixed': pinned_in_the_middle, 'stepped': stepped_arm}
     found: Arm = (made[request.param]() if request.param in made
                   else request.getfixturevalue(f'{request.param}_arm'))
     return found

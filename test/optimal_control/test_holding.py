@@ -7,7 +7,7 @@ import math
 import pickle
 from typing import Any
 
-from flex_planner.arms.arm import Arm, Joint, Link, Motor
+from flex_planner.arms.arm import Arm, BeamSection, Elasticity, Joint, Link, Motor, Node
 from flex_planner.base.errors import HoldingError
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.statics import equilibrium
@@ -86,6 +86,8 @@ def flexible(family: str) -> Link:
 
 
 STIFF = Link(length=0.4, linear_density=0.8)
+BODY = Link(length=0.4, linear_density=0.8, center_of_mass=(0.1, -0.2), inertia=0.01)
+HUB = (BeamSection(share=0.2, density=0.5, rigidity=inf), BeamSection(share=0.8, density=1.125))
 
 
 def largest_share(task: Task, payload: float) -> float:
@@ -101,9 +103,25 @@ def largest_share(task: Task, payload: float) -> float:
     ((flexible('clamped_free'),), [0.0]),
     ((flexible('clamped_free'),), [0.8]),  # bends back to where its weight pulls less
     ((flexible('clamped_mass'),), [-0.8]),
-    ((STIFF, flexible('clamped_free')), [0.5, 0.6])], ids=str)
+    ((STIFF, flexible('clamped_free')), [0.5, 0.6]),
+    ((STIFF, replace(flexible('clamped_free'), sections=HUB)), [0.5, 0.6]),
+    ((BODY, STIFF), [0.3, 0.4])], ids=str)
 def test_no_payload_above_the_limit_is_held(links: tuple[Link, ...], goal: list[float]) -> None:
+    assert_no_more_is_held(hanging(links, goal))
+
+
+@pytest.mark.parametrize(('links', 'goal'), [
+    ((BODY, STIFF), [0.3, 0.4]), ((flexible('pinned_pinned'),) * 2, [0.3, -0.9]),
+    ((STIFF,), [0.8])], ids=str)
+def test_payload_off_the_tip_is_held_up_to_its_limit(links: tuple[Link, ...],
+                                                     goal: list[float]) -> None:
     task = hanging(links, goal)
+    housed = tuple(replace(joint, housing=Node(mass=0.3)) for joint in task.arm.joints)
+    task = replace(task, arm=replace(task.arm, payload_com=[-0.1, 0.2], joints=housed))
+    assert_no_more_is_held(task)
+
+
+def assert_no_more_is_held(task: Task) -> None:
     model: Any = LightModel(task.arm)
     limit, _ = holding_bound(model, task, task_parameters(task))
     assert knows_holding(task.arm)
@@ -128,6 +146,19 @@ def test_arm_that_bends_back_holds_payloads_in_two_ranges() -> None:
 
 def test_clamped_link_that_carries_another_leaves_it_open() -> None:
     task = hanging((flexible('clamped_free'), STIFF), [0.5, 0.6])
+    assert not knows_holding(task.arm)
+    model: Any = LightModel(task.arm)
+    assert holding_bound(model, task, task_parameters(task)) == (inf, 0)
+
+
+@pytest.mark.parametrize('changes', [
+    {'links': (STIFF, flexible('clamped_free')), 'payload_com': [0.1, 0.0]},
+    {'links': (STIFF, STIFF), 'joints': (Joint(), Joint(
+        motor=Motor(rotor_inertia=0.1), elasticity=Elasticity(stiffness=50.0)))}], ids=str)
+def test_payload_that_turns_or_twists_what_holds_it_leaves_it_open(
+        changes: dict[str, Any]) -> None:
+    task = hanging((STIFF, STIFF), [0.5, 0.6])
+    task = replace(task, arm=replace(task.arm, **changes))
     assert not knows_holding(task.arm)
     model: Any = LightModel(task.arm)
     assert holding_bound(model, task, task_parameters(task)) == (inf, 0)

@@ -119,6 +119,20 @@ def _dot(weights: Any, values: Any) -> Any:
     return sum((float(w) * values[j] for j, w in enumerate(weights) if w), ca.SX(0))
 
 
+def _rest_moments(link: Link) -> tuple[tuple[float, float], float]:
+    """Return first moments along and across, and the inertia about the joint, piece by piece."""
+    if link.center_of_mass is not None and link.inertia is not None:
+        x, y = link.center_of_mass
+        return (link.mass * x, link.mass * y), link.inertia + link.mass * (x**2 + y**2)
+    start, first, second = 0.0, 0.0, 0.0
+    for share, density in [(one.share, one.density) for one in link.sections] or [(1.0, 1.0)]:
+        length = share * link.length
+        mass, middle = link.linear_density * density * length, start + length / 2
+        first, start = first + mass * middle, start + length
+        second += mass * (middle**2 + length**2 / 12)
+    return (first, 0.0), second
+
+
 def _link_energies(link: Link, frame: _Frame, q: Any, dq: Any, rigidity: Any) -> tuple[Any, Any]:
     """
     Return kinetic and potential energy of one link, eqs. (21) and (23).
@@ -128,8 +142,8 @@ def _link_energies(link: Link, frame: _Frame, q: Any, dq: Any, rigidity: Any) ->
     """
     rho, L, modes = link.linear_density, link.length, link.mode_shapes()
     v, w, g = frame.velocity, frame.rate, frame.gravity
-    mass, first, second = rho * L, rho * L**2 / 2, rho * L**3 / 3
-    b_q, b_dq = _dot(rho * modes.area, q), _dot(rho * modes.area, dq)
+    mass, (first, aside), second = rho * L, *_rest_moments(link)
+    b_q, b_dq = aside + _dot(rho * modes.area, q), _dot(rho * modes.area, dq)
     gram = ca.sparsify(ca.DM(rho * modes.gram))
     kinetic = (mass * ca.sumsqr(v) / 2 - v[0] * w * b_q + v[1] * (w * first + b_dq)
                + w**2 * (second + ca.bilin(gram, q, q)) / 2

@@ -96,7 +96,7 @@ def energy_limits(facts: MotionFacts, payload: float, duration: float,
 
     The power of driving motors, ``sum K_1 |w| - D w^2``, with kinetic energy E or less, is at
     most ``slope E + k^T (slope M / 2 + D)^-1 k / 4`` for every slope, some signs k of K_1 and
-    some posture. When they brake, D has the other sign.
+    some posture. When they brake, D has the other sign, and Coulomb friction adds to K_1.
 
     Parameters
     ----------
@@ -113,15 +113,15 @@ def energy_limits(facts: MotionFacts, payload: float, duration: float,
     inertia, drag = facts.inertia(payload), np.diag(facts.drag)
     sets = inertia.lower_bounds(facts.stall)
     signs = np.array(list(product((1.0, -1.0), repeat=facts.stall.size - 1)))
-    torques = facts.stall * np.hstack([np.ones((len(signs), 1)), signs])
+    signs = np.hstack([np.ones((len(signs), 1)), signs])
     # with less slope than that, braking grows faster than the energy lets it
     drained = 2 * float(facts.drag @ inertia.joint_mobilities)
     slopes = _SLOPES / duration
-    driving = _growth(sets, drag, torques, slopes)
+    driving = _growth(sets, drag, signs * facts.stall, slopes)
     ends = [facts.end_energy(facts.problem.start)]
     braking = EnergyGrowth.below(np.zeros(0), np.zeros(0))
     if facts.stops:
-        braking = _growth(sets, -drag, torques, slopes + drained)
+        braking = _growth(sets, -drag, signs * facts.held, slopes + drained)
         ends.append(facts.end_energy(facts.problem.goal))
     if np.isfinite(facts.power):
         driving = EnergyGrowth.below(np.append(driving.slopes, 0.0),
@@ -143,7 +143,7 @@ def _requirements(facts: MotionFacts, limits: EnergyLimits,
     """Return the times that parts of the motion take at least, with what they are."""
     inertia, n = facts.inertia(payload), facts.arm.n_joints
     if facts.reaches:
-        mobilities = inertia.point_mobilities
+        mobilities = [*inertia.point_mobilities[:-1], inertia.carried_mobility]
         ways = facts.distances()
         for i in range(n):
             yield (_time_for(limits, ways[i], mobilities[i]),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from flex_planner.arms.kinematics import link_points, tip_position, tip_velocity
+from flex_planner.arms.kinematics import link_points, payload_position, payload_velocity
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.rigid_inertia import RigidInertia
 from flex_planner.optimal_control.motion_problem import MotionProblem
@@ -69,6 +69,8 @@ class MotionFacts:
     ----------
     stall, drag : numpy.ndarray, shape (n,)
         K_1 [N m], and K_2 with the viscous friction of the joint [N m s/rad].
+    held : numpy.ndarray, shape (n,)
+        K_1 with the Coulomb friction of the joint, which helps motors that brake [N m].
     power : float
         What the motors can give at most, less what friction takes [W]; infinite without a
         no-load speed and without friction.
@@ -89,6 +91,7 @@ class MotionFacts:
         friction = np.array([joint.viscous_friction for joint in self.arm.joints])
         # of the line, which a cap only makes narrower
         self.stall, self.drag = given.stall_torque, given.torque_slope + friction
+        self.held = self.stall + given.coulomb_friction
         self.limited = bool(np.isfinite(self.stall).all())
         # K_1 |w| - drag w^2 is largest at half the speed where it vanishes
         self.power = float((self.stall**2 / (4 * self.drag)).sum()) if (
@@ -109,23 +112,24 @@ class MotionFacts:
         return RigidInertia.of(self.arm, payload, self.problem.parameters.payload_inertia)
 
     def tip_mass(self) -> float:
-        """Return the least mass that moves with the tip besides the payload [kg]."""
+        """Return the least mass that moves with the payload's centre besides it [kg]."""
         if self.rigid:
-            return float(1 / self.inertia(0.0).point_mobilities[-1])
-        return self.arm.nodes[-1].mass
+            return 1 / self.inertia(0.0).carried_mobility
+        return 0.0 if self.arm.payload_com.any() else self.arm.nodes[-1].mass
 
     def end_energy(self, state: Array) -> EndEnergy:
         """Return the energy of a state (2 n_t,); for arms of which it is known."""
         kinetic, potential = self._energies(state, 0.0)
         n_t, weight = self.arm.n_coordinates, float(np.linalg.norm(self.arm.gravity))
-        speed = tip_velocity(self.arm, state[:n_t], state[n_t:])
+        speed = payload_velocity(self.arm, state[:n_t], state[n_t:])
         moving = float(speed @ speed) / 2
         if not weight:  # at rest and unbent it is 0
             return EndEnergy(bare=kinetic + potential, per_payload=moving,
                              size=kinetic + potential, size_per_payload=moving)
-        lowest = -weight * float(self.inertia(0.0).first_moments(self.arm, 0.0).sum())
-        hangs = weight * self.arm.reach
-        height = -float(self.arm.gravity @ tip_position(self.arm, state[:n_t]))
+        bare, loaded = (self.inertia(0.0).first_moments(self.arm, payload).sum()
+                        for payload in (0.0, 1.0))
+        lowest, hangs = -weight * float(bare), weight * float(loaded - bare)
+        height = -float(self.arm.gravity @ payload_position(self.arm, state[:n_t]))
         return EndEnergy(
             bare=kinetic + potential - lowest, per_payload=moving + height + hangs,
             size=kinetic + abs(potential) - lowest, size_per_payload=moving + 2 * hangs)
@@ -150,15 +154,22 @@ class MotionFacts:
         """
         n_t, problem = self.arm.n_coordinates, self.problem
         bare = (self._energies(problem.goal, 0.0)[1] - self._energies(problem.start, 0.0)[1])
-        way = tip_position(self.arm, problem.goal[:n_t]) - tip_position(self.arm,
-                                                                        problem.start[:n_t])
+        start, goal = (payload_position(self.arm, state[:n_t])
+                       for state in (problem.start, problem.goal))
+        way = goal - start
         return bare, -float(self.arm.gravity @ way)
 
     def distances(self) -> Array:
-        """Return how far the ends of the links are between start and goal, shape (n,) [m]."""
+        """
+        Return how far the ends of the links are between start and goal, shape (n,) [m].
+
+        Instead of the tip, the payload's centre of mass.
+
+        """
         n_t = self.arm.n_coordinates
-        ends = [link_points(self.arm, state[:n_t])[:, -1] for state in (
-            self.problem.start, self.problem.goal)]
+        ends = [np.vstack([link_points(self.arm, state[:n_t])[:-1, -1],
+                           payload_position(self.arm, state[:n_t])])
+                for state in (self.problem.start, self.problem.goal)]
         apart: Array = np.linalg.norm(ends[1] - ends[0], axis=1)
         return apart
 

@@ -50,8 +50,9 @@ def find_doubt(problem: MotionProblem) -> str | None:
     asked, needed = problem.task.duration, rigid_bound(problem)
     if asked * _FASTER >= needed:
         return None
-    return (f'not looked for: with rigid links the motion takes at least {needed:.4g} s, which '
-            f'is proved, and bending does not make an arm {_FASTER:g} times as fast, which '
+    joints = ' and joints' if problem.model.arm.elastic_joints else ''
+    return (f'not looked for: with rigid links{joints} the motion takes at least {needed:.4g} s, '
+            f'which is proved, and bending does not make an arm {_FASTER:g} times as fast, which '
             f'is not; {asked:g} s were asked for')
 
 

@@ -10,6 +10,7 @@ from typing import Any
 from flex_planner.arms.arm import Arm, Joint
 from flex_planner.planning.certificate import CertificateLimits
 from flex_planner.planning.warnings import WarningKind
+from flex_planner.reports.arm import damping_text
 from flex_planner.reports.execution import execution_rows, vibrations
 from flex_planner.reports.recording.contents import RecordedRequest
 from flex_planner.reports.recording.execution import recorded_execution, recorded_robustness
@@ -277,7 +278,7 @@ def _arm(arm: Arm) -> list[ReportTable]:
             'link', 'length [m]', 'density [kg/m]', 'E I [N m²]', 'modes', 'damping'), rows=tuple(
                 (str(i), f'{link.length:g}', f'{link.linear_density:g}',
                  f'{link.flexural_rigidity:g}', f'{link.modes} {link.mode_family}'
-                 if link.modes else 'rigid', f'{link.damping_ratio:g}')
+                 if link.modes else 'rigid', damping_text(link))
                 for i, link in enumerate(arm.links, 1))),
         ReportTable(title='Joints', columns=(
             'joint', 'stall torque [N m]', 'no-load speed [rad/s]', 'largest speed [rad/s]',

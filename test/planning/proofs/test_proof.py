@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 import math
 from typing import Any
 
 from factories import TaskFactory
-from flex_planner.arms.arm import Arm, FAMILIES, Joint, Link, Motor, Node
+from flex_planner.arms.arm import Arm, BeamSection, Elasticity, Joint, Link, Motor, Node
+from flex_planner.arms.mode_shapes import FAMILIES
 from flex_planner.base.errors import HoldingError
 from flex_planner.base.validation import Array
 from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectSettings
@@ -21,6 +23,8 @@ from flex_planner.planning.proofs import (
     ProofName,
     prove_not_held,
 )
+from flex_planner.planning.proofs.duration_bounds import bound_by_power
+from flex_planner.planning.proofs.motion_facts import MotionFacts
 from known_limits import G, HEAVIEST, lifted_to, one_link, SHORTEST
 from light_model import LightModel
 import numpy as np
@@ -134,6 +138,32 @@ def test_speed_at_the_start_counts_as_energy() -> None:
     assert bound < bound_duration(problem_of(replace(task, start_velocities=[0.0])))
 
 
+def test_coulomb_friction_helps_to_brake_but_not_to_drive() -> None:
+    # from 0.8 rad/s to rest: I v / (K_1 + tau_c); the rotor is part of I
+    rotor = {'gear_ratio': 10.0, 'rotor_inertia': 0.005, 'max_torque': inf}
+    joint = Joint(motor=Motor(stall_torque=2.0, **rotor), coulomb_friction=0.6)
+    task = one_link(1.0)
+    task = replace(task, arm=replace(task.arm, joints=(joint,)))
+    seconds = 1.5 * 0.8 / 2.6
+    braked = replace(task, start_velocities=[0.8],
+                     goal_positions=task.start_positions + 0.8 * seconds / 2)
+    assert 0.99 * seconds < bound_duration(problem_of(braked)) <= seconds
+    # from rest to rest without friction, but with what it adds to the braking torque
+    quick = math.sqrt(2 * 0.5 * 1.5 * (1 / 2.0 + 1 / 2.6))
+    assert 0.99 * quick < bound_duration(problem_of(task)) <= quick
+
+
+def test_payload_off_the_tip_is_moved_where_it_is() -> None:
+    # a hook of 1 m across: the payload is sqrt(2) m from the joint, and moves so much further
+    task = with_motor(one_link(0.05, payload_mass=4.0), no_load_speed=2e-3)
+    task = replace(task, arm=replace(task.arm, payload_com=[0.0, 1.0]))
+    power, chord = 2.0 * 2e-3 / 4, math.sqrt(2) * 2 * math.sin(0.25)
+    # 1 kg m^2 of the link at that distance
+    seconds = (9 * (4.0 + 1.0 / 2) * chord**2 / (8 * power))**(1 / 3)
+    found = bound_by_power(MotionFacts(problem_of(task))).seconds
+    assert found == pytest.approx(seconds, rel=1e-5)
+
+
 def test_lifting_takes_the_time_of_its_work() -> None:
     # 0.3 kg and 1 m of link, 2 kg, from -1.2 to 1.2 rad: m g h in the power of 40 N m at 0.2 rad/s
     task = with_motor(lifted_to(1.2, 5.0, payload_mass=2.0), stall_torque=40.0, no_load_speed=0.2)
@@ -230,12 +260,31 @@ def drawn_arm(rng: np.random.Generator) -> Arm:
         mode_family=str(rng.choice(list(FAMILIES)))) for count in modes[:2 if flexible else n])
     joints = tuple(Joint(
         motor=Motor(stall_torque=10**rng.uniform(0, 1),
-                    no_load_speed=float(rng.choice([inf, 10**rng.uniform(-0.5, 1.3)]))),
+                    no_load_speed=float(rng.choice([inf, 10**rng.uniform(-0.5, 1.3)])),
+                    max_torque=inf),
         viscous_friction=float(rng.choice([0.0, 0.5]))) for _ in links)
     nodes = tuple(Node(mass=rng.uniform(0, 2), inertia=rng.uniform(0, 0.2))
                   for _ in range(len(links) + 1))
     return Arm(name='drawn', links=links, joints=joints, nodes=nodes,
                gravity=rng.choice([0.0, 7.0]) * rng.normal(size=2))
+
+
+def drawn_data_sheet(rng: np.random.Generator) -> Arm:
+    """Return such an arm with some of everything that data sheets have."""
+    arm, elastic = drawn_arm(rng), rng.random() < 0.2
+    joints = tuple(replace(
+        joint, motor=replace(joint.motor, gear_ratio=50,
+                             rotor_inertia=1e-4 * max(elastic, rng.integers(2))),
+        coulomb_friction=float(rng.choice([0.0, 0.4])), housing=Node(mass=1.0, inertia=0.02),
+        elasticity=Elasticity(stiffness=80.0, damping=0.1) if elastic else None)
+        for joint in arm.joints)
+    halves = BeamSection(share=0.5, density=1.5), BeamSection(share=0.5, density=0.5,
+                                                              rigidity=0.4)
+    links = tuple(replace(link, sections=halves) if link.modes or rng.random() < 0.5 else replace(
+        link, center_of_mass=tuple(rng.uniform(-0.3, 0.8, 2)), inertia=0.02)
+        for link in arm.links)
+    return replace(arm, links=links, joints=joints,
+                   payload_com=rng.choice([0.0, 0.2]) * rng.normal(size=2))
 
 
 def drive(task: Task, rng: np.random.Generator) -> tuple[Array, float]:
@@ -254,10 +303,12 @@ def drive(task: Task, rng: np.random.Generator) -> tuple[Array, float]:
     return x, duration
 
 
+@pytest.mark.parametrize('draw', [drawn_arm, drawn_data_sheet])
 @pytest.mark.parametrize('seed', range(24))
-def test_motion_of_driven_arm_is_not_called_impossible(seed: int) -> None:
+def test_motion_of_driven_arm_is_not_called_impossible(
+        draw: Callable[[np.random.Generator], Arm], seed: int) -> None:
     rng = np.random.default_rng(seed)
-    arm = drawn_arm(rng)
+    arm = draw(rng)
     n, n_t = arm.n_joints, arm.n_coordinates
     start = rng.uniform(-3, 3, n)
     task = Task(arm=arm, start_positions=start, goal_positions=start, duration=1.0,
