@@ -48,7 +48,8 @@ def _link(rng: np.random.Generator, index: int) -> Link:
 
 def stepped_arm() -> Arm:
     """Return links of all families in sections, bent and rigid, and a rigid body."""
-    tapered = BeamSection(share=0.5, density=1.2, rigidity=3.0), BeamSection(share=0.5, density=0.8)
+    tapered = (BeamSection(share=0.5, density=1.2, rigidity=3.0),
+               BeamSection(share=0.5, density=0.8))
     links = (Link(length=0.6, linear_density=4.0, flexural_rigidity=60.0, modes=2, sections=HUB,
                   mode_family='clamped_mass', shape_mass=4.0, damping_ratio=(0.07, 0.03)),
              Link(length=0.5, linear_density=2.0, center_of_mass=(0.3, -0.08), inertia=0.05),
