@@ -136,7 +136,7 @@ def stays(task: Task) -> bool:
 
 def _check(task: Task) -> None:
     """Refuse a task that has no largest payload."""
-    if not np.isfinite([joint.motor.stall_torque for joint in task.arm.joints]).any():
+    if not np.isfinite([joint.motor.standstill_torque for joint in task.arm.joints]).any():
         raise InvalidTaskError('no motor of the arm has a stall torque, so no payload is the '
                                'largest')
     if task.time_weight:

@@ -74,7 +74,7 @@ def find_min_duration(task: Task, *, model: ArmModel | None = None,
     effort = SearchEffort.of(search)
     helper_processes()  # what the environment says is refused before anything is solved
     number('accuracy', accuracy, at_least=_MIN_ACCURACY, at_most=_MAX_ACCURACY, unit='s')
-    if not np.isfinite([joint.motor.stall_torque for joint in task.arm.joints]).all():
+    if not np.isfinite([joint.motor.standstill_torque for joint in task.arm.joints]).all():
         raise InvalidTaskError('a motor of the arm has no stall torque, so no duration is the '
                                'shortest')
     if not task.ends_at_rest:

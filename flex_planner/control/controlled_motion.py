@@ -156,9 +156,10 @@ class ControlledArm:
 
     @property
     def _constants(self) -> Array:
-        """Return gains and limits, shape (4 n,)."""
+        """Return gains and limits, shape (5 n,)."""
         gains, limits = self.controller.gains, self._limits
-        return np.concatenate([gains.stiffness, gains.damping, limits.stall, limits.slope])
+        return np.concatenate([gains.stiffness, gains.damping, limits.stall, limits.slope,
+                               limits.cap])
 
 
 def locked_bending(dynamics: ArmDynamics, state: Array, parameters: PhysicalParameters) -> float:

@@ -128,7 +128,7 @@ class ArmDynamics:
         """
         Return the states after each of k steps under a joint controller, and their errors.
 
-        Motors have the limits of eq. (15) at the speeds of every instant.
+        Motors have their limits at the speeds of every instant, as `TorqueLimits` has them.
 
         Parameters
         ----------
@@ -140,8 +140,9 @@ class ArmDynamics:
         timing : numpy.ndarray, shape (k, 2)
             Length of each step [s], and 1 where the PD is sampled at its beginning, 0 where it is
             held.
-        controller : numpy.ndarray, shape (4 n,)
-            Stiffness, damping, stall torque and torque lost per speed of the joints.
+        controller : numpy.ndarray, shape (5 n,)
+            Stiffness, damping, stall torque, torque lost per speed and largest torque of the
+            joints.
         physical : numpy.ndarray
             `PhysicalParameters.physical`.
 

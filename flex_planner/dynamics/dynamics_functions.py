@@ -94,9 +94,9 @@ def _controlled_step(rate: Any, n: int) -> BatchedFunction:
     Return a step of DOP853 under feedforward efforts and a PD that is sampled and held.
 
     Inputs: x with the n torques of the PD; angles, speeds, and efforts at both ends of the step;
-    its length, and 1 where the PD is sampled at its beginning, else 0; gains, stall torques, and
-    what a motor loses of them by its speed. Outputs: x with the PD's torques, two error
-    estimates.
+    its length, and 1 where the PD is sampled at its beginning, else 0; gains, stall torques, what
+    a motor loses of them by its speed, and its largest torque. Outputs: x with the PD's torques,
+    two error estimates.
 
     """
     from scipy.integrate import DOP853
@@ -104,16 +104,17 @@ def _controlled_step(rate: Any, n: int) -> BatchedFunction:
     size = rate.size1_in(0)
     state, p = ca.MX.sym('s', size + n), ca.MX.sym('p', rate.size1_in(2))
     reference, timing, controller = (ca.MX.sym(name, count) for name, count in (
-        ('r', 4 * n), ('t', 2), ('c', 4 * n)))
+        ('r', 4 * n), ('t', 2), ('c', 5 * n)))
     x, held = state[:size], state[size:]
     angles, speeds, first, last = ca.vertsplit(reference, n)
-    stiffness, damping, stall, loss = ca.vertsplit(controller, n)
+    stiffness, damping, stall, loss, cap = ca.vertsplit(controller, n)
     sampled = stiffness * (angles - x[:n]) + damping * (speeds - x[size // 2:size // 2 + n])
     held += timing[1] * (sampled - held)
 
     def limited(at: Any, torque: Any, physical: Any) -> Any:
         lost = loss * at[size // 2:size // 2 + n]
-        return rate(at, ca.fmin(ca.fmax(torque, -stall - lost), stall - lost), physical)
+        low, high = (ca.fmin(ca.fmax(bound, -stall - lost), stall - lost) for bound in (-cap, cap))
+        return rate(at, ca.fmin(ca.fmax(torque, low), high), physical)
 
     stages = [first + float(share) * (last - first) + held
               for share in DOP853.C[:DOP853.n_stages]]

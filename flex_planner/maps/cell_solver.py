@@ -123,7 +123,7 @@ class CellSolver:
     def _duration_decides(self) -> bool:
         """Whether a shortest duration holds for all motions: not where they may swing first."""
         arm = self._study.arm
-        limited = [np.isfinite(joint.motor.stall_torque) for joint in arm.joints]
+        limited = [np.isfinite(joint.motor.standstill_torque) for joint in arm.joints]
         return all(limited) and not arm.gravity.any()
 
     def _measure_vibration(self, index: tuple[int, ...], task: Task, plan: Plan,

@@ -23,7 +23,8 @@ from numpy.typing import NDArray
 _REACH = {
     'start_positions': (0.2, 0.0), 'goal_positions': (0.2, 0.0), 'duration': (0.0, 0.1),
     'payload_mass': (0.1, 0.1), 'payload_inertia': (1e-3, 0.1), 'rigidity': (0.0, 0.5),
-    'stall_torque': (0.0, 0.1), 'torque_slope': (0.0, 0.1), 'effort_weights': (0.0, 0.5),
+    'stall_torque': (0.0, 0.1), 'torque_slope': (0.0, 0.1), 'max_torque': (0.0, 0.1),
+    'effort_weights': (0.0, 0.5),
     'position_weights': (0.1, 0.5), 'velocity_weights': (0.1, 0.5)}
 # of a quantity that nobody has given a reach
 _SAME = (1e-6, 1e-6)  # single precision

@@ -105,4 +105,4 @@ def check_motors(quantity: Quantity, arm: Arm) -> None:
 
 def _has_limit(arm: Arm) -> list[bool]:
     """Return for each motor whether it has a stall torque."""
-    return [math.isfinite(joint.motor.stall_torque) for joint in arm.joints]
+    return [math.isfinite(joint.motor.standstill_torque) for joint in arm.joints]

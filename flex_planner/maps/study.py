@@ -249,8 +249,10 @@ class Study:
 
 def _with_stronger_motor(joint: Joint, factor: float) -> Joint:
     """Return a joint with a stronger motor of the same no-load speed."""
-    stall = factor * joint.motor.stall_torque
-    return replace(joint, motor=replace(joint.motor, stall_torque=stall))
+    motor = joint.motor
+    cap = None if motor.max_torque is None else factor * motor.max_torque
+    return replace(joint, motor=replace(motor, stall_torque=factor * motor.stall_torque,
+                                        max_torque=cap))
 
 
 def load_study(path: str | os.PathLike[str]) -> Study:

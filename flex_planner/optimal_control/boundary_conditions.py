@@ -119,7 +119,8 @@ def _transversality(weights: Array) -> Array:
 
 def _check_holding(torque: Array, parameters: Parameters) -> None:
     """Refuse a goal at which the arm would sink as soon as it has arrived."""
-    for i, (needed, stall) in enumerate(zip(torque, parameters.stall_torque, strict=True)):
+    most = parameters.torque_limits.standstill
+    for i, (needed, stall) in enumerate(zip(torque, most, strict=True)):
         if abs(needed) > stall:
             raise HoldingError(i, float(needed), float(stall))
 

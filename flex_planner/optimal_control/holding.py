@@ -40,7 +40,7 @@ def holding_limit(model: ArmModel, task: Task, parameters: Parameters) -> tuple[
             torque = _holding_torque(model, task, parameters, payload)
         except (NoEquilibriumError, SingularError, UnreachableError):
             return np.full(model.arm.n_joints, _OVERLOADED)
-        share: Array = np.abs(torque) / parameters.stall_torque
+        share: Array = np.abs(torque) / parameters.torque_limits.standstill
         return share
 
     # that of the task can be held, though none may be too much where it is a counterweight
@@ -73,7 +73,7 @@ def holding_bound(model: ArmModel, task: Task, parameters: Parameters) -> tuple[
                         for payload in (0.0, scale))
         slopes = (loaded - bare - bend * scale**2) / scale
         limits = np.array([_last_within(a, b, bend, float(stall)) for a, b, stall in zip(
-            bare, slopes, parameters.stall_torque, strict=True)])
+            bare, slopes, parameters.torque_limits.standstill, strict=True)])
         scale = float(limits.min())
         if not 0 < scale <= MAX_PAYLOAD:
             break

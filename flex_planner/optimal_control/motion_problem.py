@@ -84,7 +84,7 @@ class MotionProblem:
         return self.model.optimality_jacobian(z, self.p)
 
     def switches(self, t: Array, z: Array, p: Array | None = None) -> Array:
-        """Return the distances of the unbounded torque from the bounds of eq. (15), (k, 2 n)."""
+        """Return the distances of the unbounded torque from its bounds, 2 n columns or more."""
         free = self.model.controls(z, self.p if p is None else p).free_torque
         n_t, n = self.model.arm.n_coordinates, self.model.arm.n_joints
         return np.hstack(self.parameters.torque_limits.distances(free, z[:, n_t:n_t + n]))

@@ -34,6 +34,8 @@ class Parameters(PhysicalParameters):
         E I of each link [N m^2].
     stall_torque, torque_slope : numpy.ndarray, shape (n,)
         K_1 [N m] and K_2 [N m s/rad] of eq. (15).
+    max_torque : numpy.ndarray, shape (n,)
+        In all quadrants [N m]; infinite for none, and where the line does not fall.
     effort_weights : numpy.ndarray, shape (n,)
         Diagonal of R.
     position_weights, velocity_weights : numpy.ndarray, shape (n_t,)
@@ -43,6 +45,7 @@ class Parameters(PhysicalParameters):
 
     stall_torque: Array
     torque_slope: Array
+    max_torque: Array
     effort_weights: Array
     position_weights: Array
     velocity_weights: Array
@@ -59,15 +62,15 @@ class Parameters(PhysicalParameters):
 
         return cls(payload_mass=payload_mass, payload_inertia=payload_inertia,
                    rigidity=arm.flexural_rigidities(), **coulomb_frictions(arm),
-                   stall_torque=limits.stall, torque_slope=limits.slope,
+                   stall_torque=limits.stall, torque_slope=limits.slope, max_torque=limits.cap,
                    effort_weights=default(effort_weights, np.ones(arm.n_joints)),
                    position_weights=default(position_weights, np.zeros(arm.n_coordinates)),
                    velocity_weights=default(velocity_weights, np.zeros(arm.n_coordinates)))
 
     @property
     def torque_limits(self) -> TorqueLimits:
-        """Return the motors' limits of eq. (15)."""
-        return TorqueLimits(self.stall_torque, self.torque_slope)
+        """Return the motors' limits: those of eq. (15), and caps."""
+        return TorqueLimits(self.stall_torque, self.torque_slope, self.max_torque)
 
     @property
     def path_weights(self) -> Array:
@@ -98,6 +101,12 @@ def payload_index() -> int:
     return NAMES.index('payload_mass')
 
 
+def torque_slope_slice(n: int) -> slice:
+    """Return where K_2 of n motors is in the vector; before it are two numbers and lists of n."""
+    first = 2 + n * (NAMES.index('torque_slope') - 2)
+    return slice(first, first + n)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class ParameterSymbols:
     """
@@ -117,7 +126,7 @@ class ParameterSymbols:
         """Create the symbols; payload and stiffness are those of the chain."""
         n_t, n = chain.coordinates.numel(), chain.rigidity.numel()
         create = type(chain.coordinates).sym
-        sizes = {'stall_torque': n, 'torque_slope': n, 'effort_weights': n,
+        sizes = {'stall_torque': n, 'torque_slope': n, 'max_torque': n, 'effort_weights': n,
                  'position_weights': n_t, 'velocity_weights': n_t}
         own = {name: create(name, size) for name, size in sizes.items()}
         return cls({'payload_mass': chain.payload_mass, 'payload_inertia': chain.payload_inertia,
@@ -129,8 +138,8 @@ class ParameterSymbols:
 
     @property
     def torque_limits(self) -> TorqueLimits:
-        """Return the motors' limits of eq. (15)."""
-        return TorqueLimits(self['stall_torque'], self['torque_slope'])
+        """Return the motors' limits: those of eq. (15), and caps."""
+        return TorqueLimits(self['stall_torque'], self['torque_slope'], self['max_torque'])
 
     def stack(self) -> list[Any]:
         """Return the symbols in the order of `Parameters.stack`."""

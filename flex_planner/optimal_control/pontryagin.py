@@ -119,7 +119,7 @@ def derive_conditions(chain: Chain, parameters: ParameterSymbols) -> Conditions:
     gradient = ca.gradient(stand_in, ca.vertcat(x, chain.payload_mass))
     cost, slope = at_point(cost, gradient)
     costate_rate = -slope[:2 * n_t]
-    costate_rate[n_t:n_t + n] += limits.multiplier(R, free, torque)
+    costate_rate[n_t:n_t + n] += limits.multiplier(R, free, rates[:n])
     return Conditions(
         z=ca.vertcat(x, psi_1, psi_2), rate=ca.vertcat(rates, acceleration, costate_rate),
         jacobian=RateJacobian.of(chain, gradient[:2 * n_t], at_point, solve,

@@ -11,63 +11,92 @@ from dataclasses import dataclass
 from typing import Any
 
 from flex_planner.arms.arm import Arm
+from flex_planner.base.validation import Array
 import numpy as np
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TorqueLimits:
     """
-    Limits of D.C. motors that fall with the speed.
+    Limits of D.C. motors: a line that falls with the speed, and a cap.
+
+    Beyond the speed at which even braking takes more than the cap, the line holds: a motor that is
+    driven so fast cannot do with less.
 
     Parameters
     ----------
     stall : numpy.ndarray or casadi.SX, shape (n,)
-        K_1, torque at standstill [N m].
+        K_1, torque of the line at standstill [N m].
     slope : numpy.ndarray or casadi.SX, shape (n,)
         K_2, torque lost per speed [N m s/rad].
+    cap : numpy.ndarray or casadi.SX, shape (n,)
+        Largest torque in either direction [N m]; infinite for none, which is eq. (15).
 
     """
 
     stall: Any
     slope: Any
+    cap: Any
 
     @classmethod
     def of(cls, arm: Arm) -> TorqueLimits:
-        """Return the limits of an arm's motors."""
+        """Return the limits of an arm's motors; a line that does not fall is a cap."""
         motors = [joint.motor for joint in arm.joints]
-        return cls(np.array([motor.stall_torque for motor in motors]),
-                   np.array([motor.torque_slope for motor in motors]))
+        falls = [motor.torque_slope > 0 for motor in motors]
+        return cls(
+            np.array([motor.stall_torque if line else motor.standstill_torque
+                      for motor, line in zip(motors, falls, strict=True)]),
+            np.array([motor.torque_slope for motor in motors]),
+            np.array([motor.torque_cap if line else np.inf
+                      for motor, line in zip(motors, falls, strict=True)]))
 
-    def bounds(self, speeds: Any) -> tuple[Any, Any]:
-        """Return the lower and the upper bound at joint speeds (..., n), eq. (15) [N m]."""
+    @property
+    def standstill(self) -> Any:
+        """Return the largest torque at standstill, shape (n,) [N m]."""
+        return np.minimum(self.stall, self.cap)
+
+    @property
+    def capped(self) -> Any:
+        """Return which motors have a cap besides a line, shape (n,)."""
+        return np.isfinite(self.cap)
+
+    def lines(self, speeds: Any) -> tuple[Any, Any]:
+        """Return the bounds of eq. (15) at joint speeds (..., n) [N m]."""
         lost = self.slope * speeds
         return -self.stall - lost, self.stall - lost
 
+    def bounds(self, speeds: Any) -> tuple[Any, Any]:
+        """Return the lower and the upper bound at joint speeds (..., n) [N m]."""
+        lowest, highest = self.lines(speeds)
+        return (_within(-self.cap, lowest, highest), _within(self.cap, lowest, highest))
+
     def bound(self, free: Any, speeds: Any) -> Any:
         """Return the torque of eq. (14): that of eq. (13), within the bounds [N m]."""
-        lower, upper = self.bounds(speeds)
-        if isinstance(free, np.ndarray):
-            return np.minimum(np.maximum(free, lower), upper)
-        import casadi as ca
-
-        return ca.fmin(ca.fmax(free, lower), upper)
+        return _within(free, *self.bounds(speeds))
 
     def toward(self, torque: Any, speeds: Any) -> Any:
         """Return the size of the bound in the direction of each torque (k, n) [N m]."""
         lower, upper = self.bounds(speeds)
         return np.where(torque >= 0, upper, -lower)
 
-    def distances(self, free: Any, speeds: Any) -> tuple[Any, Any]:
+    def distances(self, free: Array, speeds: Array) -> tuple[Array, ...]:
         """
-        Return how far torques without bounds (k, n) are above the upper and the lower bound.
+        Return functions of torques without bounds (k, n) whose signs say which limit holds [N m].
 
-        A motor reaches or leaves its limit where one of them changes its sign [N m].
+        First of the lines, upper and lower, (k, n) each; then of the caps of motors that have
+        one. A motor reaches or leaves a limit where one of them changes its sign.
 
         """
-        lower, upper = self.bounds(speeds)
-        return free - upper, free - lower
+        lowest, highest = self.lines(speeds)
+        of_lines = np.minimum(free, self.cap) - highest, np.maximum(free, -self.cap) - lowest
+        some = self.capped
+        if not some.any():
+            return of_lines
+        cap = self.cap[some]
+        return (*of_lines, np.minimum(free, highest)[:, some] - cap,
+                np.maximum(free, lowest)[:, some] + cap)
 
-    def multiplier(self, weights: Any, free: Any, torque: Any) -> Any:
+    def multiplier(self, weights: Any, free: Any, speeds: Any) -> Any:
         """
         Return what a bound that moves with the speed adds to the rate of its costate.
 
@@ -75,7 +104,7 @@ class TorqueLimits:
         vanishes unless the torque sits on its bound.
 
         """
-        return self.slope * weights * (torque - free)
+        return self._active_slope(free, speeds) * weights * (self.bound(free, speeds) - free)
 
     def sensitivity(self, weights: Any, free: Any, speeds: Any) -> TorqueSensitivity:
         """Return how the bounded torque changes, of symbols; see `bound`."""
@@ -83,9 +112,31 @@ class TorqueLimits:
 
         lower, upper = self.bounds(speeds)
         inside = ca.if_else(ca.logic_and(free > lower, free < upper), 1, 0)
-        lost = (1 - inside) * self.slope
+        slope = self._active_slope(free, speeds)
+        lost = (1 - inside) * slope
         return TorqueSensitivity(inside=inside, by_costate=inside / weights, by_speed=lost,
-                                 of_costate=lost * self.slope * weights)
+                                 of_costate=lost * slope * weights)
+
+    def _active_slope(self, free: Any, speeds: Any) -> Any:
+        """Return K_2 where the nearer bound is on the line, 0 where it is a cap."""
+        (lowest, highest), (_, upper) = self.lines(speeds), self.bounds(speeds)
+        if isinstance(upper, np.ndarray):
+            bound = np.where(free > upper, self.cap, -self.cap)
+            return np.where((lowest < bound) & (bound < highest), 0.0, self.slope)
+        import casadi as ca
+
+        cap = ca.SX(self.cap)
+        bound = ca.if_else(free > upper, cap, -cap)
+        return ca.if_else(ca.logic_and(lowest < bound, bound < highest), 0, self.slope)
+
+
+def _within(value: Any, lower: Any, upper: Any) -> Any:
+    """Return the nearest value between two, of arrays or symbols."""
+    if isinstance(lower, np.ndarray):
+        return np.minimum(np.maximum(value, lower), upper)
+    import casadi as ca
+
+    return ca.fmin(ca.fmax(value, lower), upper)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -100,7 +151,7 @@ class TorqueSensitivity:
     by_costate : casadi.SX
         -du/dy, 1/R between the bounds.
     by_speed : casadi.SX
-        -du/dq', K_2 on a bound.
+        -du/dq', K_2 on the line and 0 on a cap.
     of_costate : casadi.SX
         What the multiplier of a bound falls by with the speed.
 

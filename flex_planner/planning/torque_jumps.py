@@ -63,7 +63,7 @@ def find_torque_jumps(problem: MotionProblem, times: Array, torques: Array) -> l
         In order; empty if no motor has a limit.
 
     """
-    stall = np.array([joint.motor.stall_torque for joint in problem.task.arm.joints])
+    stall = np.array([joint.motor.standstill_torque for joint in problem.task.arm.joints])
     if not np.isfinite(stall).any():
         return []
     n_t, found = problem.model.arm.n_coordinates, []

@@ -179,11 +179,11 @@ def _torque_jumps(motion: _Motion) -> PlanWarning | None:
 
 def _braking_torque(motion: _Motion) -> PlanWarning | None:
     """Warn where the line of eq. (15) goes on beyond the stall torque, as few drives do."""
-    stall = np.array([joint.motor.stall_torque for joint in motion.arm.joints])
+    stall = np.array([joint.motor.standstill_torque for joint in motion.arm.joints])
     braking = np.where(motion.torques * motion.speeds < 0, np.abs(motion.torques), 0.0)
     return _beyond(motion, braking, stall, WarningKind.BRAKING_TORQUE, (
-        'brakes with {value:.4g} N m at {time:.4g} s, {share:.0%} of its stall torque: eq. (15) '
-        'gives a motor that much, the current limit of its drive may not'))
+        'brakes with {value:.4g} N m at {time:.4g} s, {share:.0%} of its stall torque: its '
+        'max_torque allows that much, the current limit of its drive may not'))
 
 
 def _speed_above_no_load(motion: _Motion) -> PlanWarning | None:

@@ -117,7 +117,7 @@ def test_arm_that_runs_away_is_not_a_number_from_there(
         dynamics: ArmDynamics, parameters: PhysicalParameters, reference: JointReference) -> None:
     strong = controlled(dynamics, parameters, Gains.of(2, 1e9, 1e9))
     free = ArmDynamics(dynamics.arm)  # its motors have no limits
-    monkey = TorqueLimits(np.full(2, np.inf), np.zeros(2))
+    monkey = TorqueLimits(np.full(2, np.inf), np.zeros(2), np.full(2, np.inf))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(TorqueLimits, 'of', classmethod(lambda cls, arm: monkey))
         states = strong.follow(reference, at_rest(free, parameters), 0.14).states

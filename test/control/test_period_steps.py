@@ -26,7 +26,7 @@ def test_steps_are_cut_and_what_is_left_begins_with_a_period() -> None:
 
 
 def test_limits_are_met_where_lines_cross() -> None:
-    limits = TorqueLimits(np.array([4.0, np.inf]), np.array([2.0, 0.0]))
+    limits = TorqueLimits(np.array([4.0, np.inf]), np.array([2.0, 0.0]), np.full(2, np.inf))
     # upper bounds of the first motor: 4 to 2 N m, and its lower ones: -4 to -6 N m
     speeds = np.zeros((4, 2)), np.tile([1.0, 0.0], (4, 1))
     asked = (np.array([[3.0, 9.0], [0.0, 9.0], [-5.0, 9.0], [4.001, 9.0]]),

@@ -33,8 +33,8 @@ def smooth_points(problem: Extended, solution: CollocationSolution,
     z = solution(times)
     gap = problem.switches(times, z)
     clear = (np.abs(gap) > GAP).all(axis=1)
-    n = plan.arm.n_joints
-    saturated = ((gap[:, :n] > 0) | (gap[:, n:] < 0)).any(axis=1)
+    control = plan.problem.model.controls(z[:, :plan.problem.size], plan.problem.p)
+    saturated = (control.torque != control.free_torque).any(axis=1)
     return z[clear], saturated[clear]
 
 

@@ -23,7 +23,8 @@ def parameters(workshop_arm: Arm) -> Parameters:
     """Return parameters in which no two numbers are alike."""
     n_t = workshop_arm.n_coordinates
     joints = tuple(replace(joint, coulomb_friction=0.31 + 0.01 * i,
-                           coulomb_speed=0.41 + 0.01 * i)
+                           coulomb_speed=0.41 + 0.01 * i,
+                           motor=replace(joint.motor, max_torque=8.1 + i))
                    for i, joint in enumerate(workshop_arm.joints))
     return Parameters.of(replace(workshop_arm, joints=joints),
                          payload_mass=1.3, payload_inertia=0.07,
@@ -35,7 +36,7 @@ def parameters(workshop_arm: Arm) -> Parameters:
 def test_no_two_numbers_are_alike(parameters: Parameters) -> None:
     # or the tests below would not see that two are exchanged
     stack = parameters.stack()
-    assert np.unique(stack).size == stack.size == 24
+    assert np.unique(stack).size == stack.size == 26
 
 
 @pytest.mark.parametrize('name', NAMES)

@@ -43,7 +43,7 @@ def test_bounds_hold_for_any_free_torque() -> None:
     breaks, theta = np.array([0.0, 1.0]), np.array([0.0, 1.0])
     values = np.array([[[-50.0, 0.5], [50.0, 0.5]]])  # a free torque and a speed
     torque = PlannedTorque(PiecewisePolynomial.through(breaks, theta, values),
-                           TorqueLimits(np.array([8.0]), np.array([2.0])))
+                           TorqueLimits(np.array([8.0]), np.array([2.0]), np.array([np.inf])))
     found = [torque(time)[0] for time in (0.0, 0.45, 0.5, 0.52, 1.0)]
     np.testing.assert_allclose(found, [-9, -5, 0, 2, 7], atol=1e-12)
     assert np.array_equal(

@@ -194,10 +194,9 @@ class DirectProblem:
         number('duration', duration, above=0, unit='s')
         prices = [1.0, price * (free is Free.PAYLOAD), price * (free is Free.DURATION)]
         lower, upper = self._unknowns.bounds(parameters, duration, free, most_payload)
-        rows = np.zeros(self._mesh.P.shape[0] * n_x
-                        + self._mesh.points.size * self.model.arm.n_coordinates)
+        least, most = self._unknowns.rows(parameters)
         return _Case(parameters=parameters, ends=ends, prices=prices, inputs={
-            'lbx': lower, 'ubx': upper, 'lbg': rows, 'ubg': rows,
+            'lbx': lower, 'ubx': upper, 'lbg': least, 'ubg': most,
             'p': np.concatenate([parameters.stack(), *ends, prices])})
 
     def _solve_each(self, case: _Case, iterates: Sequence[dict[str, Array]], warm: bool,

@@ -2,8 +2,9 @@
 The optimal control problem as a nonlinear programme: discretised first, optimised then.
 
 Every collocation point has the unknowns y = (q, q', q'', w) with w = u + K_2 q', so that eq. (15)
-is -K_1 <= w <= K_1 and eq. (3) one nonlinear row per coordinate. The rows that tie the points
-together are linear; their multipliers give the costates. CasADi is imported only to derive it.
+is -K_1 <= w <= K_1 and eq. (3) one nonlinear row per coordinate. A cap of the torque is a linear
+row, where a motor has one. The rows that tie the points together are linear; their multipliers
+give the costates. CasADi is imported only to derive it.
 
 """
 
@@ -15,7 +16,12 @@ from typing import Any
 from flex_planner.arms.arm import Arm
 from flex_planner.base.progress import Monitor, StopReason
 from flex_planner.optimal_control.direct.mesh import Columns, Transcription
-from flex_planner.optimal_control.parameters import ParameterSymbols, payload_index
+from flex_planner.optimal_control.parameters import (
+    ParameterSymbols,
+    payload_index,
+    torque_slope_slice,
+)
+from flex_planner.optimal_control.torque_limits import TorqueLimits
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,7 +74,8 @@ class Programme:
     Unknowns are y at the points, then x at the nodes that are no points, then the payload m_p and
     the duration t_f, which bounds fix or free. Parameters are p, in which the payload does not
     count, x at both ends, and three prices: the cost is ``prices[0] J - prices[1] m_p +
-    prices[2] t_f``. All rows are equations: those of the mesh, then eq. (3).
+    prices[2] t_f``. Rows are equations, those of the mesh, then eq. (3); last come the torques of
+    motors that have a cap.
 
     """
 
@@ -94,9 +101,12 @@ class Programme:
         force, force_slope = point.force.map(K)(*points)
         share, mean = point.share.map(K)(*points), ca.dot(weights, L)
         f = prices[0] * duration * mean - prices[1] * X[-2] + prices[2] * duration
-        g = ca.vertcat(constant @ motion - duration * moved - given, ca.vec(force))
+        torques = _capped_torques(arm, size, used)
+        g = ca.vertcat(constant @ motion - duration * moved - given, ca.vec(force),
+                       ca.vec(torques @ points[0]))
         s, multipliers = ca.MX.sym('s'), ca.MX.sym('lambda', g.numel())
-        in_mesh, of_force = ca.vertsplit(multipliers, [0, constant.size1(), g.numel()])
+        in_mesh, of_force, _ = ca.vertsplit(multipliers, [
+            0, constant.size1(), constant.size1() + force.numel(), g.numel()])
         mu = ca.reshape(of_force, -1, K)
         along = ca.vertcat(ca.vec(L_slope * ca.repmat(weights, size, 1)), ca.DM.zeros(outer))
         f_slope = ca.vertcat(prices[0] * duration * along, -prices[1],
@@ -104,7 +114,9 @@ class Programme:
         rows = ca.blockcat([
             [constant - duration * growing, ca.MX(moved.numel(), 1), -moved],
             [ca.horzcat(_diagonal(force_slope, K), ca.MX(force.numel(), outer)), ca.vec(share),
-             ca.MX(force.numel(), 1)]])
+             ca.MX(force.numel(), 1)],
+            [ca.horzcat(ca.kron(ca.DM.eye(K), torques), ca.MX(K * torques.size1(), outer)),
+             ca.MX(K * torques.size1(), 1), ca.MX(K * torques.size1(), 1)]])
         bend = ca.vertcat(ca.vec(point.bend.map(K)(*points, mu)), ca.MX(outer, 1))
         hessian = ca.blockcat([
             [ca.diagcat(_diagonal(point.hessian.map(K)(
@@ -159,6 +171,18 @@ class Programme:
                 return [int(bool(self.stopped or self.error or self.raised))]
 
         return Watch()
+
+
+def _capped_torques(arm: Arm, size: int, parameters: Any) -> Any:
+    """Return rows that make the torques u = w - K_2 q' of motors with a cap from y."""
+    import casadi as ca
+
+    n, n_t = arm.n_joints, arm.n_coordinates
+    chosen = [i for i, has in enumerate(TorqueLimits.of(arm).capped) if has]
+    driven, turning = ca.DM(len(chosen), size), ca.DM(len(chosen), size)
+    for row, i in enumerate(chosen):
+        driven[row, 3 * n_t + i] = turning[row, n_t + i] = 1
+    return driven - ca.diag(parameters[torque_slope_slice(n)][chosen]) @ turning
 
 
 def _linear_rows(mesh: Transcription, n_x: int, size: int) -> tuple[Any, Any]:

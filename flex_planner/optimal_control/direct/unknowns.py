@@ -11,6 +11,7 @@ from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.direct.mesh import Mesh
 from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.optimal_control.task import MAX_PAYLOAD
+from flex_planner.optimal_control.torque_limits import TorqueLimits
 import numpy as np
 
 # from times (k,) to z (k, 4 n_t), and to q, q', q'' (k, n_t) each
@@ -75,6 +76,13 @@ class Unknowns:
         return (np.concatenate([-both, [payload[0], time[0]]]),
                 np.concatenate([both, [payload[1], time[1]]]))
 
+    def rows(self, parameters: Parameters) -> tuple[Array, Array]:
+        """Return bounds of the rows: 0 for equations, caps of the torques of motors with any."""
+        arm, K = self.model.arm, self.mesh.points.size
+        equations = np.zeros((2 * self.mesh.P.shape[0] + K) * arm.n_coordinates)
+        caps = np.tile(parameters.max_torque[TorqueLimits.of(arm).capped], K)
+        return np.concatenate([equations, -caps]), np.concatenate([equations, caps])
+
     def on_motion(self, guess: Guess, parameters: Parameters, duration: float) -> Array:
         """Return the unknowns on a motion with costates."""
         n, n_t = self.model.arm.n_joints, self.model.arm.n_coordinates
@@ -90,7 +98,8 @@ class Unknowns:
         n = self.model.arm.n_joints
         q, v, a = path(duration * self.mesh.points)
         torque = self.model.inverse_dynamics(np.hstack([q, v]), a, parameters.physical)[:, :n]
-        most = _INSIDE * parameters.stall_torque
+        most, cap = _INSIDE * parameters.stall_torque, _INSIDE * parameters.max_torque
+        torque = np.clip(torque, -cap, cap)
         w = np.clip(torque + parameters.torque_slope * v[:, :n], -most, most)
         nodes = np.hstack(path(duration * self._outer_nodes)[:2])
         return self._join(np.hstack([q, v, a, w]), nodes, parameters, duration)

@@ -230,8 +230,9 @@ def _price(problem: MotionProblem, free: Free) -> float:
     if free is Free.NOTHING:
         return 0.0
     parameters = problem.parameters
-    stall = np.where(np.isfinite(parameters.stall_torque), parameters.stall_torque, 0.0)
-    largest = _PRICE * float(parameters.effort_weights @ stall**2) / 2
+    most = parameters.torque_limits.standstill
+    limited = np.where(np.isfinite(most), most, 0.0)
+    largest = _PRICE * float(parameters.effort_weights @ limited**2) / 2
     if free is Free.DURATION:
         return largest
     return largest * problem.task.duration / link_mass(problem)

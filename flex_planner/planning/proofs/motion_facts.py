@@ -89,6 +89,7 @@ class MotionFacts:
         self.problem, self.arm = problem, problem.model.arm
         given, n_t = problem.parameters, self.arm.n_coordinates
         friction = np.array([joint.viscous_friction for joint in self.arm.joints])
+        # of the line, which a cap only makes narrower
         self.stall, self.drag = given.stall_torque, given.torque_slope + friction
         self.held = self.stall + given.coulomb_friction
         self.limited = bool(np.isfinite(self.stall).all())
