@@ -93,7 +93,9 @@ def payload_velocity(arm: Arm, coordinates: Array, rates: Array) -> Array:
         return velocity
     c, s, _ = _tip_frame(arm, coordinates)
     turning, (x, y) = _tip_frame(arm, rates)[2], arm.payload_com
-    return velocity + turning[..., None] * np.stack([-s * x - c * y, c * x - s * y], -1)
+    moved: Array = velocity + turning[..., None] * np.stack(
+        [-s * x - c * y, c * x - s * y], -1)
+    return moved
 
 
 def _tip_frame(arm: Arm, coordinates: Array) -> tuple[Array, Array, Array]:

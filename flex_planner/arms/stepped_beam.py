@@ -18,6 +18,10 @@ from flex_planner.arms.beam_eigenmodes import TipLoad
 from flex_planner.base.validation import Array
 import numpy as np
 from numpy.polynomial import legendre
+from numpy.typing import NDArray
+
+Mask = NDArray[np.bool_]
+Counts = NDArray[np.intp]
 
 # terms of a series at first and at most; a series ends where they no longer count
 _FEWEST_TERMS, _MOST_TERMS = 10, 60
@@ -43,7 +47,7 @@ class Pieces:
     rigidities: Array
 
     @property
-    def bend(self) -> Array:
+    def bend(self) -> Mask:
         """Return which pieces are not rigid."""
         return np.isfinite(self.rigidities)
 
@@ -142,7 +146,7 @@ def stepped_modes(pieces: Pieces, count: int, load: TipLoad, *,
         None where so few pieces have mass that there are not so many modes.
 
     """
-    terms = np.where(pieces.bend, _FEWEST_TERMS, 0)
+    terms: Counts = np.where(pieces.bend, _FEWEST_TERMS, 0)
     while True:
         series = _Series.of(pieces, terms, pinned)
         inertia, modal = _vibrate(series, load, pinned)
@@ -171,12 +175,12 @@ class _Series:
     """
 
     pieces: Pieces
-    owner: Array
+    owner: Counts
     curvatures: Array
     deflections: Array
 
     @classmethod
-    def of(cls, pieces: Pieces, terms: Array, pinned: bool) -> _Series:
+    def of(cls, pieces: Pieces, terms: Counts, pinned: bool) -> _Series:
         """Return as many shapes for each piece as there are terms."""
         k, p, d = pieces.shares.size, int(terms.max()), int(terms.sum())
         owner = np.repeat(np.arange(k), terms)
@@ -198,12 +202,12 @@ class _Series:
                 deflections[i, 1] -= share / 2 * height
         return cls(pieces, owner, curvatures, deflections)
 
-    def unfinished(self, modal: Array) -> Array:
+    def unfinished(self, modal: Array) -> Mask:
         """Return for which pieces the last terms of modes (m, d) still count, (k,)."""
         rest = np.zeros(self.pieces.shares.size)
         for i in np.flatnonzero(self.pieces.bend):
             rest[i] = np.abs(modal[:, self.owner == i][:, -2:]).max()
-        still: Array = rest > _NEGLIGIBLE
+        still: Mask = rest > _NEGLIGIBLE
         return still
 
     def shapes(self, modal: Array) -> SteppedModes:
@@ -219,7 +223,7 @@ def _vibrate(series: _Series, load: TipLoad, pinned: bool) -> tuple[Array, Array
                 series.pieces.densities, series.pieces.shares, strict=True)) if density]
     if not pinned:
         tip, share = series.deflections[-1], series.pieces.shares[-1]
-        slope = legendre.legval(1.0, legendre.legder(tip, scl=2 / share))
+        slope = legendre.legder(tip, scl=2 / share).sum(axis=0)
         rows = [np.sqrt(load.mass_ratio) * tip.sum(axis=0)[None],
                 np.sqrt(load.inertia_ratio) * slope[None], *rows]
     _, values, modal = np.linalg.svd(np.vstack(rows), full_matrices=False)

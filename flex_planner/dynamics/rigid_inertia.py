@@ -169,9 +169,8 @@ class RigidInertia:
         n = self.lengths.size
         folds = np.array([[1.0] * n, [1.0] * (n - 1) + [-1.0]])
         sums = np.tril(np.ones((n, n)))
-        matrices: Array = sums.T @ (
-            self._absolute() * folds[:, :, None] * folds[:, None, :]) @ sums
-        matrices = matrices + np.diag(self.rotors)
+        matrices: Array = sums.T @ (self._absolute() * folds[:, :, None]
+                                    * folds[:, None, :]) @ sums + np.diag(self.rotors)
         return matrices
 
     def _weighted_points(self) -> Array:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+from data_sheet_arms import HUB, stepped_arm
 from flex_planner.arms.arm import Arm, Joint, Link, Node
 from flex_planner.arms.mode_shapes import FAMILIES
 from flex_planner.base.validation import Array
@@ -29,7 +32,8 @@ def arms(draw: st.DrawFn, modes: int = 3) -> Arm:
             length=draw(st.floats(0.4, 0.8)), linear_density=draw(st.floats(1.0, 4.0)),
             flexural_rigidity=draw(st.floats(2.0, 10.0)), modes=count,
             mode_family=draw(st.sampled_from(sorted(FAMILIES))),
-            shape_mass=draw(st.floats(0.0, 5.0)), shape_inertia=draw(st.floats(0.0, 1.0))))
+            shape_mass=draw(st.floats(0.0, 5.0)), shape_inertia=draw(st.floats(0.0, 1.0)),
+            sections=draw(st.sampled_from([(), (), HUB]))))
     part = st.builds(Node, mass=st.floats(0, 2), inertia=st.floats(0, 0.1))
     nodes = draw(st.one_of(st.just([]), st.lists(part, min_size=n + 1, max_size=n + 1)))
     gravity = draw(st.sampled_from([(0.0, 0.0), (0.0, -9.81), (3.0, -5.0)]))
@@ -76,6 +80,18 @@ def test_energy_is_conserved_in_free_motion(arm: Arm, seed: int) -> None:
     energy = kinetic + potential
     # of the integrator: 1e-12 a step, over some hundred steps
     assert abs(np.diff(energy)[0]) <= 1e-9 * (np.abs(potential).max() + kinetic.max())
+
+
+def test_energy_of_links_in_sections_is_conserved() -> None:
+    arm = replace(stepped_arm(), links=tuple(replace(link, damping_ratio=0.0)
+                                             for link in stepped_arm().links))
+    model, p, start = LightModel(arm), parameters(arm), random_states(arm, 1, 5)[0]
+    end = simulate(model, p, start, lambda t: np.zeros(5), 0.02,  # type: ignore
+                   rtol=1e-13, atol=1e-14)
+    _, kinetic, potential = model.mass_and_energy(np.array([start, end]), p)
+    assert np.abs(end - start).max() > 0.02
+    assert abs(np.diff(kinetic + potential)[0]) <= 1e-10 * (np.abs(potential).max()
+                                                            + kinetic.max())
 
 
 @settings(max_examples=30)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 from data_sheet_arms import data_sheet_arm, HUB, stepped_arm
 from factories import model_of
@@ -50,8 +51,8 @@ def test_mass_matrix_of_data_sheet_arms_is_that_of_the_dynamics(arm: Arm) -> Non
 def test_locked_frequencies_of_a_stepped_link_are_those_of_its_modes() -> None:
     link = stepped_arm().links[-1]
     arm = Arm(name='one', links=(link,), joints=(Joint(),))
-    found, _ = natural_modes(LightModel(arm), np.zeros(4), PhysicalParameters.of_arm(arm),  # type: ignore
-                             locked=True)
+    model: Any = LightModel(arm)
+    found, _ = natural_modes(model, np.zeros(4), PhysicalParameters.of_arm(arm), locked=True)
     exact = stepped_modes(Pieces(*np.array([(one.share, one.density, one.rigidity)
                                             for one in HUB]).T), 3, TipLoad())
     assert exact is not None
