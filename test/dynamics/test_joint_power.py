@@ -14,6 +14,7 @@ from flex_planner.dynamics.unbent_arm import bending_stiffness, mass_matrix
 from light_model import LightModel
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 # q, q', q'' and the torques that the recursive Newton-Euler algorithm of Pinocchio 4.1.0 finds for
 # `three_bodies`, with the rotors as its armature
@@ -124,3 +125,25 @@ def test_tip_hangs_where_gravity_twists_the_joint() -> None:
     assert tip_position(arm, rest) == pytest.approx([np.cos(twist), np.sin(twist)], rel=1e-12)
     assert tip_velocity(arm, rest, np.array([0.0, 1.0])) == pytest.approx(
         [-np.sin(twist), np.cos(twist)], rel=1e-12)
+
+
+@pytest.mark.parametrize('seed', range(2))
+def test_energy_is_kept_without_friction_and_damping(seed: int) -> None:
+    arm = data_sheet_arm(seed)
+    joints = tuple(replace(
+        joint, viscous_friction=0.0, coulomb_friction=0.0,
+        elasticity=joint.elasticity and Elasticity(stiffness=joint.elasticity.stiffness))
+        for joint in arm.joints)
+    arm = replace(arm, joints=joints,
+                  links=tuple(replace(link, damping_ratio=0.0) for link in arm.links))
+    model, p = LightModel(arm), physical(arm)
+    rng = np.random.default_rng(seed)
+    x = np.concatenate([rng.uniform(-1, 1, arm.n_joints), np.zeros(arm.n_passive),
+                        rng.normal(size=arm.n_joints), np.zeros(arm.n_passive)])
+    rate, still = model.state_rate(p), np.zeros(arm.n_joints)
+    run = solve_ivp(lambda t, state: rate(state, still), (0, 0.5), x, 'DOP853', rtol=1e-12,
+                    atol=1e-13)
+    energies = [sum(part[0] for part in model.mass_and_energy(state[None], p)[1:])
+                for state in run.y.T]
+    kinetic = max(model.mass_and_energy(state[None], p)[1][0] for state in run.y.T)
+    assert np.ptp(energies) < 1e-10 * kinetic
