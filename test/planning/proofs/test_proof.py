@@ -41,15 +41,15 @@ def problem_of(task: Task) -> MotionProblem:
 
 
 def with_motor(task: Task, friction: float = 0.0, **motor: float) -> Task:
-    joints = tuple(Joint(motor=Motor(**{'stall_torque': 2.0, **motor}), viscous_friction=friction)
+    joints = tuple(Joint(motor=Motor(**{'stall_torque': 2.0, 'max_torque': inf, **motor}), viscous_friction=friction)
                    for _ in task.arm.joints)
     return replace(task, arm=replace(task.arm, joints=joints))
 
 
 def two_links(**changes: Any) -> Task:
     links = (Link(length=0.6, linear_density=4.0), Link(length=0.4, linear_density=3.0))
-    joints = (Joint(motor=Motor(stall_torque=9.0, no_load_speed=5.0)),
-              Joint(motor=Motor(stall_torque=4.0, no_load_speed=6.0)))
+    joints = (Joint(motor=Motor(stall_torque=9.0, no_load_speed=5.0, max_torque=inf)),
+              Joint(motor=Motor(stall_torque=4.0, no_load_speed=6.0, max_torque=inf)))
     values: dict[str, Any] = {'start_positions': [0.2, 1.0], 'goal_positions': [1.4, -0.6],
                               'duration': 0.9, 'payload_mass': 1.5}
     return Task(arm=Arm(name='two', links=links, joints=joints), **{**values, **changes})
@@ -88,6 +88,34 @@ def test_bounds_of_one_link_are_nearly_what_it_can_do(slope: float, friction: fl
     assert found.payload >= payload
     if close > 0.9:
         assert found.payload <= payload + 0.03 * (1 + payload)
+
+
+@pytest.mark.parametrize('slope', [0.7, 2.0])
+def test_bounds_of_a_capped_motor_are_nearly_what_it_can_do(slope: float) -> None:
+    # driven on its line, K_1 - K_2 w, and braked by its cap K_1; M = 1 kg m^2
+    task, end = with_motor(one_link(1.0), no_load_speed=2 / slope, max_torque=2.0), 2.0 / slope
+
+    def way(share: float) -> float:
+        return end / slope * (-math.log1p(-share) - share) + (share * end)**2 / 4
+
+    share = brentq(lambda share: way(share) - 0.5, 0, 1 - 1e-15)
+    exact = -math.log1p(-share) / slope + share * end / 2
+    uncapped = with_motor(task, no_load_speed=end)
+    assert bound_duration(problem_of(uncapped)) < bound_duration(problem_of(task)) <= exact
+    assert bound_duration(problem_of(task)) > 0.97 * exact
+
+
+def test_cap_below_the_line_bounds_power_and_drive() -> None:
+    task = with_motor(one_link(1.0), no_load_speed=40.0, max_torque=0.5)
+    # far from the knee of the line the cap is all: 0.5 N m there and back
+    exact = 2 * math.sqrt(0.5 / 0.5)
+    assert 0.98 * exact < bound_duration(problem_of(task)) <= exact
+    # 2 N m at standstill, -0.05 N m s: 0.5 N m up to 30 rad/s
+    assert MotionFacts(problem_of(task)).power == pytest.approx(15.0, rel=1e-12)
+    slow = with_motor(task, no_load_speed=40.0, max_torque=1.5)
+    assert MotionFacts(problem_of(slow)).power == pytest.approx(2.0 * 40 / 4, rel=1e-12)
+    rubbed = with_motor(task, 0.01, no_load_speed=40.0, max_torque=0.5)
+    assert MotionFacts(problem_of(rubbed)).power == pytest.approx(0.5**2 / 0.04, rel=1e-12)
 
 
 @pytest.mark.parametrize('payload', [0.0, 4.0])
@@ -273,10 +301,11 @@ def drawn_data_sheet(rng: np.random.Generator) -> Arm:
     """Return such an arm with some of everything that data sheets have."""
     arm, elastic = drawn_arm(rng), rng.random() < 0.2
     joints = tuple(replace(
-        joint, motor=replace(joint.motor, gear_ratio=50,
+        joint, motor=replace(joint.motor, gear_ratio=50, max_torque=rng.choice(
+            [inf, joint.motor.stall_torque * rng.uniform(0.2, 1.2)]),
                              rotor_inertia=1e-4 * max(elastic, rng.integers(2))),
         coulomb_friction=float(rng.choice([0.0, 0.4])), housing=Node(mass=1.0, inertia=0.02),
-        elasticity=Elasticity(stiffness=80.0, damping=0.1) if elastic else None)
+        elasticity=Elasticity(stiffness=800.0, damping=0.1) if elastic else None)
         for joint in arm.joints)
     halves = BeamSection(share=0.5, density=1.5), BeamSection(share=0.5, density=0.5,
                                                               rigidity=0.4)
@@ -291,14 +320,15 @@ def drive(task: Task, rng: np.random.Generator) -> tuple[Array, float]:
     """Return the state after a motion with motors on their limits, and its duration."""
     problem, model = problem_of(task), LightModel(task.arm)
     n, n_t = task.arm.n_joints, task.arm.n_coordinates
-    stall, slope = problem.parameters.stall_torque, problem.parameters.torque_slope
+    limits = problem.parameters.torque_limits
+    stall = limits.standstill
     rate, x = model.state_rate(problem.p), problem.start.copy()
     inertia = np.diag(model.mass_and_energy(x[None], problem.p)[0][0])[:n]
     duration = float(np.sqrt((inertia / stall).mean()) * 10**rng.uniform(-0.8, 0.0))
     signs, turn = rng.choice([-1.0, 1.0], n), rng.uniform(0.4, 0.9)
     for sign, part in ((1.0, turn), (-1.0, 1 - turn)):
-        x = solve_ivp(lambda t, state, side=sign * signs * stall: rate(
-            state, side - slope * state[n_t:n_t + n]), (0, part * duration), x, method='LSODA',
+        x = solve_ivp(lambda t, state, side=sign * signs * inf: rate(
+            state, limits.bound(side, state[n_t:n_t + n])), (0, part * duration), x, method='LSODA',
             rtol=1e-9, atol=1e-9).y[:, -1]
     return x, duration
 
