@@ -158,7 +158,8 @@ def _braking_below_caps(facts: MotionFacts, inertia: RigidInertia, sets: tuple[A
     drag = np.where(some, facts.friction, facts.drag)
     held = np.where(some, limits.cap, facts.stall) + facts.held - facts.stall
     mobilities = inertia.joint_mobilities
-    caps = _growth(sets, -np.diag(drag), signs * held, slopes + 2 * float(drag @ mobilities), lines)
+    drained = 2 * float(drag @ mobilities)
+    caps = _growth(sets, -np.diag(drag), signs * held, slopes + drained, lines)
     fastest = (facts.stall + limits.cap)[some] / limits.slope[some]
     return caps.until(float((fastest**2 / (2 * mobilities[some])).min()), lines)
 

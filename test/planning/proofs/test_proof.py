@@ -41,7 +41,9 @@ def problem_of(task: Task) -> MotionProblem:
 
 
 def with_motor(task: Task, friction: float = 0.0, **motor: float) -> Task:
-    joints = tuple(Joint(motor=Motor(**{'stall_torque': 2.0, 'max_torque': inf, **motor}), viscous_friction=friction)
+    """Return a task with motors that are limited by a line alone, unless they have a cap."""
+    limits = {'stall_torque': 2.0, 'max_torque': inf, **motor}
+    joints = tuple(Joint(motor=Motor(**limits), viscous_friction=friction)
                    for _ in task.arm.joints)
     return replace(task, arm=replace(task.arm, joints=joints))
 
@@ -328,8 +330,8 @@ def drive(task: Task, rng: np.random.Generator) -> tuple[Array, float]:
     signs, turn = rng.choice([-1.0, 1.0], n), rng.uniform(0.4, 0.9)
     for sign, part in ((1.0, turn), (-1.0, 1 - turn)):
         x = solve_ivp(lambda t, state, side=sign * signs * inf: rate(
-            state, limits.bound(side, state[n_t:n_t + n])), (0, part * duration), x, method='LSODA',
-            rtol=1e-9, atol=1e-9).y[:, -1]
+            state, limits.bound(side, state[n_t:n_t + n])), (0, part * duration), x,
+            method='LSODA', rtol=1e-9, atol=1e-9).y[:, -1]
     return x, duration
 
 
