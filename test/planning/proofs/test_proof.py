@@ -107,6 +107,15 @@ def test_bounds_of_a_capped_motor_are_nearly_what_it_can_do(slope: float) -> Non
     assert bound_duration(problem_of(task)) > 0.97 * exact
 
 
+def test_motor_that_is_driven_far_beyond_its_line_brakes_with_more_than_its_cap() -> None:
+    # from 20 rad/s: w' = 2 - 2 w down to 2 rad/s, where that is the cap, then w' = -2
+    task = with_motor(one_link(1.0), no_load_speed=1.0, max_torque=2.0)
+    seconds = math.log(19) / 2 + 1
+    ends = [0.1 + math.log(19) / 2 + 9 + 1]
+    braked = replace(task, start_velocities=[20.0], goal_positions=ends)
+    assert 0.3 * seconds < bound_duration(problem_of(braked)) <= seconds
+
+
 def test_cap_below_the_line_bounds_power_and_drive() -> None:
     task = with_motor(one_link(1.0), no_load_speed=40.0, max_torque=0.5)
     # far from the knee of the line the cap is all: 0.5 N m there and back
