@@ -28,6 +28,7 @@ def read_link(section: YamlSection) -> Link:
     modes = section.take('modes', 0)
     values = {**(_stepped(section, bool(modes)) if section.has('sections')
                  else _uniform(section, bool(modes))),
+              'family_assumed': bool(modes) and not section.has('mode_family'),
               'modes': modes, 'mode_family': section.take('mode_family', 'pinned_pinned'),
               'damping_ratio': section.take('damping_ratio', 0.0)}
     if values['mode_family'] == 'clamped_mass':

@@ -90,6 +90,23 @@ def preset_files() -> dict[str, Path]:
     return {path.stem: path for path in reversed(files)}
 
 
+def read_arm_template() -> str:
+    """
+    Return the text of an arm file to start from.
+
+    Raises
+    ------
+    ArmFileError
+        If it is not installed.
+
+    """
+    for folder in config_folders():
+        path = folder / 'arm_template.yaml'
+        if path.is_file():
+            return path.read_text(encoding='utf-8')
+    raise ArmFileError('arm_template.yaml is not installed')
+
+
 def load_arm(name: str | os.PathLike[str]) -> Arm:
     """
     Return the arm described by a preset or a file.

@@ -80,6 +80,8 @@ class Link:
     inertia : float, optional
         Rotary inertia of a rigid link about its centre of mass, >= 0 [kg m^2]; by default that of
         the sections.
+    family_assumed : bool
+        Whether nobody said which family the modes are of.
 
     Raises
     ------
@@ -99,6 +101,7 @@ class Link:
     sections: tuple[BeamSection, ...] = ()
     center_of_mass: tuple[float, float] | None = None
     inertia: float | None = None
+    family_assumed: bool = False
 
     def __post_init__(self) -> None:
         check_quantity('length', self.length, 'length', above=0)

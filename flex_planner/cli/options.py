@@ -57,9 +57,9 @@ def integer_argument(text: str) -> int:
     return int(value)
 
 
-def add_arm(parser: argparse.ArgumentParser) -> None:
-    """Add the arm, which every command needs."""
-    parser.add_argument('arm', metavar='ARM',
+def add_arm(parser: argparse.ArgumentParser, *, optional: bool = False) -> None:
+    """Add the arm, which every command needs unless it says otherwise."""
+    parser.add_argument('arm', metavar='ARM', nargs='?' if optional else None,
                         help='arm file, - for standard input, or a preset: '
                         f'{", ".join(sorted(preset_files()))}')
 

@@ -121,8 +121,8 @@ class TorqueLimits:
         """Return K_2 where the nearer bound is on the line, 0 where it is a cap."""
         (lowest, highest), (_, upper) = self.lines(speeds), self.bounds(speeds)
         if isinstance(upper, np.ndarray):
-            bound = np.where(free > upper, self.cap, -self.cap)
-            return np.where((lowest < bound) & (bound < highest), 0.0, self.slope)
+            nearer = np.where(free > upper, self.cap, -self.cap)
+            return np.where((lowest < nearer) & (nearer < highest), 0.0, self.slope)
         import casadi as ca
 
         cap = ca.SX(self.cap)

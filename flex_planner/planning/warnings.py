@@ -47,6 +47,7 @@ class WarningKind(Enum):
     LINKS_OVERLAP = 'links overlap'
     STIFF_LINKS = 'links so stiff that they are planned as rigid'
     JOINT_WITHOUT_INERTIA = 'clamped link on a joint without inertia'
+    MODE_FAMILY_ASSUMED = 'a link does not say how it is fixed'
     TOO_FEW_MODES = 'too few modes'
     ARRIVES_ELSEWHERE = 'the controller leads the arm elsewhere'
     SENSITIVE_TO_MODES = 'sensitive to the number of modes'
@@ -103,18 +104,37 @@ def find_warnings(problem: MotionProblem,
 
 def find_arm_warnings(arm: Arm) -> tuple[PlanWarning, ...]:
     """Return what is to be known of an arm before any motion; a hint where planning fails."""
-    light = [str(i) for i, (link, node) in enumerate(zip(arm.links, arm.nodes, strict=False), 1)
-             if link.modes and link.mode_family.startswith('clamped')
-             and node.inertia < _LIGHT_JOINT * link.rotary_inertia]
+    found = (check(arm) for check in (_joints_without_inertia, _assumed_families))
+    return tuple(one for one in found if one is not None)
+
+
+def _joints_without_inertia(arm: Arm) -> PlanWarning | None:
+    """Warn of links that are clamped to next to nothing."""
+    light = [str(i) for i, (link, joint, node) in enumerate(
+        zip(arm.links, arm.joints, arm.nodes, strict=False), 1)
+        if link.is_clamped and not joint.is_elastic
+        and node.inertia + joint.motor.reflected_inertia < _LIGHT_JOINT * link.rotary_inertia]
     if not light:
-        return ()
+        return None
     joints = (f'joints {" and ".join(light)} have hardly any rotary inertia, but links are '
               'clamped to them' if light[1:] else
               f'joint {light[0]} has hardly any rotary inertia, but a link is clamped to it')
-    return (PlanWarning(kind=WarningKind.JOINT_WITHOUT_INERTIA, sentence=(
-        f'{joints}: motors have some, that of the rotor times the square of the gear ratio, and '
-        'it belongs into the inertia of the node at the joint; without it plans take long, and '
-        'many are not found')),)
+    return PlanWarning(kind=WarningKind.JOINT_WITHOUT_INERTIA, sentence=(
+        f'{joints}: a torque would bend the link at once, so plans take long and many are not '
+        'found. Real motors have a rotor: give rotor_inertia and gear_ratio of the motor, or the '
+        'inertia of the hub at the node'))
+
+
+def _assumed_families(arm: Arm) -> PlanWarning | None:
+    """Warn of links whose file does not say how they are fixed."""
+    assumed = [str(i) for i, link in enumerate(arm.links, 1) if link.family_assumed]
+    if not assumed:
+        return None
+    links = f'links {" and ".join(assumed)} have' if assumed[1:] else f'link {assumed[0]} has'
+    return PlanWarning(kind=WarningKind.MODE_FAMILY_ASSUMED, sentence=(
+        f'{links} no mode_family and bends between its ends like a beam on two supports, as in '
+        'the paper: the links of real arms are clamped to their motors (clamped_free), and their '
+        'tips move when they bend'))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -58,6 +58,10 @@ def _draw_link_shapes(axes: Axes, arm: Arm, index: int) -> None:
     x = np.linspace(0, link.length, _STATIONS, dtype=float)
     for j, shape in enumerate(link.mode_shapes().shape(x).T, 1):
         axes.plot(x, shape, label=f'mode {j}')
+    ends = np.cumsum([0.0, *(one.share for one in link.sections)]) * link.length
+    for section, first, last in zip(link.sections, ends[:-1], ends[1:], strict=True):
+        if np.isinf(section.rigidity):
+            axes.axvspan(first, last, color='0.9', zorder=0)
     finish(axes, f'link {index + 1}: assumed shapes, {link.mode_family}',
            'deflection per unit of modal displacement', 'along the link [m]')
 

@@ -142,7 +142,8 @@ def test_hanging_arm_swings_as_scipy_has_it() -> None:
     start[:2] = -1.5, -0.5
     breaks = np.linspace(0, 0.4, 5)
     pieces = PiecewisePolynomial(breaks, np.zeros((4, 1, 4)))
-    still = PlannedTorque(pieces, TorqueLimits(np.full(2, np.inf), np.zeros(2), np.full(2, np.inf)))
+    limits = TorqueLimits(np.full(2, np.inf), np.zeros(2), np.full(2, np.inf))
+    still = PlannedTorque(pieces, limits)
     expected = simulate(model, p, start, still, 0.4, rtol=1e-12, atol=1e-14)
     end = integrate(model, p, start, still, rtol=1e-11, atol=1e-13)[-1]
     np.testing.assert_allclose(end, expected, rtol=0, atol=1e-10)

@@ -49,7 +49,7 @@ def test_numbers_and_symbols_agree(points: tuple[Array, Array], limits: TorqueLi
     assert all(20 < (torque == bound).sum() for bound in (free, *limits.bounds(speeds)))
 
 
-def test_cap_holds_in_all_quadrants_as_far_as_the_line_lets_it(points: tuple[Array, Array]) -> None:
+def test_cap_holds_in_all_quadrants_as_the_line_lets_it(points: tuple[Array, Array]) -> None:
     stall, slope, cap = CAPPED.stall, CAPPED.slope, CAPPED.cap
     speeds = np.vstack([points[1], [[0.0, 0.0], [20.0, -30.0]]])
     lower, upper = CAPPED.bounds(speeds)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from flex_planner.arms.arm_files import load_arm
-from flex_planner.base.paths import file_stem
+from flex_planner.arms.arm_files import ArmFileError, load_arm, read_arm_template
+from flex_planner.base.paths import expand_path, file_stem, STANDARD_INPUT
+from flex_planner.base.text_files import say_file
 from flex_planner.base.validation import number
 from flex_planner.cli.options import (
     add_arm,
@@ -26,7 +27,10 @@ def add_command(commands: Commands) -> None:
     """Add ``flex-planner arm``."""
     parser = commands.add_parser('arm',
                                  help='print the properties of an arm, draw its mode shapes')
-    add_arm(parser)
+    add_arm(parser, optional=True)
+    parser.add_argument('--template', nargs='?', const='-', metavar='FILE',
+                        help='write an arm file with comments to start from, into a new file or '
+                        'to the standard output')
     parser.add_argument('--payload', type=number_argument, default=0.0, metavar='KG',
                         help='mass at the tip (default: 0)')
     parser.add_argument('--posture', action='append', metavar='DEG,DEG,...',
@@ -39,8 +43,31 @@ def add_command(commands: Commands) -> None:
     parser.set_defaults(run=_run)
 
 
+def _write_template(options: argparse.Namespace) -> int:
+    """Write a file to start from; never over another one."""
+    if options.arm is not None:
+        raise ArmFileError(f'--template describes no arm: leave out {options.arm}')
+    text = read_arm_template()
+    if options.template == STANDARD_INPUT:
+        print(text, end='', flush=True)
+        return 0
+    path = expand_path(options.template)
+    try:
+        with path.open('x', encoding='utf-8') as file:
+            file.write(text)
+    except OSError as error:
+        raise ArmFileError(f'{say_file(path)} cannot be written: {error.strerror}') from None
+    print(f'wrote {say_file(path)}: see what it says with flex-planner arm {say_file(path)}')
+    return 0
+
+
 def _run(options: argparse.Namespace) -> int:
-    """Print an arm's properties and draw its mode shapes."""
+    """Print an arm's properties and draw its mode shapes, or write a template."""
+    if options.template is not None:
+        return _write_template(options)
+    if options.arm is None:
+        raise ArmFileError('no arm is given: name a file or a preset, or write a file to start '
+                           'from with --template FILE')
     arm = load_arm(options.arm)
     payload = number('--payload', options.payload, at_least=0, at_most=MAX_PAYLOAD, unit='kg')
     postures = ([angles('--posture', text, arm.n_joints) for text in options.posture]
