@@ -85,8 +85,14 @@ def test_frequencies_are_roots_of_transfer_matrices(seed: int) -> None:
         assert found == pytest.approx(root, rel=1e-10)
 
 
-def test_hub_and_rigid_tip_are_a_short_cantilever_on_an_arm() -> None:
-    # without mass in the hub, a hub moves no mode; a rigid tip is a load off the flexible end
+def test_steps_tend_to_a_wedge() -> None:
+    # of constant width and a depth that falls to 0 (Kirchhoff 1879): 5.315 sqrt(EI / (rho L^4))
+    coarse, fine = (frequencies([(1 / k, x, x**3) for x in 1 - (np.arange(k) + 0.5) / k], 1)[0]
+                    for k in (16, 32))
+    assert fine + (fine - coarse) / 3 == pytest.approx(5.315, rel=5e-4)  # errors of second order
+
+
+def test_hub_without_mass_leaves_a_short_cantilever() -> None:
     hub = frequencies([(0.4, 0.0, math.inf), (0.6, 1 / 0.6, 1.0)], 3)
     bare = frequencies([(1.0, 1.0, 1.0)], 3)
     # EI / (rho l^4) of the flexible length with all of the mass

@@ -289,6 +289,22 @@ def test_payloads_that_ipopt_finds_are_not_excluded(task: Task, close: float) ->
     assert 0.2 * task.duration < bound_duration(heavy) < task.duration
 
 
+def test_duration_that_ipopt_finds_for_a_data_sheet_arm_is_nearly_its_bound() -> None:
+    motor = Motor(stall_torque=6.0, no_load_speed=5.0, max_torque=3.0, gear_ratio=50.0,
+                  rotor_inertia=5e-5)
+    body = Link(length=0.6, linear_density=2.0, center_of_mass=(0.2, 0.1), inertia=0.02)
+    arm = Arm(name='body', links=(body,), payload_com=[0.05, -0.1], joints=(
+        Joint(motor=motor, viscous_friction=0.1, coulomb_friction=0.3),))
+    problem = problem_of(Task(arm=arm, start_positions=[0.2], goal_positions=[1.4], duration=1.0,
+                              payload_mass=1.5))
+    direct = DirectProblem(problem.model, DirectSettings(intervals=24, degree=4, tolerance=1e-7))
+    found = direct.solve(problem.parameters, problem.start, problem.goal, 1.0,
+                         free=Free.DURATION, price=1e5)
+    assert found.converged
+    # what Coulomb friction takes from driving is not in the bound
+    assert 0.9 * found.duration < bound_duration(problem) <= found.duration
+
+
 def drawn_arm(rng: np.random.Generator) -> Arm:
     """Return an arm with some of everything."""
     flexible, n = rng.random() < 0.3, int(rng.integers(1, 5))
