@@ -9,6 +9,7 @@ the compiled functions stay in the user's cache folder.
 from __future__ import annotations
 
 from collections.abc import Callable
+import math
 import os
 from pathlib import Path
 from typing import Any
@@ -109,8 +110,10 @@ def crane_arm() -> Arm:
                   damping_ratio=0.02),
              Link(length=0.4, linear_density=2.5, flexural_rigidity=20.0, modes=1,
                   mode_family='clamped_free', damping_ratio=0.05))
-    joints = (Joint(motor=Motor(stall_torque=9.0, no_load_speed=4.0), viscous_friction=0.3),
-              Joint(motor=Motor(stall_torque=5.0, no_load_speed=6.0), viscous_friction=0.1))
+    joints = (Joint(motor=Motor(stall_torque=9.0, no_load_speed=4.0,
+                               max_torque=math.inf), viscous_friction=0.3),
+              Joint(motor=Motor(stall_torque=5.0, no_load_speed=6.0,
+                               max_torque=math.inf), viscous_friction=0.1))
     nodes = (Node(mass=2.0, inertia=0.05), Node(mass=1.5, inertia=0.02),
              Node(mass=0.4, inertia=0.01))
     return Arm(name='crane', links=links, joints=joints, nodes=nodes, gravity=[1.3, -9.81])

@@ -80,9 +80,9 @@ def test_cut_file_is_refused(tree: Tree, tmp_path: Path) -> None:
 
 def test_file_of_a_later_format_is_refused_saying_so(tmp_path: Path) -> None:
     with (tmp_path / 'later').open('wb') as file:
-        header = json.dumps({'format': 2, 'objects': [], 'root': None})
+        header = json.dumps({'format': 3, 'objects': [], 'root': None})
         np.savez(file, **{'values.json': np.array(header)})
-    with pytest.raises(ValueFileError, match='has format 2, but must have 1'):
+    with pytest.raises(ValueFileError, match='has format 3, but must have 2'):
         load_value(tmp_path / 'later', CLASSES)
 
 

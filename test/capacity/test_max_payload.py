@@ -48,7 +48,7 @@ def arm_with(arm: Arm, torques: tuple[float, float], no_load_speed: float = 3.5)
     """Return an arm of two joints with other motors."""
     speeds = [no_load_speed if math.isfinite(torque) else inf for torque in torques]
     return replace(arm, joints=tuple(
-        Joint(motor=Motor(stall_torque=torque, no_load_speed=speed))
+        Joint(motor=Motor(stall_torque=torque, no_load_speed=speed, max_torque=np.inf))
         for torque, speed in zip(torques, speeds, strict=True)))
 
 

@@ -32,7 +32,7 @@ def level_arm(name: str) -> Arm:
     lengths, densities, torques, speeds = _ARMS[name]
     links = tuple(Link(length=length, linear_density=density)
                   for length, density in zip(lengths, densities, strict=True))
-    motors = (Motor(stall_torque=torque, no_load_speed=speed)
+    motors = (Motor(stall_torque=torque, no_load_speed=speed, max_torque=np.inf)
               for torque, speed in zip(torques, speeds, strict=True))
     return Arm(name=name, links=links, joints=tuple(Joint(motor=motor) for motor in motors))
 
@@ -52,10 +52,11 @@ def lifting_task(**changes: Any) -> Task:
     links = (Link(length=0.7302003392335195, linear_density=4.493343913031948),
              Link(length=0.5468632067254429, linear_density=4.09960842732783, modes=2,
                   flexural_rigidity=131.91917826727652, mode_family='pinned_pinned'))
-    joints = (Joint(motor=Motor(stall_torque=87.42070393829658, no_load_speed=4.826830147200209),
+    joints = (Joint(motor=Motor(stall_torque=87.42070393829658, no_load_speed=4.826830147200209,
+                                max_torque=np.inf),
                     viscous_friction=0.3),
               Joint(motor=Motor(stall_torque=16.080724498187617,
-                                no_load_speed=6.565635894559151)))
+                                no_load_speed=6.565635894559151, max_torque=np.inf)))
     nodes = (Node(), Node(mass=0.24366808554040148, inertia=0.022349808628205688), Node())
     arm = Arm(name='G12', links=links, joints=joints, nodes=nodes, gravity=[0.0, -9.81])
     values: dict[str, Any] = {
