@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 import math
 
-from flex_planner.arms.arm import BeamSection, Link
+from flex_planner.arms.arm import Arm, BeamSection, Joint, Link
 from flex_planner.arms.beam_eigenmodes import TipLoad
 from flex_planner.arms.mode_shapes import LinkModes
 from flex_planner.arms.stepped_beam import Pieces, stepped_modes
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.validation import Array
+from flex_planner.simulation.mismatch import AS_GIVEN, Mismatch
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -83,8 +85,14 @@ def test_frequencies_are_roots_of_transfer_matrices(seed: int) -> None:
         assert found == pytest.approx(root, rel=1e-10)
 
 
-def test_hub_and_rigid_tip_are_a_short_cantilever_on_an_arm() -> None:
-    # without mass in the hub, a hub moves no mode; a rigid tip is a load off the flexible end
+def test_steps_tend_to_a_wedge() -> None:
+    # of constant width and a depth that falls to 0 (Kirchhoff 1879): 5.315 sqrt(EI / (rho L^4))
+    coarse, fine = (frequencies([(1 / k, x, x**3) for x in 1 - (np.arange(k) + 0.5) / k], 1)[0]
+                    for k in (16, 32))
+    assert fine + (fine - coarse) / 3 == pytest.approx(5.315, rel=5e-4)  # errors of second order
+
+
+def test_hub_without_mass_leaves_a_short_cantilever() -> None:
     hub = frequencies([(0.4, 0.0, math.inf), (0.6, 1 / 0.6, 1.0)], 3)
     bare = frequencies([(1.0, 1.0, 1.0)], 3)
     # EI / (rho l^4) of the flexible length with all of the mass
@@ -146,3 +154,23 @@ def test_shapes_have_the_mean_square_of_uniform_ones() -> None:
             x = LENGTH * (low + (high - low) * (points + 1) / 2)
             square += (high - low) / 2 * weights @ modes.shape(x)**2
         np.testing.assert_allclose(square, expected, rtol=1e-12)
+
+
+def test_further_modes_are_damped_as_the_last_and_end_where_there_are_none() -> None:
+    bending = replace(link((0.5, 1.5, 2.0), (0.5, 0.5, 1.0), modes=2), damping_ratio=(0.07, 0.03))
+    assert bending.with_more_modes(2).damping_ratio == (0.07, 0.03, 0.03, 0.03)
+    assert bending.with_modes(1).damping_ratio == (0.07,)
+    assert bending.with_modes(0).damping_ratios.size == 0
+    assert bending.with_more_modes(9).modes == 8
+    # a spring without mass that carries a rigid piece has two modes
+    spring = link((0.7, 0.0, 1.0), (0.3, 1 / 0.3, math.inf), modes=1)
+    assert spring.with_more_modes(3).modes == 2
+
+
+def test_simulated_arm_may_have_other_numbers_of_modes() -> None:
+    given = replace(link((0.5, 1.5, 2.0), (0.5, 0.5, 1.0), modes=2), damping_ratio=(0.07, 0.03))
+    arm = Arm(name='one', links=(given,), joints=(Joint(),))
+    for modes, ratios in ((AS_GIVEN, (0.07, 0.03)), (3, (0.07, 0.03, 0.03)), (0, 0.0)):
+        changed = Mismatch(modes=modes, rigidity_scale=2.0).apply(arm).links[0]
+        assert (changed.damping_ratio, changed.flexural_rigidity) == (ratios, 2.0)
+        assert changed.sections == given.sections

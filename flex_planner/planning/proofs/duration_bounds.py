@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import product
 
 from flex_planner.base.validation import Array
-from flex_planner.dynamics.rigid_inertia import largest_form
+from flex_planner.dynamics.rigid_inertia import largest_form, RigidInertia
 from flex_planner.planning.proofs.energy_growth import EnergyGrowth, EnergyLimits
 from flex_planner.planning.proofs.motion_facts import MotionFacts
 import numpy as np
@@ -96,7 +96,8 @@ def energy_limits(facts: MotionFacts, payload: float, duration: float,
 
     The power of driving motors, ``sum K_1 |w| - D w^2``, with kinetic energy E or less, is at
     most ``slope E + k^T (slope M / 2 + D)^-1 k / 4`` for every slope, some signs k of K_1 and
-    some posture. When they brake, D has the other sign, and Coulomb friction adds to K_1.
+    some posture; with caps in the place of K_1, D is friction alone. When they brake, D has the
+    other sign, and Coulomb friction adds to K_1.
 
     Parameters
     ----------
@@ -114,14 +115,16 @@ def energy_limits(facts: MotionFacts, payload: float, duration: float,
     sets = inertia.lower_bounds(facts.stall)
     signs = np.array(list(product((1.0, -1.0), repeat=facts.stall.size - 1)))
     signs = np.hstack([np.ones((len(signs), 1)), signs])
-    # with less slope than that, braking grows faster than the energy lets it
-    drained = 2 * float(facts.drag @ inertia.joint_mobilities)
     slopes = _SLOPES / duration
     driving = _growth(sets, drag, signs * facts.stall, slopes)
+    if (facts.caps < facts.stall).any():
+        driving = _growth(sets, np.diag(facts.friction), signs * facts.caps, slopes, driving)
     ends = [facts.end_energy(facts.problem.start)]
     braking = EnergyGrowth.below(np.zeros(0), np.zeros(0))
     if facts.stops:
-        braking = _growth(sets, -drag, signs * facts.held, slopes + drained)
+        braking = _braking(facts, inertia, sets, signs, slopes)
+        if not heavier:  # the speed at which caps end may be less of a speed for them
+            braking = _braking_below_caps(facts, inertia, sets, signs, slopes, braking)
         ends.append(facts.end_energy(facts.problem.goal))
     if np.isfinite(facts.power):
         driving = EnergyGrowth.below(np.append(driving.slopes, 0.0),
@@ -131,11 +134,45 @@ def energy_limits(facts: MotionFacts, payload: float, duration: float,
     return EnergyLimits(driving, braking, energies[0], energies[1] if facts.stops else 0.0)
 
 
-def _growth(sets: tuple[Array, ...], drag: Array, torques: Array, slopes: Array) -> EnergyGrowth:
-    """Return the bound of growth by lines of these slopes."""
+def _braking(facts: MotionFacts, inertia: RigidInertia, sets: tuple[Array, ...], signs: Array,
+             slopes: Array) -> EnergyGrowth:
+    """Return how fast energy is taken out on the motors' lines."""
+    # with less slope than that, braking grows faster than the energy lets it
+    drained = 2 * float(facts.drag @ inertia.joint_mobilities)
+    return _growth(sets, -np.diag(facts.drag), signs * facts.held, slopes + drained)
+
+
+def _braking_below_caps(facts: MotionFacts, inertia: RigidInertia, sets: tuple[Array, ...],
+                        signs: Array, slopes: Array, lines: EnergyGrowth) -> EnergyGrowth:
+    """
+    Return how fast energy is taken out where motors brake with no more than their caps.
+
+    A motor that is driven faster than ``(K_1 + cap) / K_2`` brakes with more. With so little
+    energy that none is, the bounds of caps and lines hold both.
+
+    """
+    limits = facts.problem.parameters.torque_limits
+    some = limits.capped
+    if not some.any():
+        return lines
+    drag = np.where(some, facts.friction, facts.drag)
+    held = np.where(some, limits.cap, facts.stall) + facts.held - facts.stall
+    mobilities = inertia.joint_mobilities
+    drained = 2 * float(drag @ mobilities)
+    caps = _growth(sets, -np.diag(drag), signs * held, slopes + drained, lines)
+    fastest = (facts.stall + limits.cap)[some] / limits.slope[some]
+    return caps.until(float((fastest**2 / (2 * mobilities[some])).min()), lines)
+
+
+def _growth(sets: tuple[Array, ...], drag: Array, torques: Array, slopes: Array,
+            other: EnergyGrowth | None = None) -> EnergyGrowth:
+    """Return the bound of growth by lines of these slopes, and by those of another bound."""
     steep = slopes[:, None, None, None]
     scaled = tuple(steep / 2 * matrices + drag for matrices in sets)
-    return EnergyGrowth.below(slopes, largest_form(scaled, torques).max(-1) / 4)
+    offsets = largest_form(scaled, torques).max(-1) / 4
+    if other is None:
+        return EnergyGrowth.below(slopes, offsets)
+    return EnergyGrowth.below(np.append(other.slopes, slopes), np.append(other.offsets, offsets))
 
 
 def _requirements(facts: MotionFacts, limits: EnergyLimits,

@@ -14,7 +14,7 @@ _SMALL = 1e-4
 @dataclass(frozen=True, slots=True, eq=False)
 class EnergyGrowth:
     """
-    A bound of the rate at which an energy grows, concave and piecewise linear.
+    A bound of the rate at which an energy grows, piecewise linear.
 
     ``E' <= slope E + offset`` on each piece, so that time and way are integrals in closed form.
 
@@ -54,6 +54,15 @@ class EnergyGrowth:
                 kept.append(int(line))
                 starts.append(start)
         return cls(np.array([*starts, np.inf]), slopes[kept], offsets[kept])
+
+    def until(self, energy: float, beyond: EnergyGrowth) -> EnergyGrowth:
+        """Return this bound below an energy [J], and another one beyond it."""
+        pieces = int(np.searchsorted(self.edges[:-1], energy))
+        after = max(int(np.searchsorted(beyond.edges, energy, side='right')) - 1, 0)
+        return EnergyGrowth(
+            np.concatenate([self.edges[:pieces], [energy], beyond.edges[after + 1:]]),
+            np.concatenate([self.slopes[:pieces], beyond.slopes[after:]]),
+            np.concatenate([self.offsets[:pieces], beyond.offsets[after:]]))
 
     def time(self, energies: Array, begin: float) -> Array:
         """Return the time that growth from `begin` to energies (m,) takes at least [s]."""

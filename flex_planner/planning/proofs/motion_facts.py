@@ -71,6 +71,8 @@ class MotionFacts:
         K_1 [N m], and K_2 with the viscous friction of the joint [N m s/rad].
     held : numpy.ndarray, shape (n,)
         K_1 with the Coulomb friction of the joint, which helps motors that brake [N m].
+    caps, friction : numpy.ndarray, shape (n,)
+        The most torque that drives at any speed [N m], and viscous friction [N m s/rad].
     power : float
         What the motors can give at most, less what friction takes [W]; infinite without a
         no-load speed and without friction.
@@ -88,19 +90,34 @@ class MotionFacts:
     def __init__(self, problem: MotionProblem) -> None:
         self.problem, self.arm = problem, problem.model.arm
         given, n_t = problem.parameters, self.arm.n_coordinates
-        friction = np.array([joint.viscous_friction for joint in self.arm.joints])
+        self.friction = np.array([joint.viscous_friction for joint in self.arm.joints])
         # of the line, which a cap only makes narrower
-        self.stall, self.drag = given.stall_torque, given.torque_slope + friction
+        self.stall, self.drag = given.stall_torque, given.torque_slope + self.friction
         self.held = self.stall + given.coulomb_friction
+        # of driving motors alone: one that is driven far beyond its line brakes with more
+        self.caps = given.torque_limits.standstill
         self.limited = bool(np.isfinite(self.stall).all())
-        # K_1 |w| - drag w^2 is largest at half the speed where it vanishes
-        self.power = float((self.stall**2 / (4 * self.drag)).sum()) if (
-            self.limited and self.drag.all()) else np.inf
+        self.power = self._largest_power() if self.limited and self.drag.all() else np.inf
         self.rigid, self.weightless = not self.arm.n_passive, not self.arm.gravity.any()
         hard = np.isinf(problem.goal_weights)
         self.hard_joints = hard[:self.arm.n_joints]
         self.reaches = bool(hard[:n_t].all())
         self.stops = self.reaches and bool(hard[n_t:].all())
+
+    def _largest_power(self) -> float:
+        """Return the sum over motors of the largest power on the line and below the cap [W]."""
+        # K_1 |w| - drag w^2 is largest at half the speed where it vanishes
+        speeds = self.stall / (2 * self.drag)
+        power = self.stall * speeds / 2
+        # there or faster, where the cap leaves what the line gives
+        slope = self.drag - self.friction
+        capped = self.stall - slope * speeds > self.caps
+        if capped.any():
+            free = np.minimum((self.stall - self.caps)[capped] / slope[capped], np.divide(
+                self.caps[capped], 2 * self.friction[capped], where=self.friction[capped] > 0,
+                out=np.full(int(capped.sum()), np.inf)))
+            power[capped] = (self.caps[capped] - self.friction[capped] * free) * free
+        return float(power.sum())
 
     @property
     def knows_energies(self) -> bool:

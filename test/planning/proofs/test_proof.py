@@ -41,15 +41,17 @@ def problem_of(task: Task) -> MotionProblem:
 
 
 def with_motor(task: Task, friction: float = 0.0, **motor: float) -> Task:
-    joints = tuple(Joint(motor=Motor(**{'stall_torque': 2.0, **motor}), viscous_friction=friction)
+    """Return a task with motors that are limited by a line alone, unless they have a cap."""
+    limits = {'stall_torque': 2.0, 'max_torque': inf, **motor}
+    joints = tuple(Joint(motor=Motor(**limits), viscous_friction=friction)
                    for _ in task.arm.joints)
     return replace(task, arm=replace(task.arm, joints=joints))
 
 
 def two_links(**changes: Any) -> Task:
     links = (Link(length=0.6, linear_density=4.0), Link(length=0.4, linear_density=3.0))
-    joints = (Joint(motor=Motor(stall_torque=9.0, no_load_speed=5.0)),
-              Joint(motor=Motor(stall_torque=4.0, no_load_speed=6.0)))
+    joints = (Joint(motor=Motor(stall_torque=9.0, no_load_speed=5.0, max_torque=inf)),
+              Joint(motor=Motor(stall_torque=4.0, no_load_speed=6.0, max_torque=inf)))
     values: dict[str, Any] = {'start_positions': [0.2, 1.0], 'goal_positions': [1.4, -0.6],
                               'duration': 0.9, 'payload_mass': 1.5}
     return Task(arm=Arm(name='two', links=links, joints=joints), **{**values, **changes})
@@ -88,6 +90,43 @@ def test_bounds_of_one_link_are_nearly_what_it_can_do(slope: float, friction: fl
     assert found.payload >= payload
     if close > 0.9:
         assert found.payload <= payload + 0.03 * (1 + payload)
+
+
+@pytest.mark.parametrize('slope', [0.7, 2.0])
+def test_bounds_of_a_capped_motor_are_nearly_what_it_can_do(slope: float) -> None:
+    # driven on its line, K_1 - K_2 w, and braked by its cap K_1; M = 1 kg m^2
+    task, end = with_motor(one_link(1.0), no_load_speed=2 / slope, max_torque=2.0), 2.0 / slope
+
+    def way(share: float) -> float:
+        return end / slope * (-math.log1p(-share) - share) + (share * end)**2 / 4
+
+    share = brentq(lambda share: way(share) - 0.5, 0, 1 - 1e-15)
+    exact = -math.log1p(-share) / slope + share * end / 2
+    uncapped = with_motor(task, no_load_speed=end)
+    assert bound_duration(problem_of(uncapped)) < bound_duration(problem_of(task)) <= exact
+    assert bound_duration(problem_of(task)) > 0.97 * exact
+
+
+def test_motor_that_is_driven_far_beyond_its_line_brakes_with_more_than_its_cap() -> None:
+    # from 20 rad/s: w' = 2 - 2 w down to 2 rad/s, where that is the cap, then w' = -2
+    task = with_motor(one_link(1.0), no_load_speed=1.0, max_torque=2.0)
+    seconds = math.log(19) / 2 + 1
+    ends = [0.1 + math.log(19) / 2 + 9 + 1]
+    braked = replace(task, start_velocities=[20.0], goal_positions=ends)
+    assert 0.3 * seconds < bound_duration(problem_of(braked)) <= seconds
+
+
+def test_cap_below_the_line_bounds_power_and_drive() -> None:
+    task = with_motor(one_link(1.0), no_load_speed=40.0, max_torque=0.5)
+    # far from the knee of the line the cap is all: 0.5 N m there and back
+    exact = 2 * math.sqrt(0.5 / 0.5)
+    assert 0.98 * exact < bound_duration(problem_of(task)) <= exact
+    # 2 N m at standstill, -0.05 N m s: 0.5 N m up to 30 rad/s
+    assert MotionFacts(problem_of(task)).power == pytest.approx(15.0, rel=1e-12)
+    slow = with_motor(task, no_load_speed=40.0, max_torque=1.5)
+    assert MotionFacts(problem_of(slow)).power == pytest.approx(2.0 * 40 / 4, rel=1e-12)
+    rubbed = with_motor(task, 0.01, no_load_speed=40.0, max_torque=0.5)
+    assert MotionFacts(problem_of(rubbed)).power == pytest.approx(0.5**2 / 0.04, rel=1e-12)
 
 
 @pytest.mark.parametrize('payload', [0.0, 4.0])
@@ -250,6 +289,22 @@ def test_payloads_that_ipopt_finds_are_not_excluded(task: Task, close: float) ->
     assert 0.2 * task.duration < bound_duration(heavy) < task.duration
 
 
+def test_duration_that_ipopt_finds_for_a_data_sheet_arm_is_nearly_its_bound() -> None:
+    motor = Motor(stall_torque=6.0, no_load_speed=5.0, max_torque=3.0, gear_ratio=50.0,
+                  rotor_inertia=5e-5)
+    body = Link(length=0.6, linear_density=2.0, center_of_mass=(0.2, 0.1), inertia=0.02)
+    arm = Arm(name='body', links=(body,), payload_com=[0.05, -0.1], joints=(
+        Joint(motor=motor, viscous_friction=0.1, coulomb_friction=0.3),))
+    problem = problem_of(Task(arm=arm, start_positions=[0.2], goal_positions=[1.4], duration=1.0,
+                              payload_mass=1.5))
+    direct = DirectProblem(problem.model, DirectSettings(intervals=24, degree=4, tolerance=1e-7))
+    found = direct.solve(problem.parameters, problem.start, problem.goal, 1.0,
+                         free=Free.DURATION, price=1e5)
+    assert found.converged
+    # what Coulomb friction takes from driving is not in the bound
+    assert 0.9 * found.duration < bound_duration(problem) <= found.duration
+
+
 def drawn_arm(rng: np.random.Generator) -> Arm:
     """Return an arm with some of everything."""
     flexible, n = rng.random() < 0.3, int(rng.integers(1, 5))
@@ -273,10 +328,11 @@ def drawn_data_sheet(rng: np.random.Generator) -> Arm:
     """Return such an arm with some of everything that data sheets have."""
     arm, elastic = drawn_arm(rng), rng.random() < 0.2
     joints = tuple(replace(
-        joint, motor=replace(joint.motor, gear_ratio=50,
+        joint, motor=replace(joint.motor, gear_ratio=50, max_torque=rng.choice(
+            [inf, joint.motor.stall_torque * rng.uniform(0.2, 1.2)]),
                              rotor_inertia=1e-4 * max(elastic, rng.integers(2))),
         coulomb_friction=float(rng.choice([0.0, 0.4])), housing=Node(mass=1.0, inertia=0.02),
-        elasticity=Elasticity(stiffness=80.0, damping=0.1) if elastic else None)
+        elasticity=Elasticity(stiffness=800.0, damping=0.1) if elastic else None)
         for joint in arm.joints)
     halves = BeamSection(share=0.5, density=1.5), BeamSection(share=0.5, density=0.5,
                                                               rigidity=0.4)
@@ -291,15 +347,16 @@ def drive(task: Task, rng: np.random.Generator) -> tuple[Array, float]:
     """Return the state after a motion with motors on their limits, and its duration."""
     problem, model = problem_of(task), LightModel(task.arm)
     n, n_t = task.arm.n_joints, task.arm.n_coordinates
-    stall, slope = problem.parameters.stall_torque, problem.parameters.torque_slope
+    limits = problem.parameters.torque_limits
+    stall = limits.standstill
     rate, x = model.state_rate(problem.p), problem.start.copy()
     inertia = np.diag(model.mass_and_energy(x[None], problem.p)[0][0])[:n]
     duration = float(np.sqrt((inertia / stall).mean()) * 10**rng.uniform(-0.8, 0.0))
     signs, turn = rng.choice([-1.0, 1.0], n), rng.uniform(0.4, 0.9)
     for sign, part in ((1.0, turn), (-1.0, 1 - turn)):
-        x = solve_ivp(lambda t, state, side=sign * signs * stall: rate(
-            state, side - slope * state[n_t:n_t + n]), (0, part * duration), x, method='LSODA',
-            rtol=1e-9, atol=1e-9).y[:, -1]
+        x = solve_ivp(lambda t, state, side=sign * signs * inf: rate(
+            state, limits.bound(side, state[n_t:n_t + n])), (0, part * duration), x,
+            method='LSODA', rtol=1e-9, atol=1e-9).y[:, -1]
     return x, duration
 
 
