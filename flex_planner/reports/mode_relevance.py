@@ -40,7 +40,7 @@ def find_bending(dynamics: ArmDynamics, posture: Array,
     frequencies : numpy.ndarray, shape (n_f,)
         Joints locked [rad/s].
     bending : numpy.ndarray, shape (n_f, durations)
-        Of the tip, for each of `DURATIONS` [m].
+        Of the tip, for each of `DURATIONS` [m]; infinite where a posture is unstable.
 
     Raises
     ------
@@ -54,7 +54,10 @@ def find_bending(dynamics: ArmDynamics, posture: Array,
     x = np.concatenate([rest, np.zeros_like(rest)])[None]
     mass = dynamics.mass_and_energy(x, parameters.physical)[0][0]
     # each joint drives by its own sign: the worst of them
-    driven = np.abs(vectors.T @ mass[n:, :n]).sum(axis=1) / frequencies**2
+    driven = np.abs(vectors.T @ mass[n:, :n]).sum(axis=1)
+    # what has no frequency of its own gives way without end
+    driven = np.divide(driven, frequencies**2, out=np.full(driven.shape, np.inf),
+                       where=frequencies > 0)
     moved = np.linalg.norm(tip_jacobian(dynamics.arm, rest)[:, n:] @ vectors, axis=0)
     moved = np.maximum(moved, _deepest(dynamics, vectors))
     return frequencies, np.outer(driven * moved, _PEAK / np.square(DURATIONS))
