@@ -110,10 +110,10 @@ def crane_arm() -> Arm:
                   damping_ratio=0.02),
              Link(length=0.4, linear_density=2.5, flexural_rigidity=20.0, modes=1,
                   mode_family='clamped_free', damping_ratio=0.05))
-    joints = (Joint(motor=Motor(stall_torque=9.0, no_load_speed=4.0,
-                               max_torque=math.inf), viscous_friction=0.3),
-              Joint(motor=Motor(stall_torque=5.0, no_load_speed=6.0,
-                               max_torque=math.inf), viscous_friction=0.1))
+    motors = (Motor(stall_torque=9.0, no_load_speed=4.0, max_torque=math.inf),
+              Motor(stall_torque=5.0, no_load_speed=6.0, max_torque=math.inf))
+    joints = tuple(Joint(motor=motor, viscous_friction=friction)
+                   for motor, friction in zip(motors, (0.3, 0.1), strict=True))
     nodes = (Node(mass=2.0, inertia=0.05), Node(mass=1.5, inertia=0.02),
              Node(mass=0.4, inertia=0.01))
     return Arm(name='crane', links=links, joints=joints, nodes=nodes, gravity=[1.3, -9.81])

@@ -75,8 +75,8 @@ def test_bounds_fall_with_the_speed_from_the_stall_torque_to_none_at_the_no_load
 
 
 def test_line_that_does_not_fall_is_a_cap(workshop_arm: Arm) -> None:
-    motors = (Motor(stall_torque=3.0), Motor(max_torque=2.0), Motor(stall_torque=3.0,
-                                                                   max_torque=2.0), Motor())
+    motors = (Motor(stall_torque=3.0), Motor(max_torque=2.0),
+              Motor(stall_torque=3.0, max_torque=2.0), Motor())
     limits = TorqueLimits.of(Arm(
         name='four', links=workshop_arm.links[:1] * 4,
         joints=tuple(Joint(motor=motor) for motor in motors)))
