@@ -35,7 +35,8 @@ def random_task(seed: int, *, links: int = 2, gravity: bool = False) -> Task:
         name=f'random {seed}', gravity=[0.0, -_GRAVITY * gravity],
         links=tuple(Link(length=float(length), linear_density=float(density))
                     for length, density in zip(lengths, densities, strict=True)),
-        joints=tuple(Joint(motor=Motor(stall_torque=float(torque), no_load_speed=float(speed)))
+        joints=tuple(Joint(motor=Motor(stall_torque=float(torque), no_load_speed=float(speed),
+                                       max_torque=np.inf))
                      for torque, speed in zip(stall, speeds, strict=True)))
     return Task(arm=arm, start_positions=start, goal_positions=goal,
                 duration=float(quickest * draw.uniform(*_SLACKS)), effort_weights=1 / stall**2)
