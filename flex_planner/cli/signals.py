@@ -114,8 +114,15 @@ class CommandSignals:
         return self.exit_code
 
     def ending(self, code: int) -> None:
-        """Let a signal end the process at once from now on, with the code that it has anyway."""
+        """
+        Let Ctrl-C change the exit code no more; other signals end the process at once.
+
+        Python itself would let Ctrl-C kill it while it ends.
+
+        """
         self._leave = lambda: code
+        if self._before:
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
         self._before.clear()
 
     @contextmanager

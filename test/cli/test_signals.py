@@ -17,7 +17,7 @@ import pytest
 
 # a command that hangs while a module of it is loaded, or at work, and says when it does
 HANGING = """
-import signal, sys, time
+import os, signal, sys, time
 # as from a terminal: nohup and a shell's background jobs ignore some
 signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
@@ -45,6 +45,14 @@ def deaf():
     with SIGNALS.patient():
         clean_up()
 
+class Slow:  # to end
+    def __del__(self, say=os.write, wait=time.sleep):
+        say(1, b'ends\\n')
+        wait(0.3)
+
+if sys.argv[1] == 'end':
+    slow = Slow()
+    sys.exit(run_command(lambda: print('hangs', flush=True) or 0))
 if sys.argv[1] == 'imports':
     sys.meta_path.insert(0, Finder())
     sys.exit(main())
@@ -88,6 +96,16 @@ def test_command_ends_in_good_order(start: Callable[[str], subprocess.Popen[str]
         time.sleep(0.05)
     shown, errors = process.communicate(timeout=60)
     assert (process.returncode, errors, shown) == (code, f'flex-planner: {said}\n', out)
+
+
+def test_interrupt_while_python_ends_changes_nothing(
+        start: Callable[[str], subprocess.Popen[str]]) -> None:
+    process = start('end')
+    assert process.stdout is not None
+    assert process.stdout.readline() == 'ends\n'
+    process.send_signal(signal.SIGINT)
+    assert process.communicate(timeout=60) == ('', '')
+    assert process.returncode == 0
 
 
 def press() -> None:
