@@ -105,7 +105,8 @@ def _joints(draw: np.random.Generator, plain: Arm) -> tuple[Joint, ...]:
     if draw.random() < 0.15:
         motors = [Motor()] * mass.size
     else:
-        motors = [Motor(stall_torque=float(torque), no_load_speed=float(speed))
+        motors = [Motor(stall_torque=float(torque), no_load_speed=float(speed),
+                        max_torque=np.inf)
                   for torque, speed in zip(stall, speeds, strict=True)]
     friction = draw.uniform(0.0, 0.3, mass.size) * (draw.random() < 0.5)
     return tuple(Joint(motor=motor, viscous_friction=float(value))

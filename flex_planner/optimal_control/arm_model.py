@@ -17,7 +17,12 @@ from flex_planner.base.errors import InvalidTaskError
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.cache_key import cache_key, describe_fields, FREE_FIELDS
-from flex_planner.dynamics.compiled_functions import BatchFunction, load_functions
+from flex_planner.dynamics.compiled_functions import (
+    BatchFunction,
+    content_key,
+    load_functions,
+)
+from flex_planner.optimal_control.torque_limits import has_caps
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -78,7 +83,8 @@ class ArmModel(ArmDynamics):
                                      != describe_fields(arm, FREE_FIELDS)):
             raise InvalidTaskError(f'model is of another arm ({given.arm.name}) than the task '
                                    f'({arm.name})')
-        return given
+        # what is derived without caps would not keep them
+        return cls.of(arm) if has_caps(arm) and not has_caps(given.arm) else given
 
     def prepare(self) -> None:
         """Load the functions from disk, or compile them."""
@@ -110,7 +116,8 @@ class ArmModel(ArmDynamics):
     def _load_optimality(self, name: str) -> BatchFunction:
         """Return a function of the conditions; the first one brings all of their library."""
         if name not in self._loaded:
-            self._loaded |= load_functions(cache_key(self.arm, 'dynamics', 'optimal_control'),
+            key = cache_key(self.arm, 'dynamics', 'optimal_control')
+            self._loaded |= load_functions(content_key(key, 'caps') if has_caps(self.arm) else key,
                                            self._build_optimality)
         return self._loaded[name]
 

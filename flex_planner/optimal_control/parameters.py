@@ -116,13 +116,16 @@ class ParameterSymbols:
     ----------
     values : dict of str to casadi.SX
         By the names of the fields of `Parameters`.
+    capped : bool
+        Whether motors may have a cap.
 
     """
 
     values: dict[str, Any]
+    capped: bool = True
 
     @classmethod
-    def of(cls, chain: Chain) -> ParameterSymbols:
+    def of(cls, chain: Chain, *, capped: bool = True) -> ParameterSymbols:
         """Create the symbols; payload and stiffness are those of the chain."""
         n_t, n = chain.coordinates.numel(), chain.rigidity.numel()
         create = type(chain.coordinates).sym
@@ -131,7 +134,7 @@ class ParameterSymbols:
         own = {name: create(name, size) for name, size in sizes.items()}
         return cls({'payload_mass': chain.payload_mass, 'payload_inertia': chain.payload_inertia,
                     'rigidity': chain.rigidity, 'coulomb_friction': chain.coulomb_friction,
-                    'coulomb_speed': chain.coulomb_speed, **own})
+                    'coulomb_speed': chain.coulomb_speed, **own}, capped)
 
     def __getitem__(self, name: str) -> Any:
         return self.values[name]
@@ -139,7 +142,8 @@ class ParameterSymbols:
     @property
     def torque_limits(self) -> TorqueLimits:
         """Return the motors' limits: those of eq. (15), and caps."""
-        return TorqueLimits(self['stall_torque'], self['torque_slope'], self['max_torque'])
+        return TorqueLimits(self['stall_torque'], self['torque_slope'],
+                            self['max_torque'] if self.capped else None)
 
     def stack(self) -> list[Any]:
         """Return the symbols in the order of `Parameters.stack`."""

@@ -22,7 +22,7 @@ from flex_planner.dynamics.dynamics_functions import batch, BatchedFunction, sol
 from flex_planner.optimal_control.parameters import ParameterSymbols
 from flex_planner.optimal_control.rate_jacobian import RateJacobian
 from flex_planner.optimal_control.running_cost import running_cost
-from flex_planner.optimal_control.torque_limits import free_torque
+from flex_planner.optimal_control.torque_limits import free_torque, has_caps
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -82,7 +82,7 @@ def build_optimality_functions(arm: Arm) -> dict[str, BatchedFunction]:
 
     """
     chain = build_chain(arm)
-    symbols = ParameterSymbols.of(chain)
+    symbols = ParameterSymbols.of(chain, capped=has_caps(arm))
     found, p = derive_conditions(chain, symbols), ca.vertcat(*symbols.stack())
     z, F, share, payload = found.z, found.rate, found.payload_share, chain.payload_mass
     return {

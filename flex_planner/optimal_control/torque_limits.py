@@ -30,13 +30,14 @@ class TorqueLimits:
     slope : numpy.ndarray or casadi.SX, shape (n,)
         K_2, torque lost per speed [N m s/rad].
     cap : numpy.ndarray or casadi.SX, shape (n,)
-        Largest torque in either direction [N m]; infinite for none, which is eq. (15).
+        Largest torque in either direction [N m]; infinite for none, which is eq. (15). No symbol
+        where no motor has any: what is not derived takes no time.
 
     """
 
     stall: Any
     slope: Any
-    cap: Any
+    cap: Any = None
 
     @classmethod
     def of(cls, arm: Arm) -> TorqueLimits:
@@ -68,7 +69,9 @@ class TorqueLimits:
     def bounds(self, speeds: Any) -> tuple[Any, Any]:
         """Return the lower and the upper bound at joint speeds (..., n) [N m]."""
         lowest, highest = self.lines(speeds)
-        return (_within(-self.cap, lowest, highest), _within(self.cap, lowest, highest))
+        if self.cap is None:
+            return lowest, highest
+        return _within(-self.cap, lowest, highest), _within(self.cap, lowest, highest)
 
     def bound(self, free: Any, speeds: Any) -> Any:
         """Return the torque of eq. (14): that of eq. (13), within the bounds [N m]."""
@@ -119,6 +122,8 @@ class TorqueLimits:
 
     def _active_slope(self, free: Any, speeds: Any) -> Any:
         """Return K_2 where the nearer bound is on the line, 0 where it is a cap."""
+        if self.cap is None:
+            return self.slope
         (lowest, highest), (_, upper) = self.lines(speeds), self.bounds(speeds)
         if isinstance(upper, np.ndarray):
             nearer = np.where(free > upper, self.cap, -self.cap)
@@ -128,6 +133,11 @@ class TorqueLimits:
         cap = ca.SX(self.cap)
         bound = ca.if_else(free > upper, cap, -cap)
         return ca.if_else(ca.logic_and(lowest < bound, bound < highest), 0, self.slope)
+
+
+def has_caps(arm: Arm) -> bool:
+    """Return whether a motor of an arm has a cap besides its line."""
+    return bool(TorqueLimits.of(arm).capped.any())
 
 
 def _within(value: Any, lower: Any, upper: Any) -> Any:

@@ -30,8 +30,8 @@ def test_structured_jacobian_is_the_derivative_of_the_conditions(name: str | int
         p = Parameters(
             **coulomb_frictions(arm),
             payload_mass=1.3, payload_inertia=0.07, rigidity=arm.flexural_rigidities(),
-            stall_torque=rng.uniform(0.05, 3.0, n), torque_slope=rng.uniform(0.1, 0.5, n),
-            max_torque=rng.choice([np.inf, 1.0, 0.3], n),
+            stall_torque=10**rng.uniform(-1, 6, n), torque_slope=rng.uniform(0.1, 0.5, n),
+            max_torque=rng.choice([np.inf, 1e3, 1.0, 0.3], n),
             effort_weights=rng.uniform(0.5, 2.0, n), position_weights=rng.uniform(0, 1, n_t),
             velocity_weights=rng.uniform(0, 1, n_t))
         structured, plain, cut = (np.array(value) for value in function(z, p.stack()))
