@@ -176,7 +176,15 @@ def _static_deflection(arm: Arm, posture: Array, rest: Array) -> list[str]:
     most = (f'; link {bending.link + 1} bends by {bending.share:.2%} of its length'
             if _shown(bending.share) else '')
     return [f'  static deflection: tip {_shown(sag) * 1e3:.4g} mm, {sag / arm.reach:.2%} of the '
-            f'reach{most}']
+            f'reach{most}', *_modal_displacements(arm, rest)]
+
+
+def _modal_displacements(arm: Arm, rest: Array) -> list[str]:
+    """Return what gravity displaces modes and twists by."""
+    values = [f'{_shown(q) * 1e3:.3g}' for q in rest[arm.n_joints:]]
+    twists, modes = values[:len(arm.elastic_joints)], values[len(arm.elastic_joints):]
+    return [f'  {name} {", ".join(each)} {unit}' for name, each, unit in (
+        ('modes', modes, 'mm'), ('twists', twists, 'mrad')) if each]
 
 
 def _holding(arm: Arm, torque: Array) -> list[str]:

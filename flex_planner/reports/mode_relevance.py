@@ -84,7 +84,7 @@ def describe_relevance(dynamics: ArmDynamics, posture: Array,
     """Return the bending of each mode for durations, and which modes nobody would miss."""
     frequencies, bending = find_bending(dynamics, posture, parameters)
     heads = ''.join(f'{f"{duration:g} s":>10}' for duration in DURATIONS)
-    lines = ['bending by each mode, joints locked, when all joints turn by 1 rad in',
+    lines = ['bending by each mode with joints held, when all joints turn by 1 rad in',
              f'  {"":>12}{heads}']
     for frequency, row in zip(frequencies, bending, strict=True):
         cells = ''.join(f'{_millimetres(value):>10}' for value in row)

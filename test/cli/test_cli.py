@@ -45,7 +45,8 @@ def test_every_preset_is_described(capsys: pytest.CaptureFixture[str], name: str
     arm = load_arm(name)
     assert (code, err) == (0, '')
     assert out.startswith(f'{arm.name}\nsource: ')
-    total = sum(link.mass for link in arm.links) + sum(node.mass for node in arm.nodes)
+    total = (sum(link.mass for link in arm.links) + sum(node.mass for node in arm.nodes)
+             + sum(joint.housing.mass for joint in arm.joints[1:]))
     assert f'mass: {total:.4g} kg' in out
     assert 'payload 0.5 kg' in out
     assert f'{arm.n_joints} joints, {arm.n_modes} modal' in out

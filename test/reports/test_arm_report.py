@@ -113,5 +113,3 @@ def test_template_is_written_but_never_over_another_file(
     assert 'File exists' in capsys.readouterr().err
     assert main(['arm', '--template']) == 0
     assert capsys.readouterr().out == read_arm_template() == path.read_text()
-    assert main(['arm']) != 0
-    assert 'no arm is given' in capsys.readouterr().err

@@ -40,7 +40,7 @@ def add_command(commands: Commands) -> None:
                         help='picture of the mode shapes (default: DIR/<arm>_modes.png)')
     add_folder(parser)
     parser.add_argument('--no-plot', action='store_true', help='draw nothing')
-    parser.set_defaults(run=_run)
+    parser.set_defaults(run=lambda options: _run(parser, options))
 
 
 def _write_template(options: argparse.Namespace) -> int:
@@ -61,13 +61,12 @@ def _write_template(options: argparse.Namespace) -> int:
     return 0
 
 
-def _run(options: argparse.Namespace) -> int:
+def _run(parser: argparse.ArgumentParser, options: argparse.Namespace) -> int:
     """Print an arm's properties and draw its mode shapes, or write a template."""
     if options.template is not None:
         return _write_template(options)
     if options.arm is None:
-        raise ArmFileError('no arm is given: name a file or a preset, or write a file to start '
-                           'from with --template FILE')
+        parser.error('the following arguments are required: ARM, or --template')
     arm = load_arm(options.arm)
     payload = number('--payload', options.payload, at_least=0, at_most=MAX_PAYLOAD, unit='kg')
     postures = ([angles('--posture', text, arm.n_joints) for text in options.posture]
