@@ -67,7 +67,7 @@ def continue_in_price(parameter: FreeParameter, problem: MotionProblem,
         return
     here = Extremal(value=parameter.value(problem), result=first, problem=problem, price=price)
     factor = _FACTOR if problem.model.arm.n_passive else _LARGEST_FACTOR
-    jumps = _MOST_JUMPS
+    jumps, tried = _MOST_JUMPS, None
     while factor > _SMALLEST_FACTOR:
         solver.monitor.payload = here.problem.task.payload_mass
         try:
@@ -76,13 +76,13 @@ def continue_in_price(parameter: FreeParameter, problem: MotionProblem,
             extremal = None
         if extremal is None:
             factor **= 0.5
-            if factor >= _STALLED or not jumps:
+            if factor >= _STALLED or not jumps or tried is here:
                 continue
+            # a jump that fails may succeed from further on
             extremal = jump_in_price(parameter, here, target_gap, solver)
+            tried, jumps = here, jumps - 1
             if extremal is None:
-                jumps = 0
                 continue
-            jumps -= 1
         yield extremal
         if extremal.interrupted:
             return
