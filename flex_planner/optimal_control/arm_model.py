@@ -22,7 +22,7 @@ from flex_planner.dynamics.compiled_functions import (
     content_key,
     load_functions,
 )
-from flex_planner.optimal_control.torque_limits import has_caps
+from flex_planner.optimal_control.torque_limits import has_caps, TorqueLimits
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -83,8 +83,9 @@ class ArmModel(ArmDynamics):
                                      != describe_fields(arm, FREE_FIELDS)):
             raise InvalidTaskError(f'model is of another arm ({given.arm.name}) than the task '
                                    f'({arm.name})')
-        # what is derived without caps would not keep them
-        return cls.of(arm) if has_caps(arm) and not has_caps(given.arm) else given
+        # what is derived without the cap of a motor would not keep it
+        missed = TorqueLimits.of(arm).capped & ~TorqueLimits.of(given.arm).capped
+        return cls.of(arm) if missed.any() else given
 
     def prepare(self) -> None:
         """Load the functions from disk, or compile them."""

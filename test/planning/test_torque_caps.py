@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import load_arm
+from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectSettings
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import Plan
@@ -57,6 +58,15 @@ def test_cost_grows_with_the_payload_as_the_hamiltonian_says() -> None:
     share = plan.problem.model.controls(z, plan.problem.p).payload_share
     weights = (plan.solution.steps[:, None] * plan.solution.rule.weights).ravel()
     assert weights @ share == pytest.approx((around[1] - around[0]) / (2 * step), rel=1e-6)
+
+
+def test_model_without_the_cap_of_a_motor_is_not_used_for_it() -> None:
+    arm = capped('korayem_rigid', 4.5)
+    partly = replace(arm, joints=(arm.joints[0], capped('korayem_rigid', np.inf).joints[1]))
+    model, other = ArmModel.of(arm), ArmModel.of(partly)
+    assert ArmModel.for_arm(arm, other) is model
+    # caps that the task's motors do not have are infinite to it
+    assert ArmModel.for_arm(partly, model) is model
 
 
 def test_line_alone_is_capped_at_the_stall_torque_unless_it_says_unlimited() -> None:
