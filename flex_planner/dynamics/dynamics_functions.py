@@ -9,6 +9,7 @@ import casadi as ca
 from flex_planner.arms.arm import Arm
 from flex_planner.dynamics.build_chain import build_chain
 from flex_planner.dynamics.chain import Chain
+from flex_planner.dynamics.torque_bounds import clip, torque_bounds
 
 BatchedFunction = tuple[Any, int]
 """A CasADi function, and how many of its leading inputs differ from point to point."""
@@ -112,9 +113,8 @@ def _controlled_step(rate: Any, n: int) -> BatchedFunction:
     held += timing[1] * (sampled - held)
 
     def limited(at: Any, torque: Any, physical: Any) -> Any:
-        lost = loss * at[size // 2:size // 2 + n]
-        low, high = (ca.fmin(ca.fmax(bound, -stall - lost), stall - lost) for bound in (-cap, cap))
-        return rate(at, ca.fmin(ca.fmax(torque, low), high), physical)
+        speeds = at[size // 2:size // 2 + n]
+        return rate(at, clip(torque, *torque_bounds(stall, loss, cap, speeds)), physical)
 
     stages = [first + float(share) * (last - first) + held
               for share in DOP853.C[:DOP853.n_stages]]

@@ -12,16 +12,14 @@ from typing import Any
 
 from flex_planner.arms.arm import Arm
 from flex_planner.base.validation import Array
+from flex_planner.dynamics.torque_bounds import clip, line_bounds, torque_bounds
 import numpy as np
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TorqueLimits:
     """
-    Limits of D.C. motors: a line that falls with the speed, and a cap.
-
-    Beyond the speed at which even braking takes more than the cap, the line holds: a motor that is
-    driven so fast cannot do with less.
+    Limits of D.C. motors: a line that falls with the speed, and a cap, see `torque_bounds`.
 
     Parameters
     ----------
@@ -63,19 +61,15 @@ class TorqueLimits:
 
     def lines(self, speeds: Any) -> tuple[Any, Any]:
         """Return the bounds of eq. (15) at joint speeds (..., n) [N m]."""
-        lost = self.slope * speeds
-        return -self.stall - lost, self.stall - lost
+        return line_bounds(self.stall, self.slope, speeds)
 
     def bounds(self, speeds: Any) -> tuple[Any, Any]:
         """Return the lower and the upper bound at joint speeds (..., n) [N m]."""
-        lowest, highest = self.lines(speeds)
-        if self.cap is None:
-            return lowest, highest
-        return _within(-self.cap, lowest, highest), _within(self.cap, lowest, highest)
+        return torque_bounds(self.stall, self.slope, self.cap, speeds)
 
     def bound(self, free: Any, speeds: Any) -> Any:
         """Return the torque of eq. (14): that of eq. (13), within the bounds [N m]."""
-        return _within(free, *self.bounds(speeds))
+        return clip(free, *self.bounds(speeds))
 
     def toward(self, torque: Any, speeds: Any) -> Any:
         """Return the size of the bound in the direction of each torque (k, n) [N m]."""
@@ -91,13 +85,14 @@ class TorqueLimits:
 
         """
         lowest, highest = self.lines(speeds)
-        of_lines = np.minimum(free, self.cap) - highest, np.maximum(free, -self.cap) - lowest
         some = self.capped
         if not some.any():
-            return of_lines
-        cap = self.cap[some]
-        return (*of_lines, np.minimum(free, highest)[:, some] - cap,
-                np.maximum(free, lowest)[:, some] + cap)
+            return free - highest, free - lowest
+        within, cap = clip(free, -self.cap, self.cap), self.cap[some]
+        # a cap holds only between the lines
+        return (within - highest, within - lowest,
+                np.minimum(np.minimum(free, highest)[:, some] - cap, cap - lowest[:, some]),
+                np.maximum(np.maximum(free, lowest)[:, some] + cap, -cap - highest[:, some]))
 
     def multiplier(self, weights: Any, free: Any, speeds: Any) -> Any:
         """
@@ -138,15 +133,6 @@ class TorqueLimits:
 def has_caps(arm: Arm) -> bool:
     """Return whether a motor of an arm has a cap besides its line."""
     return bool(TorqueLimits.of(arm).capped.any())
-
-
-def _within(value: Any, lower: Any, upper: Any) -> Any:
-    """Return the nearest value between two, of arrays or symbols."""
-    if isinstance(lower, np.ndarray):
-        return np.minimum(np.maximum(value, lower), upper)
-    import casadi as ca
-
-    return ca.fmin(ca.fmax(value, lower), upper)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -114,6 +114,23 @@ def test_distances_tell_which_limit_holds(points: tuple[Array, Array]) -> None:
         assert held.any()
 
 
+def test_no_change_of_the_limit_that_holds_is_missed() -> None:
+    # random walks, also where a motor is driven so fast that the line takes over from the cap
+    rng = np.random.default_rng(4)
+    walk = np.cumsum(rng.normal(size=(20000, 2)), axis=0) * 0.3
+    speeds, free = 12 * np.sin(0.1 * walk), 30 * np.sin(0.07 * walk[::-1])
+    lowest, highest = CAPPED.lines(speeds)
+    torque, cap = CAPPED.bound(free, speeds), np.broadcast_to(CAPPED.cap, speeds.shape)
+    held = np.select([torque == free, torque == highest, torque == lowest, torque == cap],
+                     list(range(4)), 4)
+    signs = np.array(CAPPED.distances(free, speeds)) >= 0
+    changes = held[1:] != held[:-1]
+    assert (signs[:, 1:] != signs[:, :-1]).any(axis=0)[changes].all()
+    assert len(np.unique(held)) == 5 and changes.sum() > 500
+    driven = np.abs(speeds) > (CAPPED.stall + CAPPED.cap) / CAPPED.slope
+    assert changes[driven[1:] != driven[:-1]].any()
+
+
 @pytest.mark.parametrize('limits', [LIMITS, CAPPED], ids=['line', 'capped'])
 def test_multiplier_is_the_slope_of_the_hamiltonian_along_a_bound(
         points: tuple[Array, Array], limits: TorqueLimits) -> None:
