@@ -12,6 +12,8 @@ from flex_planner.arms.arm import Arm
 from flex_planner.base.validation import Array
 import numpy as np
 
+_STATIONS = 41
+
 
 def frame_angles(arm: Arm, coordinates: Array) -> Array:
     """
@@ -67,6 +69,26 @@ def link_points(arm: Arm, coordinates: Array, stations: int = 2) -> Array:
         base = base + np.stack([c * link.length - s * tip_bend,
                                 s * link.length + c * tip_bend], -1)
     return np.stack(points, axis=-3)
+
+
+def link_deflections(arm: Arm, index: int, vectors: Array) -> Array:
+    """
+    Return the deflections of a link's stations for modal displacements, shape (41, m) [m].
+
+    Parameters
+    ----------
+    arm : Arm
+        n_f coordinates without a motor.
+    index : int
+        Of the link, from 0.
+    vectors : numpy.ndarray, shape (n_f, m)
+        Columns are displacements of those coordinates.
+
+    """
+    link, part, n = arm.links[index], arm.modal_slices[index], arm.n_joints
+    shapes = link.mode_shapes().shape(np.linspace(0, link.length, _STATIONS, dtype=np.float64))
+    deflections: Array = shapes @ vectors[part.start - n:part.stop - n]
+    return deflections
 
 
 def tip_position(arm: Arm, coordinates: Array) -> Array:

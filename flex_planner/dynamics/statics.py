@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from flex_planner.arms.kinematics import link_deflections
 from flex_planner.base.errors import InvalidTaskError, NoEquilibriumError
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
@@ -10,7 +11,6 @@ import numpy as np
 
 _MAX_ITERATIONS = 50
 _LEAST_INERTIA = 1e-14  # of a motion relative to those of single coordinates; rounding is 1e-16
-_STATIONS = 41
 
 
 def equilibrium(dynamics: ArmDynamics, positions: Array,
@@ -154,17 +154,7 @@ def residual_vibration(dynamics: ArmDynamics, state: Array, rest: Array,
     amplitude = np.hypot(displacement, rate / frequencies)
     twisting = np.abs(vectors[:len(arm.elastic_joints)]) @ amplitude
     beyond = np.cumsum([link.length for link in reversed(arm.links)])[::-1]
-    away = [*(np.abs(_bending(dynamics, link, vectors)) @ amplitude
+    away = [*(np.abs(link_deflections(arm, link, vectors)) @ amplitude
               for link in range(n) if arm.links[link].modes),
             twisting * beyond[list(arm.elastic_joints)]]
     return float(np.concatenate(away).max())
-
-
-def _bending(dynamics: ArmDynamics, index: int, vectors: Array) -> Array:
-    """Return the deflections of a link's stations in each mode, shape (stations, n_f)."""
-    link, part = dynamics.arm.links[index], dynamics.arm.modal_slices[index]
-    stations = np.linspace(0, link.length, _STATIONS, dtype=float)
-    shapes = link.mode_shapes().shape(stations)
-    n = dynamics.arm.n_joints
-    bending: Array = shapes @ vectors[part.start - n:part.stop - n]
-    return bending

@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 from flex_planner.arms.arm import Arm
+from flex_planner.arms.kinematics import link_deflections
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.unbent_arm import bending_stiffness, free_vibrations, mass_matrix
 from flex_planner.optimal_control.task import Task
 import numpy as np
 from numpy.typing import NDArray
-
-_STATIONS = 41
 
 
 def estimate_left_out(task: Task, times: Array, weights: Array, torques: Array) -> float:
@@ -102,10 +101,6 @@ def _locked_deflection(arm: Arm, mass: Array, stiffness: Array, state: Array) ->
     rates, shapes = free_vibrations(mass[n:, n:], stiffness, 0)
     displacement = state[0, n:] @ mass[n:, n:] @ shapes
     rate = state[1] @ mass[:, n:] @ shapes
-    amplitude, largest = np.hypot(displacement, rate / rates), 0.0
-    for link, part in zip(arm.links, arm.modal_slices, strict=True):
-        stations = np.linspace(0, link.length, _STATIONS, dtype=np.float64)
-        modal = slice(part.start - arm.n_joints, part.stop - arm.n_joints)
-        bending = np.abs(link.mode_shapes().shape(stations) @ shapes[modal])
-        largest = max(largest, float((bending @ amplitude).max()))
-    return largest
+    amplitude = np.hypot(displacement, rate / rates)
+    return max(float((np.abs(link_deflections(arm, i, shapes)) @ amplitude).max())
+               for i in range(n))

@@ -164,7 +164,7 @@ def _describe_posture(model: ArmModel, posture: Array, parameters: Parameters) -
         lines.append(f'  natural frequencies, {label}: {_frequencies(frequencies)}')
     if arm.gravity.any():
         lines += [*_static_deflection(arm, posture, rest), *_holding(arm, torque),
-                  *_largest_payload(model, posture, parameters)]
+                  *_largest_payload(model, posture)]
     return lines
 
 
@@ -201,11 +201,11 @@ def _holding(arm: Arm, torque: Array) -> list[str]:
     return lines
 
 
-def _largest_payload(model: ArmModel, posture: Array, parameters: Parameters) -> list[str]:
-    """Return what the motors hold at a posture, if they do and it is known."""
+def _largest_payload(model: ArmModel, posture: Array) -> list[str]:
+    """Return what the motors hold at a posture, if they hold the arm and it is known."""
+    parameters = Parameters.of(model.arm)
     try:
-        task = Task(arm=model.arm, start_positions=posture, goal_positions=posture, duration=1.0,
-                    payload_mass=parameters.payload_mass)
+        task = Task(arm=model.arm, start_positions=posture, goal_positions=posture, duration=1.0)
         if (np.abs(rest_at_end(model, task, 'goal', parameters)[1])
                 > parameters.torque_limits.standstill).any():
             return []

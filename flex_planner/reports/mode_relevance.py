@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flex_planner.arms.kinematics import tip_jacobian
+from flex_planner.arms.kinematics import link_deflections, tip_jacobian
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.physical_parameters import PhysicalParameters
@@ -24,7 +24,8 @@ def find_bending(dynamics: ArmDynamics, posture: Array,
     Return how far each natural mode moves the tip when all joints turn by one radian.
 
     The joints accelerate at most as in the motion of least effort, and each mode gives way as a
-    spring does: a motion with jumps of its torque rings by as much again.
+    spring does, but no further than a mode that stays behind altogether. An estimate: a motion
+    with jumps of its torque rings by as much again.
 
     Parameters
     ----------
@@ -40,7 +41,7 @@ def find_bending(dynamics: ArmDynamics, posture: Array,
     frequencies : numpy.ndarray, shape (n_f,)
         Joints locked [rad/s].
     bending : numpy.ndarray, shape (n_f, durations)
-        Of the tip, for each of `DURATIONS` [m]; infinite where a posture is unstable.
+        Of the tip or, where that is more, of a link, for each of `DURATIONS` [m].
 
     Raises
     ------
@@ -48,30 +49,21 @@ def find_bending(dynamics: ArmDynamics, posture: Array,
         See `equilibrium` and `natural_modes`.
 
     """
-    n = dynamics.arm.n_joints
+    arm = dynamics.arm
+    n = arm.n_joints
     rest, _ = equilibrium(dynamics, posture, parameters)
     frequencies, vectors = natural_modes(dynamics, rest, parameters, locked=True)
     x = np.concatenate([rest, np.zeros_like(rest)])[None]
     mass = dynamics.mass_and_energy(x, parameters.physical)[0][0]
     # each joint drives by its own sign: the worst of them
-    driven = np.abs(vectors.T @ mass[n:, :n]).sum(axis=1)
-    # what has no frequency of its own gives way without end
-    driven = np.divide(driven, frequencies**2, out=np.full(driven.shape, np.inf),
-                       where=frequencies > 0)
-    moved = np.linalg.norm(tip_jacobian(dynamics.arm, rest)[:, n:] @ vectors, axis=0)
-    moved = np.maximum(moved, _deepest(dynamics, vectors))
-    return frequencies, np.outer(driven * moved, _PEAK / np.square(DURATIONS))
-
-
-def _deepest(dynamics: ArmDynamics, vectors: Array) -> Array:
-    """Return how far each mode bends links between their ends, shape (n_f,)."""
-    n, deepest = dynamics.arm.n_joints, np.zeros(vectors.shape[1])
-    for link, part in zip(dynamics.arm.links, dynamics.arm.modal_slices, strict=True):
-        if link.modes:
-            shapes = link.mode_shapes().shape(np.linspace(0, link.length, 21, dtype=float))
-            bends = np.abs(shapes @ vectors[part.start - n:part.stop - n]).max(axis=0)
-            deepest = np.maximum(deepest, bends)
-    return deepest
+    behind = np.abs(vectors.T @ mass[n:, :n]).sum(axis=1)
+    # what has no frequency of its own, or is unstable, stays behind
+    turns = np.outer(np.nan_to_num(frequencies), DURATIONS)
+    shares = _PEAK / np.maximum(turns**2, _PEAK)
+    moved = np.max([np.linalg.norm(tip_jacobian(arm, rest)[:, n:] @ vectors, axis=0),
+                    *(np.abs(link_deflections(arm, i, vectors)).max(axis=0) for i in range(n))],
+                   axis=0)
+    return frequencies, (behind * moved)[:, None] * shares
 
 
 def _millimetres(value: float) -> str:
@@ -83,11 +75,11 @@ def describe_relevance(dynamics: ArmDynamics, posture: Array,
                        parameters: PhysicalParameters) -> list[str]:
     """Return the bending of each mode for durations, and which modes nobody would miss."""
     frequencies, bending = find_bending(dynamics, posture, parameters)
-    heads = ''.join(f'{f"{duration:g} s":>10}' for duration in DURATIONS)
+    heads = ''.join(f'{f"{duration:g} s":>12}' for duration in DURATIONS)
     lines = ['bending by each mode with joints held, when all joints turn by 1 rad in',
              f'  {"":>12}{heads}']
     for frequency, row in zip(frequencies, bending, strict=True):
-        cells = ''.join(f'{_millimetres(value):>10}' for value in row)
+        cells = ''.join(f'{_millimetres(value):>12}' for value in row)
         lines.append(f'  {frequency / (2 * np.pi):>9.4g} Hz{cells}')
     needed = (bending >= _NEGLIGIBLE * dynamics.arm.reach).sum(axis=0)
     text = ', '.join(f'{count} in {duration:g} s'
