@@ -159,9 +159,21 @@ class Arm:
         return (np.array([joint.lower_limit for joint in self.joints]),
                 np.array([joint.upper_limit for joint in self.joints]))
 
+    def end_body(self, index: int) -> Node:
+        """
+        Return what turns with the end of a link: the housing of the next motor, or the last node.
+
+        It has the mass of the node at the next joint, too, whose inertia turns with the next link.
+
+        """
+        if index == self.n_joints - 1:
+            return self.nodes[-1]
+        housing = self.joints[index + 1].housing
+        return replace(housing, mass=self.nodes[index + 1].mass + housing.mass)
+
     def rigid(self) -> Arm:
         """Return the same arm with every link and joint rigid."""
-        stiff = replace(self.with_rigid_links(range(self.n_joints)), name=f'{self.name} (rigid)')
+        stiff = self.with_rigid_links(range(self.n_joints), f'{self.name} (rigid)')
         return replace(stiff, joints=tuple(replace(joint, elasticity=None)
                                            for joint in self.joints))
 

@@ -42,44 +42,26 @@ class Piece:
 def read_piece(section: YamlSection, bends: bool) -> Piece:
     """Return a piece of `length`; one that bends needs a rigidity unless it says ``rigid``."""
     length = read_quantity(section, 'length')
-    area, second_moment = _cross_section(section)
-    density = read_density(section, length, area)
-    rigid = section.flag('rigid', False)
-    rigidity = math.inf
-    if not rigid and (bends or gives_rigidity(section)):
-        rigidity = read_rigidity(section, second_moment)
+    piece = read_uniform(section, length, bends, rigid=section.flag('rigid', False))
     section.finish()
-    return Piece(length=length, linear_density=density, rigidity=rigidity)
+    return piece
 
 
-def read_uniform(section: YamlSection, length: float, bends: bool) -> Piece:
-    """Return the uniform part of a link, of a length that was read before."""
+def read_uniform(section: YamlSection, length: float, bends: bool, *,
+                 rigid: bool = False) -> Piece:
+    """Return a piece, or the uniform part of a link, of a length that was read before."""
     area, second_moment = _cross_section(section)
-    density = read_density(section, length, area)
-    rigidity = math.inf
-    if bends or gives_rigidity(section):
-        rigidity = read_rigidity(section, second_moment)
-    return Piece(length=length, linear_density=density, rigidity=rigidity)
-
-
-def gives_rigidity(section: YamlSection) -> bool:
-    """Return whether a file says how stiff a piece is."""
-    return section.has('flexural_rigidity') or section.has('youngs_modulus')
-
-
-def read_density(section: YamlSection, length: float, area: float) -> float:
-    """Return the mass per length of a piece [kg/m]."""
-    return _one_of(section, {
+    density = _one_of(section, {
         'linear_density': lambda value: value, 'mass': lambda value: value / length,
         'density': lambda value: value * area}, {'mass': 'length', 'density': 'section'})
-
-
-def read_rigidity(section: YamlSection, second_moment: float) -> float:
-    """Return E I of a piece [N m^2]."""
-    return _one_of(section, {
-        'flexural_rigidity': lambda value: value,
-        'youngs_modulus': lambda value: value * second_moment},
-        {'youngs_modulus': 'second moment of area'})
+    rigidity = math.inf
+    given = section.has('flexural_rigidity') or section.has('youngs_modulus')
+    if not rigid and (bends or given):
+        rigidity = _one_of(section, {
+            'flexural_rigidity': lambda value: value,
+            'youngs_modulus': lambda value: value * second_moment},
+            {'youngs_modulus': 'second moment of area'})
+    return Piece(length=length, linear_density=density, rigidity=rigidity)
 
 
 def join_pieces(section: YamlSection, pieces: list[Piece]) -> dict[str, Any]:

@@ -5,7 +5,7 @@ Knows a right-hand side, boundary rows and a mesh, and nothing of arms.
 
 """
 
-from flex_planner.collocation.gauss import GaussRule
+from flex_planner.collocation.gauss import differentiation_matrix, GaussRule
 from flex_planner.collocation.homotopy import follow_homotopy
 from flex_planner.collocation.problem import BoundaryValueProblem
 from flex_planner.collocation.result import (
@@ -20,4 +20,4 @@ from flex_planner.collocation.solver import Backend, Solver
 
 __all__ = ['INTERRUPTED', 'Backend', 'BoundaryValueProblem', 'CollocationResult',
            'CollocationSolution', 'GaussRule', 'Solver', 'SolverSettings', 'SolverStatus',
-           'follow_homotopy', 'solve']
+           'differentiation_matrix', 'follow_homotopy', 'solve']

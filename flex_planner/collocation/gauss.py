@@ -14,7 +14,7 @@ from functools import cache
 
 from flex_planner.base.validation import Array
 import numpy as np
-from numpy.polynomial import legendre
+from numpy.polynomial import chebyshev, legendre
 from numpy.typing import NDArray
 
 ComplexArray = NDArray[np.complex128]
@@ -111,6 +111,24 @@ class GaussRule:
         """Return the Lagrange polynomials at theta, shape (k, s)."""
         rate: Array = legendre.legvander(2 * theta - 1, self.stages - 1) @ self.transform
         return rate
+
+
+def differentiation_matrix(points: Array) -> Array:
+    """
+    Return the matrix from values of a polynomial at points to its derivatives there.
+
+    Parameters
+    ----------
+    points : numpy.ndarray, shape (k,)
+        Distinct, from 0 to 1.
+
+    """
+    at = 2 * points - 1  # where Chebyshev polynomials are well apart
+    values = chebyshev.chebvander(at, at.size - 1)
+    slopes = np.stack([chebyshev.chebval(at, chebyshev.chebder(row))
+                       for row in np.eye(at.size)])
+    matrix: Array = np.array(2 * np.linalg.solve(values.T, slopes).T, dtype=np.float64)
+    return matrix
 
 
 def _integrate_polynomials(x: Array, count: int) -> Array:

@@ -58,7 +58,7 @@ class RigidInertia:
             moment = complex(*link.first_moment)
             place = _point(n, i, moment / (link.mass * link.length))
             points += link.mass * np.outer(place.conj(), place)
-            points[i, i] += _mass_at_end(arm, i)
+            points[i, i] += arm.end_body(i).mass
             # about the centre of mass; less than none is rounding
             rotary[i] = arm.nodes[i].inertia + max(
                 link.rotary_inertia - abs(moment)**2 / link.mass, 0.0)
@@ -112,7 +112,7 @@ class RigidInertia:
         beyond, moments = 0.0, np.zeros(self.lengths.size)
         for i in reversed(range(self.lengths.size)):
             link = arm.links[i]
-            beyond += _mass_at_end(arm, i)
+            beyond += arm.end_body(i).mass
             moments[i] = (abs(complex(*link.first_moment) + beyond * link.length)
                           + payload_mass * self.lengths[i] * abs(
                               self.carried[i] if i == arm.n_joints - 1 else 1))
@@ -199,12 +199,6 @@ def _point(n: int, link: int, share: complex) -> Array:
     if link:
         weights[link - 1] = 1 - share
     return weights
-
-
-def _mass_at_end(arm: Arm, link: int) -> float:
-    """Return the mass of the node at the end of a link, and of the next motor there [kg]."""
-    last = link == arm.n_joints - 1
-    return arm.nodes[link + 1].mass + (0.0 if last else arm.joints[link + 1].housing.mass)
 
 
 def largest_form(sets: tuple[Array, ...], vectors: Array) -> Array:

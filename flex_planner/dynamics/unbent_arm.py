@@ -9,7 +9,7 @@ Neither gravity nor damping is in it.
 
 from __future__ import annotations
 
-from flex_planner.arms.arm import Arm, Link, Node
+from flex_planner.arms.arm import Arm, Link
 from flex_planner.base.validation import Array
 import numpy as np
 
@@ -56,18 +56,10 @@ def mass_matrix(arm: Arm, positions: Array, payload_mass: float,
         deflection, slope = np.zeros(n_t), np.zeros(n_t)
         deflection[modal], slope[modal] = shapes.tip_deflection, shapes.tip_slope
         base = base + np.outer(across, link.length * turning + deflection)
-        end, spin = _end_body(arm, i), turning + slope
+        end, spin = arm.end_body(i), turning + slope
         mass += end.mass * base.T @ base + end.inertia * np.outer(spin, spin)
     return mass + _payload_mass(arm, positions.sum(), base, turning + slope, payload_mass,
                                 payload_inertia)
-
-
-def _end_body(arm: Arm, index: int) -> Node:
-    """Return what is fixed to the tip of a link, with the mass at the next joint."""
-    if index == arm.n_joints - 1:
-        return arm.nodes[-1]
-    housing = arm.joints[index + 1].housing
-    return Node(mass=arm.nodes[index + 1].mass + housing.mass, inertia=housing.inertia)
 
 
 def _payload_mass(arm: Arm, angle: float, tip: Array, turning: Array, mass: float,

@@ -17,6 +17,7 @@ from flex_planner.base.validation import Array
 from flex_planner.collocation import (
     CollocationResult,
     CollocationSolution,
+    differentiation_matrix,
     Solver,
     SolverStatus,
 )
@@ -29,7 +30,6 @@ from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.verdict import judge
 from flex_planner.planning.warnings import PlanWarning, WarningKind
 import numpy as np
-from numpy.polynomial import polynomial
 from numpy.typing import NDArray
 
 Mask = NDArray[np.bool_]
@@ -194,7 +194,7 @@ class _Lift:
         z = self._widen(found.values_at(self._theta))
         shape = z.shape[:2]
         flat = self._bend(z.reshape(-1, 4 * n_t)).reshape(z.shape)
-        slope = _derivatives(self._theta)
+        slope = differentiation_matrix(self._theta)
         stiff = self._stiff
         flat[..., n_t + stiff] = self._rates(flat[..., stiff], slope)
         rate = self._problem.model.optimality(flat.reshape(-1, 4 * n_t), self._problem.p)
@@ -240,15 +240,6 @@ class _Lift:
         """Return the derivatives by time of values (N, k, m) at the same points."""
         rates: Array = (slope @ values) / self._found.steps[:, None, None]
         return rates
-
-
-def _derivatives(theta: Array) -> Array:
-    """Return the matrix from values at positions to derivatives there, through a polynomial."""
-    powers = polynomial.polyvander(theta, theta.size - 1)
-    slopes = np.zeros_like(powers)
-    slopes[:, 1:] = powers[:, :-1] * np.arange(1, theta.size)
-    matrix: Array = slopes @ np.linalg.inv(powers)
-    return matrix
 
 
 def _bends(problem: MotionProblem) -> Array:

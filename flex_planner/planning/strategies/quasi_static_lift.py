@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from flex_planner.base.validation import Array
-from flex_planner.collocation import CollocationSolution, GaussRule
+from flex_planner.collocation import CollocationSolution, differentiation_matrix, GaussRule
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem
 import numpy as np
@@ -85,13 +85,8 @@ class _Points:
     def of(cls, mesh: Array, rule: GaussRule) -> _Points:
         """Return those of a mesh."""
         shares = np.concatenate([[0.0], rule.nodes, [1.0]])
-        degree, chebyshev = shares.size - 1, np.polynomial.chebyshev
-        values = chebyshev.chebvander(2 * shares - 1, degree)
-        derivatives = np.stack([
-            chebyshev.chebval(2 * shares - 1, chebyshev.chebder(row))
-            for row in np.eye(shares.size)], axis=1)
-        slopes: Array = 2 * np.linalg.solve(values.T, derivatives.T).T
-        return cls(mesh, rule, mesh[:-1, None] + np.diff(mesh)[:, None] * shares, slopes)
+        return cls(mesh, rule, mesh[:-1, None] + np.diff(mesh)[:, None] * shares,
+                   differentiation_matrix(shares))
 
     def rates(self, values: Array) -> Array:
         """Return the rates of values (N (s + 2), m) at the points; one at both sides of a node."""
