@@ -130,7 +130,7 @@ def test_time_limit_is_kept(huge: MotionProblem) -> None:
 def test_helper_that_gives_up_is_kept(problem: MotionProblem,
                                       monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, '_PATIENCE', 10.0)  # on a busy machine
-    for helper in module._POOL.borrow(9, 0):  # which have served other tests
+    for helper in module._POOL.borrow(9, 0):  # several that wait take turns
         helper.end()
     before = solve_from(problem, 1)
     kept = module._POOL.borrow(9, 0)
