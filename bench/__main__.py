@@ -12,7 +12,7 @@ import subprocess
 import sys
 from typing import Any
 
-from bench import growth, model, payload, solver
+from bench import earlier, growth, model, payload, solver
 import numpy as np
 
 DOCS = Path(__file__).parents[1] / 'docs'
@@ -105,6 +105,25 @@ shortest duration with 1 kg takes {durations}.
 """
 
 
+EARLIER = """
+## The model and the lift against those before
+
+The same processor, interpreter and libraries, by turns, CPU time: the earlier version derives its
+equations from energies and lifts a rigid motion with straight links; this one takes virtual power,
+and bends the links by the forces of the rigid motion. The arms are presets; a *first build* is a
+fresh process, imports included, that finds no compiled functions, except for arms that share those
+of an arm above. Iterations are those of the strategy *rigid motion first* alone, the rigid motion
+included.
+
+{table}
+"""
+
+
+def measured_earlier() -> dict[str, object]:
+    """Measure the model and the lift against those of an earlier version."""
+    return {'earlier': earlier.measure()}
+
+
 def measured_payload() -> dict[str, object]:
     """Measure the searches for the largest payload and the shortest duration."""
     rows = [row for arm in payload.ARMS for row in payload.measure(arm)]
@@ -143,8 +162,13 @@ def text(figures: dict[str, Any]) -> str:
         versions=used) + SOLVER.format(
         table=solver.table([solver.Row(**row) for row in figures['solver']]), shares=shares,
         cold_1=cold_1, warm_1=warm_1, cold_2=cold_2, warm_2=warm_2, limit=growth.TIME_LIMIT,
-        growth=growth.table([growth.Growth(**row) for row in figures['growth']])) + payload_text(
-        figures)
+        growth=growth.table([growth.Growth(**row) for row in figures['growth']])) + (
+        payload_text(figures) + earlier_text(figures))
+
+
+def earlier_text(figures: dict[str, Any]) -> str:
+    """Return the part on the earlier version, once it was measured."""
+    return EARLIER.format(table=earlier.tables(figures['earlier'])) if 'earlier' in figures else ''
 
 
 def payload_text(figures: dict[str, Any]) -> str:
@@ -164,7 +188,8 @@ def main() -> None:
     """Run the benchmarks named on the command line, or all; the others keep their figures."""
     kept = DOCS / 'benchmarks.json'
     figures = json.loads(kept.read_text()) if kept.exists() else {}
-    parts = {'model': measured_model, 'solver': measured_solver, 'payload': measured_payload}
+    parts = {'model': measured_model, 'solver': measured_solver, 'payload': measured_payload,
+             'earlier': measured_earlier}
     for name in sys.argv[1:] or parts:
         figures |= parts[name]()
     figures['versions'] = versions()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
 import secrets
@@ -9,8 +10,9 @@ import warnings
 
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.paths import expand_path
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, FigureBase
 
 _DPI = 110
 
@@ -22,6 +24,16 @@ def finish(axes: Axes, title: str, y_label: str, x_label: str = 'time [s]', *,
     axes.grid(alpha=0.3)
     if axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize='small', loc=legend, ncols=columns)
+
+
+def explain_lines(figure: FigureBase, axes: Sequence[Axes], columns: int) -> None:
+    """Say what the lines are, once for all diagrams: a name is the same line in each."""
+    named: dict[str, Artist] = {}
+    for one in axes:
+        for handle, label in zip(*one.get_legend_handles_labels(), strict=True):
+            named.setdefault(label, handle)
+    figure.legend(named.values(), named.keys(), loc='outside lower center', ncols=columns,
+                  fontsize='small')
 
 
 def plain(text: str) -> str:

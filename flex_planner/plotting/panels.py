@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from flex_planner.plotting.diagrams import Panel, Picture
-from flex_planner.plotting.figures import save
-from matplotlib.artist import Artist
+from flex_planner.plotting.figures import explain_lines, save
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 import numpy as np
@@ -25,7 +23,7 @@ def draw_picture(folder: Path, picture: Picture) -> Path:
         _draw(one, panel)
     for empty in axes[len(picture.panels):]:
         empty.set_axis_off()
-    _add_legends(figure, list(axes[:len(picture.panels)]), 2 * columns)
+    explain_lines(figure, list(axes[:len(picture.panels)]), 2 * columns)
     path = folder / f'{picture.name}.png'
     save(figure, path)
     return path
@@ -42,13 +40,3 @@ def _draw(axes: Axes, panel: Panel) -> None:
         axes.set_aspect('equal', adjustable='datalim')
     axes.set(title=panel.title, xlabel=panel.x_label, ylabel=panel.y_label)
     axes.grid(alpha=0.3)
-
-
-def _add_legends(figure: Figure, axes: Sequence[Axes], columns: int) -> None:
-    """Say what the lines are, once for all diagrams: a name is the same line in each."""
-    named: dict[str, Artist] = {}
-    for one in axes:
-        for handle, label in zip(*one.get_legend_handles_labels(), strict=True):
-            named.setdefault(label, handle)
-    figure.legend(named.values(), named.keys(), loc='outside lower center', ncols=columns,
-                  fontsize='small')

@@ -89,7 +89,7 @@ def _overview(arm: Arm, payload_mass: float) -> list[str]:
 def _describe_link(link: Link) -> str:
     """Return a link's properties in one line."""
     text = f'{link.length:.4g} m, {link.mass:.4g} kg ({link.linear_density:.4g} kg/m), '
-    parts = f', {_sections(link)}' if link.sections else ''
+    parts = f', in sections: {sections_text(link)}' if link.sections else ''
     if not link.modes:
         along, across = (moment / link.mass for moment in link.first_moment)
         given = link.center_of_mass is not None or link.inertia is not None or link.sections
@@ -108,12 +108,12 @@ def damping_text(link: Link) -> str:
         given if isinstance(given, tuple) else (given,))) or '0'
 
 
-def _sections(link: Link) -> str:
+def sections_text(link: Link) -> str:
     """Return the pieces of a link from its joint outwards."""
     pieces = [f'{one.share * link.length:.4g} m '
               + ('rigid' if math.isinf(one.rigidity) else f'EI x {one.rigidity:.4g}')
               + ('' if one.density else ' without mass') for one in link.sections]
-    return f'in sections: {"; ".join(pieces)}'
+    return '; '.join(pieces)
 
 
 def _describe_joint(joint: Joint) -> str:

@@ -14,7 +14,7 @@ MOTION = ['--from', '0.5,0', '--to', '0.5,0.5', '--duration', '1']
 
 def rows(text: str) -> list[tuple[str, str]]:
     """Return the rows that name files."""
-    names = ('recording', 'picture', 'output folder', 'mode shapes')
+    names = ('recording', 'picture', 'output folder', 'picture of the arm')
     return [(line[:26].strip(), line[27:]) for line in text.splitlines()
             if line.startswith(names)]
 
@@ -43,7 +43,7 @@ def test_arm_is_described_without_pictures(tmp_path: Path, monkeypatch: pytest.M
     assert main(['arm', 'korayem_ei50', '--output', str(tmp_path)]) == 0
     said = capsys.readouterr()
     assert said.out.startswith('Korayem 2009 two-link arm')
-    assert said.err.startswith('flex-planner: warning: no mode shapes: ')
+    assert said.err.startswith('flex-planner: warning: no picture of the arm: ')
     assert main(['arm', 'korayem_ei50', '--plot', str(tmp_path / 'a.png')]) == 1
 
 

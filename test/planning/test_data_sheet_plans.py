@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from flex_planner.arms.arm import Arm, Elasticity, Joint, Link, Motor, Node
+from flex_planner.arms.arm_files import load_arm
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_path
@@ -60,6 +61,20 @@ def test_elastic_joint_tends_to_the_rigid_one_with_the_rotor_as_its_inertia() ->
     bare = tuple(replace(joint, motor=replace(joint.motor, rotor_inertia=0.0))
                  for joint in geared_arm().joints)
     assert plan_of(geared_arm(joints=bare)).cost < 0.9 * rigid
+
+
+def test_plan_does_not_depend_on_the_frame_of_the_base() -> None:
+    arm, angle = load_arm('desk_arm'), 0.7
+    c, s = np.cos(angle), np.sin(angle)
+    tilted = replace(arm, gravity=np.array([[c, -s], [s, c]]) @ arm.gravity)
+    plan, turned = (plan_path(Task(
+        arm=one, start_positions=[first - np.pi / 2, np.pi / 6],
+        goal_positions=[first, np.pi / 3], duration=1.0, payload_mass=0.3))
+        for one, first in ((arm, 0.0), (tilted, angle)))
+    assert turned.cost == pytest.approx(plan.cost, rel=1e-9)
+    times = np.linspace(0.0, 1.0, 50)
+    np.testing.assert_allclose(turned.sample(times).torques, plan.sample(times).torques,
+                               atol=1e-5 * np.abs(plan.sample(times).torques).max())
 
 
 def test_everything_in_play_is_an_extremal_that_is_certified() -> None:

@@ -145,6 +145,25 @@ def test_torque_never_leaves_the_bounds_of_the_motors(plan: Plan) -> None:
     assert reached > 10
 
 
+def test_torque_stays_below_the_cap_also_when_braking(ei50_arm: Arm) -> None:
+    joints = tuple(replace(joint, motor=replace(joint.motor, max_torque=2.0))
+                   for joint in ei50_arm.joints)
+    plant = Plant(ArmDynamics(replace(ei50_arm, joints=joints)),
+                  Control(gains=Gains.of(2, 5e3, 50.0)), payload_mass=1.0,
+                  positions=np.array([0.5, 0.5]))
+    plant.follow(JointReference.hold(np.array([1.5, 0.0]), np.zeros(2)))
+    torques, speeds = [], []
+    for k in range(1, 601):
+        speeds.append(plant.joint_state[1])
+        plant.advance(k * PERIOD)
+        torques.append(plant.torque)
+    capped = np.abs(torques) == 2.0
+    assert np.abs(torques).max() == 2.0
+    braking = np.array(torques) * np.array(speeds) < 0
+    assert (capped & braking).any()  # where eq. (15) would let it grow with the speed
+    assert (capped & ~braking).any()
+
+
 def test_last_sample_is_held(plan: Plan, reference: JointReference) -> None:
     plant = plant_at_start(plan)
     plant.follow(reference)

@@ -26,7 +26,7 @@ from flex_planner.reports.arm import describe_arm, standard_postures
 def add_command(commands: Commands) -> None:
     """Add ``flex-planner arm``."""
     parser = commands.add_parser('arm',
-                                 help='print the properties of an arm, draw its mode shapes')
+                                 help='print the properties of an arm, draw it')
     add_arm(parser, optional=True)
     parser.add_argument('--template', nargs='?', const='-', metavar='FILE',
                         help='write an arm file with comments to start from, into a new file or '
@@ -37,7 +37,7 @@ def add_command(commands: Commands) -> None:
                         help='joint angles for frequencies and deflections; may be repeated '
                         '(default: stretched, and bent by 90 degrees)')
     parser.add_argument('--plot', type=path_argument, metavar='PNG',
-                        help='picture of the mode shapes (default: DIR/<arm>_modes.png)')
+                        help='picture of the arm and its modes (default: DIR/<arm>_arm.png)')
     add_folder(parser)
     parser.add_argument('--no-plot', action='store_true', help='draw nothing')
     parser.set_defaults(run=lambda options: _run(parser, options))
@@ -62,7 +62,7 @@ def _write_template(options: argparse.Namespace) -> int:
 
 
 def _run(parser: argparse.ArgumentParser, options: argparse.Namespace) -> int:
-    """Print an arm's properties and draw its mode shapes, or write a template."""
+    """Print an arm's properties and draw it, or write a template."""
     if options.template is not None:
         return _write_template(options)
     if options.arm is None:
@@ -74,15 +74,15 @@ def _run(parser: argparse.ArgumentParser, options: argparse.Namespace) -> int:
     model = ArmModel(arm)
     text = describe_arm(model, postures, payload)
     print(text, flush=True)
-    if options.no_plot or not arm.n_modes:
+    if options.no_plot:
         return 0
 
     def draw(path: Path) -> None:
-        from flex_planner.plotting import draw_mode_shapes
+        from flex_planner.plotting import draw_arm
 
-        draw_mode_shapes(path, model, postures[-1], payload)
+        draw_arm(path, model, postures, payload)
 
     print()
-    path = options.plot or options.output / f'{file_stem(options.arm)}_modes.png'
-    count = print_files(drawn('mode shapes', path, draw))
+    path = options.plot or options.output / f'{file_stem(options.arm)}_arm.png'
+    count = print_files(drawn('picture of the arm', path, draw))
     return 1 if options.plot and not count else 0

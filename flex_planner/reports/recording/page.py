@@ -27,7 +27,8 @@ from flex_planner.reports.recording.contents import RecordedRequest
 from flex_planner.reports.recording.findings import MotionCheck
 from flex_planner.reports.recording.frequencies import NaturalFrequencies
 from flex_planner.reports.recording.plots import Plot, plots, Series
-from flex_planner.reports.recording.tables import ReportTable, tables, verdict
+from flex_planner.reports.recording.report_table import ReportTable
+from flex_planner.reports.recording.tables import tables, verdict
 
 _FOLDER = Path(__file__).parent
 _DIGITS = 9

@@ -3,46 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from itertools import zip_longest
 from typing import Any
 
-from flex_planner.arms.arm import Arm, Joint
 from flex_planner.planning.certificate import CertificateLimits
 from flex_planner.planning.warnings import WarningKind
-from flex_planner.reports.arm import damping_text
 from flex_planner.reports.execution import execution_rows, vibrations
+from flex_planner.reports.recording.arm_tables import arm_tables
 from flex_planner.reports.recording.contents import RecordedRequest
 from flex_planner.reports.recording.execution import recorded_execution, recorded_robustness
 from flex_planner.reports.recording.findings import MotionCheck
 from flex_planner.reports.recording.frequencies import NaturalFrequencies
+from flex_planner.reports.recording.report_table import Cells, ReportTable
 import numpy as np
 
-Cells = tuple[str, ...]
 _CERTIFICATE = {
     'collocation_residual': '', 'boundary_error': '', 'hamiltonian_drift': '', 'tip_error': ' m',
     'residual_vibration': ' m', 'state_error': '', 'costate_error': ''}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ReportTable:
-    """
-    A table of a report.
-
-    Attributes
-    ----------
-    title : str
-        Its heading.
-    columns : tuple of str
-        Their names; empty where rows are names and values.
-    rows : tuple of tuple of str
-        The cells.
-
-    """
-
-    title: str
-    columns: Cells = ()
-    rows: tuple[Cells, ...]
 
 
 def verdict(request: RecordedRequest, check: MotionCheck | None = None) -> str:
@@ -74,7 +52,7 @@ def tables(request: RecordedRequest, check: MotionCheck | None = None,
         found += [_search(request.search), *_trials(request.search)]
     if len(request.report.tried_weights):
         found.append(_objectives(request.report))
-    return [*found, *_arm(request.arm), _settings(request), *_left_out(request)]
+    return [*found, *arm_tables(request.arm), _settings(request), *_left_out(request)]
 
 
 def check_table(check: MotionCheck) -> ReportTable:
@@ -269,32 +247,6 @@ def _objectives(report: Any) -> ReportTable:
                        columns=('objective', 'weight', 'share of the limit'),
                        rows=tuple((str(name), f'{weight:.5g}', f'{share:.4f}')
                                   for name, weight, share in tried))
-
-
-def _arm(arm: Arm) -> list[ReportTable]:
-    """Return the arm's links and joints."""
-    return [
-        ReportTable(title=f'Arm: {arm.name}', columns=(
-            'link', 'length [m]', 'density [kg/m]', 'E I [N m²]', 'modes', 'damping'), rows=tuple(
-                (str(i), f'{link.length:g}', f'{link.linear_density:g}',
-                 f'{link.flexural_rigidity:g}', f'{link.modes} {link.mode_family}'
-                 if link.modes else 'rigid', damping_text(link))
-                for i, link in enumerate(arm.links, 1))),
-        ReportTable(title='Joints', columns=(
-            'joint', 'stall torque [N m]', 'no-load speed [rad/s]', 'largest speed [rad/s]',
-            'angles [deg]', 'friction [N m s/rad]', 'mass at it [kg]'), rows=tuple(
-                (str(i), f'{joint.motor.stall_torque:g}', f'{joint.motor.no_load_speed:g}',
-                 f'{joint.motor.max_speed:g}', _angles(joint), f'{joint.viscous_friction:g}',
-                 f'{node.mass:g}')
-                for i, (joint, node) in enumerate(zip(arm.joints, arm.nodes, strict=False), 1)))]
-
-
-def _angles(joint: Joint) -> str:
-    """Return the limits of a joint's angle, or a dash."""
-    limits = joint.lower_limit, joint.upper_limit
-    if not np.isfinite(limits).any():
-        return '–'
-    return ' to '.join(f'{angle:.4g}' for angle in np.degrees(limits))
 
 
 def _left_out(request: RecordedRequest) -> list[ReportTable]:

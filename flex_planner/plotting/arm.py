@@ -1,7 +1,8 @@
-"""The shapes that links are assumed to bend in, and the natural modes of an arm."""
+"""The picture of an arm: postures, the shapes its links bend in, and its natural modes."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from flex_planner.arms.arm import Arm
@@ -10,46 +11,63 @@ from flex_planner.base.validation import Array
 from flex_planner.dynamics.statics import equilibrium, natural_modes
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.parameters import Parameters
-from flex_planner.plotting.figures import finish, plain, save
+from flex_planner.plotting.figures import explain_lines, finish, plain, save
+from flex_planner.plotting.posture import draw_posture
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, FigureBase
 import numpy as np
 
 _NATURAL_MODES = 4
 _STATIONS = 81
 _SHOWN_BEND = 0.1
+_WIDTH, _HEIGHT, _LEGEND_COLUMNS = 5, 4, 8
 
 
-def draw_mode_shapes(path: Path, model: ArmModel, posture: Array, payload_mass: float) -> None:
+def draw_arm(path: Path, model: ArmModel, postures: Sequence[Array], payload_mass: float) -> None:
     """
-    Write a picture of the assumed shapes of each link and of the arm's natural modes as PNG.
+    Write a picture of an arm as PNG.
+
+    It shows the arm at rest in each posture; the assumed shapes of each flexible link; and the
+    natural modes in the last posture with joints locked, if anything bends or twists.
 
     Parameters
     ----------
     path : Path
         File to write.
     model : ArmModel
-        n joints, at least one link with modes.
-    posture : numpy.ndarray, shape (n,)
-        Of the arm whose natural modes are drawn, joints locked [rad].
+        n joints.
+    postures : sequence of numpy.ndarray, shape (n,)
+        Joint angles, at least one [rad].
     payload_mass : float
         At its tip [kg].
 
     """
     arm = model.arm
     parameters = Parameters.of(arm, payload_mass=payload_mass)
-    rest, _ = equilibrium(model, posture, parameters)
-    frequencies, vectors = natural_modes(model, rest, parameters, locked=True)
     flexible = [i for i, link in enumerate(arm.links) if link.modes]
-    shown = min(frequencies.size, _NATURAL_MODES)
-    figure = Figure(figsize=(5 * max(len(flexible), shown), 8), layout='constrained')
-    top, bottom = figure.subfigures(2, 1)
-    for axes, i in zip(np.atleast_1d(top.subplots(1, len(flexible))), flexible, strict=True):
-        _draw_link_shapes(axes, arm, i)
-    for k, axes in enumerate(np.atleast_1d(bottom.subplots(1, shown))):
-        _draw_natural_mode(axes, arm, rest, vectors[:, k], frequencies[k])
+    shown = min(arm.n_passive, _NATURAL_MODES)
+    counts = [count for count in (len(postures), len(flexible), shown) if count]
+    figure = Figure(figsize=(_WIDTH * max(counts), _HEIGHT * len(counts)), layout='constrained')
+    rows = iter(np.atleast_1d(figure.subfigures(len(counts), 1)))
+    first = next(rows)
+    for axes, posture in zip(_row(first, len(postures)), postures, strict=True):
+        rest, _ = equilibrium(model, posture, parameters)
+        draw_posture(axes, arm, rest, payload_mass)
+    explain_lines(first, first.axes, _LEGEND_COLUMNS)
+    if flexible:
+        for axes, i in zip(_row(next(rows), len(flexible)), flexible, strict=True):
+            _draw_link_shapes(axes, arm, i)
+    if shown:
+        frequencies, vectors = natural_modes(model, rest, parameters, locked=True)
+        for k, axes in enumerate(_row(next(rows), shown)):
+            _draw_natural_mode(axes, arm, rest, vectors[:, k], frequencies[k])
     figure.suptitle(f'{plain(arm.name)}, payload {payload_mass:g} kg')
     save(figure, path)
+
+
+def _row(part: FigureBase, count: int) -> Sequence[Axes]:
+    """Return diagrams beside one another."""
+    return list(np.atleast_1d(part.subplots(1, count)))
 
 
 def _draw_link_shapes(axes: Axes, arm: Arm, index: int) -> None:

@@ -1,0 +1,90 @@
+"""
+The model and the lift against an earlier version of them, by turns.
+
+The earlier version is a checkout of a commit of this repository, made for the run; both have the
+same interpreter and libraries.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+import json
+import os
+from pathlib import Path
+import statistics
+import subprocess
+import sys
+import tempfile
+from typing import Any
+
+from bench.earlier_probe import LIFTED, PRESETS
+
+ENERGIES = 'c8484632ad6e4d7bc3c20c30e315350d786de4e6'
+"""The last commit whose equations of motion came from energies."""
+ROUNDS = 3
+_ROOT = Path(__file__).parents[1]
+
+
+@contextmanager
+def checkout(commit: str) -> Iterator[Path]:
+    """Give a folder with the sources of a commit."""
+    with tempfile.TemporaryDirectory() as folder:
+        packed = subprocess.run(['git', '-C', str(_ROOT), 'archive', commit], check=True,
+                                stdout=subprocess.PIPE).stdout
+        subprocess.run(['tar', '-x', '-C', folder], input=packed, check=True)
+        yield Path(folder)
+
+
+def measure() -> dict[str, Any]:
+    """Return the figures of both versions, earlier ones first."""
+    with checkout(ENERGIES) as sources, tempfile.TemporaryDirectory() as caches:
+        sides = [(sources, f'{caches}/{ENERGIES}'), (_ROOT, f'{caches}/now')]
+        rows = []
+        for name in PRESETS:
+            print(f'earlier: {name}', flush=True)
+            runs = [[_probe(*side, 'model', name) for side in sides] for _ in range(ROUNDS)]
+            rows.append({
+                'name': name, 'build_seconds': [one['build_seconds'] for one in runs[0]],
+                'microseconds': [statistics.median(run[side]['microseconds'] for run in runs)
+                                 for side in range(2)]})
+        lifts = []
+        for index, (name, start, goal, duration, payload) in enumerate(LIFTED):
+            print(f'earlier: lift {index}', flush=True)
+            both = [_probe(*side, 'lift', str(index)) for side in sides]
+            lifts.append({'name': f'{name}, {start} to {goal} deg in {duration:g} s, '
+                          f'{payload:g} kg', 'both': both})
+    return {'presets': rows, 'lifts': lifts}
+
+
+def _probe(sources: Path, cache: str, *what: str) -> dict[str, Any]:
+    """Return figures of one version from a process of its own."""
+    script = 'import runpy; runpy.run_path({!r}, run_name="__main__")'.format(
+        str(Path(__file__).with_name('earlier_probe.py')))
+    path = os.pathsep.join([str(sources), os.environ.get('PYTHONPATH', '')])
+    done = subprocess.run([sys.executable, '-c', script, *what], check=True, cwd=sources,
+                          capture_output=True, text=True,
+                          env={**os.environ, 'PYTHONPATH': path, 'XDG_CACHE_HOME': cache})
+    return json.loads(done.stdout.splitlines()[-1])  # type: ignore[no-any-return]
+
+
+def tables(figures: dict[str, Any]) -> str:
+    """Return the figures as two Markdown tables."""
+    lines = ["| arm | z' with dz'/dz, energies [us] | virtual power [us] | ratio "
+             '| first build [s] | | ratio |', f'|{"---|" * 7}']
+    for row in figures['presets']:
+        before, now = row['microseconds']
+        slow, quick = row['build_seconds']
+        lines.append(f'| {row["name"]} | {before:.3g} | {now:.3g} | {before / now:.2f} | '
+                     f'{slow:.2f} | {quick:.2f} | {slow / quick:.1f} |')
+    lines += ['', '| motion | links straight: iterations | CPU [s] | links bent: iterations '
+              '| CPU [s] |', f'|{"---|" * 5}']
+    lines += [f'| {lift["name"]} | {" | ".join(_lift_cells(one) for one in lift["both"])} |'
+              for lift in figures['lifts']]
+    return '\n'.join(lines)
+
+
+def _lift_cells(one: dict[str, Any]) -> str:
+    count = one['iterations'] if one['solved'] else f'not in {one["iterations"]}'
+    return f'{count} | {one["seconds"]:.2f}'
