@@ -76,7 +76,8 @@ def _draw_masses(axes: Axes, arm: Arm, points: Array, payload_mass: float,
         some = np.array(masses) > 0
         if some.any():
             areas = _SMALLEST + _LARGEST * np.array(masses)[some] / largest
-            axes.scatter(*places[some].T, s=areas, color=color, alpha=0.6, label=name, zorder=3)
+            x, y = places[some].T
+            axes.scatter(x, y, s=areas, color=color, alpha=0.6, label=name, zorder=3)
 
 
 def _draw_gravity(axes: Axes, arm: Arm) -> None:
@@ -84,6 +85,6 @@ def _draw_gravity(axes: Axes, arm: Arm) -> None:
     size = np.linalg.norm(arm.gravity)
     if not size:
         return
-    end = _ARROW * arm.reach * arm.gravity / size
-    axes.annotate('', end, (0.0, 0.0), arrowprops={'arrowstyle': '->', 'color': 'C4'})
+    x, y = _ARROW * arm.reach * arm.gravity / size
+    axes.annotate('', (x, y), (0.0, 0.0), arrowprops={'arrowstyle': '->', 'color': 'C4'})
     axes.plot([], [], color='C4', label='gravity')

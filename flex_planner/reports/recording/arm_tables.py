@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 import math
 
 from flex_planner.arms.arm import Arm, Joint, Link
@@ -68,7 +67,7 @@ def _masses(arm: Arm) -> list[ReportTable]:
     return [ReportTable(title='Masses at joints and tip', rows=tuple(cells))] if cells else []
 
 
-def _table(title: str, first: str, columns: dict[str, Sequence[str]]) -> ReportTable:
+def _table(title: str, first: str, columns: dict[str, list[str]]) -> ReportTable:
     """Return a table of numbered rows."""
     rows: list[Cells] = [(str(i), *cells) for i, cells in enumerate(
         zip(*columns.values(), strict=True), 1)]
