@@ -17,8 +17,8 @@ _LIBC = ctypes.CDLL(None)
 ONE_THREAD = dict.fromkeys(('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS'), '1')
 # tells how many other processes may compute for this one
 PROCESSES = 'FLEX_PLANNER_PROCESSES'
-# multiprocessing's tracker removes what processes that were ended by force have left, and would tell
-# it to the user, who can do nothing about it
+# multiprocessing's tracker removes what processes that were ended by force have left, and would
+# tell it to the user, who can do nothing about it
 _SILENT_TRACKER = {'PYTHONWARNINGS': 'ignore::UserWarning:multiprocessing.resource_tracker'}
 # more are not started unasked: each takes 60 MB
 _MOST = 4
