@@ -12,7 +12,7 @@ import subprocess
 import sys
 from typing import Any
 
-from bench import earlier, growth, model, payload, solver
+from bench import earlier, growth, model, payload, soak, solver
 import numpy as np
 
 DOCS = Path(__file__).parents[1] / 'docs'
@@ -124,6 +124,23 @@ def measured_earlier() -> dict[str, object]:
     return {'earlier': earlier.measure()}
 
 
+SOAK = """
+## The node under mixed requests
+
+One planner of the arm with EI 50 N m², recordings on, is asked for everything in turn:
+
+{table}
+
+{summary}
+"""
+
+
+def measured_soak() -> dict[str, object]:
+    """Measure what a planner answers, costs and leaves."""
+    print(f'soak: {soak.SECONDS:g} s', flush=True)
+    return {'soak': asdict(soak.measure())}
+
+
 def measured_payload() -> dict[str, object]:
     """Measure the searches for the largest payload and the shortest duration."""
     rows = [row for arm in payload.ARMS for row in payload.measure(arm)]
@@ -163,7 +180,7 @@ def text(figures: dict[str, Any]) -> str:
         table=solver.table([solver.Row(**row) for row in figures['solver']]), shares=shares,
         cold_1=cold_1, warm_1=warm_1, cold_2=cold_2, warm_2=warm_2, limit=growth.TIME_LIMIT,
         growth=growth.table([growth.Growth(**row) for row in figures['growth']])) + (
-        payload_text(figures) + earlier_text(figures))
+        payload_text(figures) + earlier_text(figures) + soak_text(figures))
 
 
 def earlier_text(figures: dict[str, Any]) -> str:
@@ -184,12 +201,20 @@ def payload_text(figures: dict[str, Any]) -> str:
                             for name, seconds in figures['durations'].items()))
 
 
+def soak_text(figures: dict[str, Any]) -> str:
+    """Return the part on the node, once it was measured."""
+    if 'soak' not in figures:
+        return ''
+    measured = soak.Soak(**figures['soak'])
+    return SOAK.format(table=soak.table(measured), summary=soak.summary(measured))
+
+
 def main() -> None:
     """Run the benchmarks named on the command line, or all; the others keep their figures."""
     kept = DOCS / 'benchmarks.json'
     figures = json.loads(kept.read_text()) if kept.exists() else {}
     parts = {'model': measured_model, 'solver': measured_solver, 'payload': measured_payload,
-             'earlier': measured_earlier}
+             'earlier': measured_earlier, 'soak': measured_soak}
     for name in sys.argv[1:] or parts:
         figures |= parts[name]()
     figures['versions'] = versions()

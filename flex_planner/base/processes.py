@@ -17,6 +17,9 @@ _LIBC = ctypes.CDLL(None)
 ONE_THREAD = dict.fromkeys(('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS'), '1')
 # tells how many other processes may compute for this one
 PROCESSES = 'FLEX_PLANNER_PROCESSES'
+# multiprocessing's tracker removes what processes that were ended by force have left, and would
+# tell it to the user, who can do nothing about it
+_SILENT_TRACKER = {'PYTHONWARNINGS': 'ignore::UserWarning:multiprocessing.resource_tracker'}
 # more are not started unasked: each takes 60 MB
 _MOST = 4
 
@@ -89,7 +92,8 @@ def deaf_to_interrupts(*, pool: bool = False) -> Iterator[None]:
 
     """
     if pool:  # its tracker would unblock Ctrl-C for this thread as it starts
-        resource_tracker.ensure_running()
+        with _environment(_SILENT_TRACKER):
+            resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

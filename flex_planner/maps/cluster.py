@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 import logging
+import tempfile
 
 import dask
 from dask.system import CPU_COUNT
@@ -52,7 +53,8 @@ def local_cluster(workers: int) -> Iterator[Client]:
         If they cannot be started.
 
     """
-    with _quiet(), one_thread_each(), dask.config.set(_SETTINGS):
+    with _quiet(), one_thread_each(), _scratch_folder() as scratch, \
+            dask.config.set({**_SETTINGS, 'temporary-directory': scratch}):
         try:
             with deaf_to_interrupts(pool=True):
                 cluster = LocalCluster(
@@ -67,6 +69,11 @@ def local_cluster(workers: int) -> Iterator[Client]:
                 yield client
         finally:
             cluster.close(timeout=_CLOSING)
+
+
+def _scratch_folder() -> tempfile.TemporaryDirectory[str]:
+    """Return a folder for what workers put aside; Dask would leave parts of it behind."""
+    return tempfile.TemporaryDirectory(prefix='flex_planner-map-', ignore_cleanup_errors=True)
 
 
 @contextmanager

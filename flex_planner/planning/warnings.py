@@ -130,11 +130,12 @@ def _assumed_families(arm: Arm) -> PlanWarning | None:
     assumed = [str(i) for i, link in enumerate(arm.links, 1) if link.family_assumed]
     if not assumed:
         return None
-    links = f'links {" and ".join(assumed)} have' if assumed[1:] else f'link {assumed[0]} has'
+    links = (f'links {" and ".join(assumed)} have no mode_family and bend between their ends like '
+             'beams' if assumed[1:] else
+             f'link {assumed[0]} has no mode_family and bends between its ends like a beam')
     return PlanWarning(kind=WarningKind.MODE_FAMILY_ASSUMED, sentence=(
-        f'{links} no mode_family and bends between its ends like a beam on two supports, as in '
-        'the paper: the links of real arms are clamped to their motors (clamped_free), and their '
-        'tips move when they bend'))
+        f'{links} on two supports, as in the paper: the links of real arms are clamped to their '
+        'motors (clamped_free), and their tips move when they bend'))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

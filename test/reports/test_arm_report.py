@@ -130,6 +130,16 @@ def test_family_that_nobody_gave_is_told() -> None:
     assert 'warning: link 2 has no mode_family' in report(arm)
 
 
+def test_families_that_nobody_gave_are_told_in_one_sentence() -> None:
+    text = parse_yaml(read_arm_template())
+    assert isinstance(text, dict)
+    for link in text['links']:
+        del link['mode_family']
+    (told,) = find_arm_warnings(arm_from_mapping(text))
+    assert told.sentence.startswith(
+        'links 1 and 2 have no mode_family and bend between their ends like beams on two supports')
+
+
 @pytest.mark.parametrize('name', ['korayem_ei50', 'single_link'])
 def test_family_of_a_preset_is_given(name: str) -> None:
     assert not any(one.kind is WarningKind.MODE_FAMILY_ASSUMED

@@ -19,6 +19,7 @@ from types import TracebackType
 from typing import Any, TypeVar
 import warnings
 
+from bench.leftovers import shared_memory
 from flex_planner.ros.runtime.processes import NodeProcess
 from flex_planner_interfaces import action
 from flex_planner_interfaces.msg import MotionTask, PlanReport
@@ -265,6 +266,10 @@ class Planner(Client):
         request = GetParameters.Request(names=[name])
         answer = self.call(GetParameters, f'{self.name}/get_parameters', request)
         return parameter_value_to_python(answer.values[0])
+
+    def shared_memory(self) -> list[Path]:
+        """Return the segments of shared memory that its middleware has made."""
+        return shared_memory([Path('/proc', str(self.process.process.pid))])
 
     def stop(self, number: signal.Signals = signal.SIGINT) -> int:
         """End the node by a signal and return its exit code; fail if it stays."""

@@ -256,6 +256,14 @@ def test_cluster_that_is_not_there_is_named(store: MapStore,
         run_map(small_study(), store, scheduler='tcp://127.0.0.1:9')
 
 
+def test_workers_leave_no_files_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('tempfile.tempdir', str(tmp_path))
+    with local_cluster(1) as client:
+        client.wait_for_workers(1, timeout=PATIENCE)
+        assert list(tmp_path.rglob('worker-*'))
+    assert not list(tmp_path.iterdir())
+
+
 def test_command_stops_on_interrupt_and_goes_on_later(tmp_path: Path) -> None:
     study, path = tmp_path / 'large.yaml', tmp_path / 'large.zarr'
     study.write_text(LARGE)

@@ -84,6 +84,10 @@ class Controller:
         self._executions.append(execution)
         return execution
 
+    def close(self) -> None:
+        """Leave the action."""
+        self._link.client.destroy()
+
     def _describe_absence(self) -> str:
         """Return what is there instead of the action, in words."""
         types = self._types(self._name)

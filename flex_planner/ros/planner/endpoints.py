@@ -94,6 +94,10 @@ class Endpoint:
         node.create_timer(_FEEDBACK_PERIOD, self._send_feedback, group, clock)
         node.create_timer(_PRESENCE_PERIOD, self._drop_abandoned, group, clock)
 
+    def close(self) -> None:
+        """End the action, which a node that is destroyed leaves to others."""
+        self._server.destroy()
+
     async def _on_request(self, request: Any, response: Any) -> Any:
         """Serve a request of the service."""
         pending = self._submit(request, _SERVICE)

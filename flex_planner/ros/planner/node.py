@@ -217,6 +217,12 @@ class PlannerNode(Node):  # type: ignore[misc]
         self._streamer.close()
         if not self._queue.close(_STOP_TIMEOUT):
             self._planner.abandon()
+        # or the node would go on within them: others would hear of it until its lease is over, and
+        # its shared memory would stay for good
+        for endpoint in self._endpoints:
+            endpoint.close()
+        if self._controller is not None:
+            self._controller.close()
         return super().destroy_node()
 
 

@@ -60,9 +60,11 @@ def check_health(planner: Planner) -> None:
 
 def check_end(planner: Planner, number: signal.Signals) -> None:
     """Require that a signal ends the node in good order, whatever it is at work on."""
+    memory = planner.shared_memory()
+    assert memory
     assert planner.stop(number) == 0
     assert 'Traceback' not in planner.log()
-    assert not list(planner.recordings.glob('.*'))
+    assert not [path for path in (*memory, *planner.recordings.glob('.*')) if path.exists()]
 
 
 @pytest.fixture(scope='module', autouse=True)
