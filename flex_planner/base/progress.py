@@ -88,6 +88,11 @@ class Monitor:
             return StopReason.TIMEOUT
         return None
 
+    @property
+    def exhausted(self) -> bool:
+        """Return whether the work has used up its share; never, unless it has one."""
+        return False
+
     def check(self) -> None:
         """Raise StoppedError if the work should stop now."""
         reason = self.stop_reason()
@@ -99,3 +104,47 @@ class Monitor:
         self.iteration += 1
         self.report(Progress(phase=self.phase, iteration=self.iteration, residual=residual,
                              intervals=intervals, payload=self.payload))
+
+
+@dataclass(slots=True, kw_only=True)
+class LimitedMonitor(Monitor):
+    """
+    Watches a part of some work that has only a share of it.
+
+    What is reported and asked goes to the monitor of the whole. Work is counted in iterations
+    times intervals, not in seconds: so the same is done on every machine.
+
+    Parameters
+    ----------
+    whole : Monitor
+        Of the whole work.
+    share : float
+        Iterations times intervals, > 0.
+
+    """
+
+    whole: Monitor
+    share: float
+
+    @classmethod
+    def of(cls, whole: Monitor, share: float) -> LimitedMonitor:
+        """Return a monitor of a part that begins now."""
+        return cls(whole=whole, share=share, time_limit=whole.time_limit, canceled=whole.canceled,
+                   report=whole.report, phase=whole.phase, payload=whole.payload,
+                   iteration=whole.iteration, started=whole.started)
+
+    @property
+    def exhausted(self) -> bool:
+        """Return whether its share is used up."""
+        return self.share <= 0
+
+    def stop_reason(self) -> StopReason | None:
+        """Return the reason to stop the whole work now, or None."""
+        return self.whole.stop_reason()
+
+    def step(self, residual: float, intervals: int) -> None:
+        """Count and report an iteration."""
+        self.share -= intervals
+        self.whole.phase, self.whole.payload = self.phase, self.payload
+        self.whole.step(residual, intervals)
+        self.iteration = self.whole.iteration

@@ -99,6 +99,8 @@ def newton(problem: BoundaryValueProblem, guess: CollocationSolution, *, toleran
     run = _Run(problem, guess, tolerance, monitor)
     try:
         while run.iterations < max_iterations:
+            if monitor.exhausted:
+                return run.outcome('given up, its share of the work is used up')
             if run.iterate():
                 return run.outcome('converged', converged=True)
         return run.outcome(f'not converged after {max_iterations} iterations')

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+import math
 
-from flex_planner.base.progress import StoppedError, StopReason
+from flex_planner.base.progress import LimitedMonitor, StoppedError, StopReason
 from flex_planner.collocation import CollocationResult, Solver, SolverStatus
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import MAX_DURATION
@@ -29,6 +30,9 @@ STOP_STATUS = {StopReason.TIMEOUT: PlanStatus.TIMEOUT, StopReason.CANCELED: Plan
 _REFINEMENTS = 2
 _REFINEMENT_FACTOR = 10.0
 _STRICTER = 100.0
+# what a strategy is given in turn: iterations times intervals, half a second on a common machine
+# with so many unknowns
+_SHARES, _USUAL_SIZE = (5e3, 2e4, 8e4, 3.2e5, math.inf), 16
 # longer guesses of a free duration
 _GUESSES = (2.0, 4.0, 8.0)
 
@@ -153,23 +157,46 @@ def _conclude(problem: MotionProblem, strategy: str, attempt: Attempt, solver: S
 
 def _solve_first(problem: MotionProblem, solver: Solver,
                  strategies: Sequence[Strategy]) -> tuple[str, Attempt]:
-    """Try the strategies in order; report the first that decides it, or all failures."""
-    failures, names = [], []
+    """
+    Try the strategies in order; report the first that decides it, or all failures.
+
+    First each has a share of the work, in which most motions are found that it finds at all; those
+    that have used it up are tried again with more.
+
+    """
+    failures: dict[str, str] = {}
     last, not_found = Attempt(result=_unsolved(problem, solver)), False
-    for strategy in strategies:
-        solver.monitor.phase = strategy.name
-        attempt = strategy.attempt(problem, solver)
-        if attempt is None:
-            continue
-        last = attempt
-        if attempt.decides:
-            return strategy.name, attempt
-        names.append(strategy.name)
-        failures.append(f'{strategy.name}: {attempt.result.message}')
-        not_found = not_found or attempt.not_found
-    message = '; '.join(failures) or last.result.message
-    return ', '.join(names), Attempt(result=replace(last.result, message=message),
-                                     not_found=not_found)
+    for share in _shares(problem):
+        cut_off = []
+        for strategy in strategies:
+            solver.monitor.phase = strategy.name
+            limited = _rationed(solver, share / strategy.cost) if strategy.cost else solver
+            attempt = strategy.attempt(problem, limited)
+            if attempt is None:
+                continue
+            exhausted = limited.monitor.exhausted and not attempt.result.converged
+            if exhausted:
+                cut_off.append(strategy)
+                attempt = replace(attempt, hopeless=False, not_found=False)
+            last = attempt
+            if attempt.decides:
+                return strategy.name, attempt
+            failures[strategy.name] = attempt.result.message
+            not_found = not_found or attempt.not_found
+        strategies = cut_off
+    message = '; '.join(f'{name}: {why}' for name, why in failures.items())
+    return ', '.join(failures), Attempt(
+        result=replace(last.result, message=message or last.result.message), not_found=not_found)
+
+
+def _shares(problem: MotionProblem) -> tuple[float, ...]:
+    """Return shares of the work, in iterations times intervals, of some time and of all."""
+    return tuple(share * (_USUAL_SIZE / problem.size)**2 for share in _SHARES)
+
+
+def _rationed(solver: Solver, share: float) -> Solver:
+    """Return the solver with a share of the work."""
+    return solver.watched_by(LimitedMonitor.of(solver.monitor, share))
 
 
 def _certify(plan: Plan, result: CollocationResult, solver: Solver) -> Plan:

@@ -99,6 +99,8 @@ class _Crew:
         """Return the answer of a start, the next one."""
         while True:
             self._monitor.check()
+            if self._monitor.exhausted:
+                return Answer.failed(self._starts[turn], 'its share of the work is used up')
             self._distribute()
             self._tell(turn)
             outcome = self._outcomes.pop(turn, None)

@@ -168,7 +168,8 @@ class Programme:
                     self.stopped = self.monitor.stop_reason()
                 except BaseException as error:  # CasADi would print and drop it
                     self.error = error
-                return [int(bool(self.stopped or self.error or self.raised))]
+                return [int(bool(self.stopped or self.error or self.raised
+                                 or self.monitor.exhausted))]
 
         return Watch()
 

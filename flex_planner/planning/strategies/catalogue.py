@@ -25,11 +25,11 @@ CATALOGUE: tuple[Strategy, ...] = (
     Strategy('rigid motion first', lift_rigid_motion, quick=True),
     Strategy('homotopy in the weights', raise_weights, quick=True),
     Strategy('coarse mesh first', coarse_mesh, quick=True),
-    Strategy('kinds of motion', explore_kinds),
-    Strategy('continuation in payload', continue_in_payload),
-    Strategy('continuation in duration', continue_in_duration),
     Strategy('homotopy in vibration weights', lower_vibration_price),
     Strategy('homotopy in stiffness', soften_links),
-    Strategy('direct collocation', direct_collocation),
+    Strategy('kinds of motion', explore_kinds, cost=0.0),
+    Strategy('continuation in payload', continue_in_payload),
+    Strategy('continuation in duration', continue_in_duration),
+    Strategy('direct collocation', direct_collocation, cost=5.0),
 )
 QUICK = tuple(strategy for strategy in CATALOGUE if strategy.quick)

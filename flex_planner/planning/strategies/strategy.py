@@ -56,9 +56,13 @@ class Strategy:
         such as a homotopy in the weights of a task without any.
     quick : bool
         Whether it takes little time, solved or not.
+    cost : float
+        Of one of its iterations in Newton's: it is given up when it has had its share of the
+        work, and tried again with more once the others have failed. 0 for what has no share.
 
     """
 
     name: str
     attempt: Callable[[MotionProblem, Solver], Attempt | None]
     quick: bool = False
+    cost: float = 1.0
