@@ -14,9 +14,8 @@ import numpy as np
 
 # error that a mesh along the way is coarsened to
 _DEFECT = 3e-3
-# a mesh is refined where a step fails, and loses at most this share where one succeeds; it never
-# grows to more than so many times the last that led on
-_FINER, _COARSER, _FINEST = 1.5, 0.75, 4
+# a mesh is refined where a step fails, and loses at most this share where one succeeds
+_FINER, _COARSER = 1.5, 0.75
 _SMALLEST_STEP = 1 / 256
 # so few iterations show that the step may grow
 _EASY = 6
@@ -41,7 +40,6 @@ def follow_homotopy(problem_at: Callable[[float], BoundaryValueProblem],
 
     """
     here, step, point, settings = 0.0, first_step, start, solver.settings
-    finest = _FINEST * start.intervals
     while True:
         there = min(1.0, here + step)
         problem = problem_at(there)
@@ -54,11 +52,10 @@ def follow_homotopy(problem_at: Callable[[float], BoundaryValueProblem],
             here = there
             fewest = max(settings.intervals, int(_COARSER * result.solution.intervals))
             point = coarsen(problem, result.solution, _DEFECT, fewest)
-            finest = _FINEST * point.intervals
             step *= 2 if result.iterations <= _EASY else 1
         else:
             step /= 2
-            point = _refine_mesh(point, min(finest, settings.max_intervals))
+            point = _refine_mesh(point, settings.max_intervals)
             if step < _SMALLEST_STEP:
                 return replace(result, message=f'{result.message} at {there:.1%} of the homotopy')
 

@@ -30,9 +30,9 @@ STOP_STATUS = {StopReason.TIMEOUT: PlanStatus.TIMEOUT, StopReason.CANCELED: Plan
 _REFINEMENTS = 2
 _REFINEMENT_FACTOR = 10.0
 _STRICTER = 100.0
-# what a strategy is given in turn: iterations times intervals, half a second on a common machine
-# with so many unknowns
-_SHARES, _USUAL_SIZE = (5e3, 2e4, 8e4, 3.2e5, math.inf), 16
+# what a strategy is given in turn: iterations times intervals, a second or so of two links with a
+# mode each
+_SHARES = (1e4, 4e4, 1.6e5, math.inf)
 # longer guesses of a free duration
 _GUESSES = (2.0, 4.0, 8.0)
 
@@ -166,7 +166,7 @@ def _solve_first(problem: MotionProblem, solver: Solver,
     """
     failures: dict[str, str] = {}
     last, not_found = Attempt(result=_unsolved(problem, solver)), False
-    for share in _shares(problem):
+    for share in _SHARES:
         cut_off = []
         for strategy in strategies:
             solver.monitor.phase = strategy.name
@@ -187,11 +187,6 @@ def _solve_first(problem: MotionProblem, solver: Solver,
     message = '; '.join(f'{name}: {why}' for name, why in failures.items())
     return ', '.join(failures), Attempt(
         result=replace(last.result, message=message or last.result.message), not_found=not_found)
-
-
-def _shares(problem: MotionProblem) -> tuple[float, ...]:
-    """Return shares of the work, in iterations times intervals, of some time and of all."""
-    return tuple(share * (_USUAL_SIZE / problem.size)**2 for share in _SHARES)
 
 
 def _rationed(solver: Solver, share: float) -> Solver:

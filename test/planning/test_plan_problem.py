@@ -8,7 +8,7 @@ import math
 import time
 from typing import Any
 
-from flex_planner.base.progress import Monitor, Progress
+from flex_planner.base.progress import LimitedMonitor, Monitor, Progress
 from flex_planner.collocation import CollocationResult, Solver, SolverSettings, SolverStatus
 from flex_planner.optimal_control import task as task_module
 from flex_planner.optimal_control.arm_model import ArmModel
@@ -316,3 +316,57 @@ def test_all_failures_of_a_free_duration_are_told(
                      strategies=strategies)
     assert plan.message == 'fast: fast lost; slow: slow lost'
     assert plan.strategy == 'fast, slow'
+
+
+def using(share: float, asked: list[tuple[str, float]], name: str,
+          last: CollocationResult | None = None) -> Attempting:
+    """Return a strategy that takes so much work, and notes what it is given."""
+    def attempt(problem: MotionProblem, solver: Solver) -> Attempt:
+        monitor = solver.monitor
+        asked.append((name, monitor.share if isinstance(monitor, LimitedMonitor) else math.inf))
+        line = problem.straight_line(4, solver.settings.rule)
+        taken = 0.0
+        while taken < share and not monitor.exhausted:
+            monitor.step(1.0, 100)
+            taken += 100
+        if taken >= share and last is not None:
+            return Attempt(result=last)
+        return Attempt(result=CollocationResult.failed(line, 'tired'),
+                       not_found=monitor.exhausted)
+
+    return attempt
+
+
+def test_what_takes_long_is_put_off_and_tried_again_with_more(
+        rigid_model: ArmModel, paper_task: TaskFactory, result: CollocationResult) -> None:
+    asked: list[tuple[str, float]] = []
+    plan = planned(rigid_model, paper_task(rigid_model.arm),
+                   ('long', using(5e4, asked, 'long', result)),
+                   ('fails', using(1e3, asked, 'fails')),
+                   ('longer', using(1e9, asked, 'longer')))
+    assert plan.solved
+    assert plan.strategy == 'long'
+    assert [name for name, _ in asked] == [
+        'long', 'fails', 'longer', 'long', 'longer', 'long']  # what failed is not tried again
+    shares = [share for name, share in asked if name == 'long']
+    assert shares == sorted(shares)
+    assert shares[0] < 5e4 <= shares[-1]
+
+
+def test_strategy_that_was_cut_off_has_found_nothing_out(
+        rigid_model: ArmModel, paper_task: TaskFactory) -> None:
+    asked: list[tuple[str, float]] = []
+    plan = planned(rigid_model, paper_task(rigid_model.arm), ('cut', using(5e4, asked, 'cut')))
+    assert plan.status is PlanStatus.NOT_CONVERGED
+    assert len(asked) > 1
+    assert plan.message.count('cut: tired') == 1
+
+
+def test_newtons_method_gives_up_when_its_share_is_used_up(
+        rigid_model: ArmModel, paper_task: TaskFactory) -> None:
+    problem = problem_of(rigid_model, paper_task(rigid_model.arm, 5.5))
+    part = LimitedMonitor.of(Monitor(), 30.0)
+    found = cold_start(problem, Solver(monitor=part)).result
+    assert found.status is SolverStatus.NEWTON_FAILED
+    assert 'share of the work' in found.message
+    assert part.iteration == 2  # on 20 intervals
