@@ -13,15 +13,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from flex_planner.arms.arm import Arm
+from flex_planner.base.compiled_library import content_key
 from flex_planner.base.errors import InvalidTaskError
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.cache_key import cache_key, describe_fields, FREE_FIELDS
-from flex_planner.dynamics.compiled_functions import (
-    BatchFunction,
-    content_key,
-    load_functions,
-)
+from flex_planner.dynamics.compiled_functions import BatchFunction, load_functions
 from flex_planner.optimal_control.torque_limits import has_caps, TorqueLimits
 
 

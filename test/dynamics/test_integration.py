@@ -10,9 +10,9 @@ from applied_torques import Case, every_case, torque_of
 from factories import PlanFactory
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import load_arm
+from flex_planner.base import compiler
 from flex_planner.base.progress import Monitor, StoppedError, StopReason
 from flex_planner.base.validation import Array
-from flex_planner.dynamics import compiler
 from flex_planner.dynamics.arm_dynamics import RUNGE_KUTTA_STAGES
 from flex_planner.dynamics.integration import integrate, PiecewisePolynomial, simulate
 from flex_planner.optimal_control.arm_model import ArmModel
