@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
-from flex_planner.collocation.linear import NewtonSystem, Residual, SingularSystemError
-from flex_planner.collocation.problem import BoundaryValueProblem
+from flex_planner.collocation.compiled_system import factorise_system
+from flex_planner.collocation.linear import LinearSystem, Residual
+from flex_planner.collocation.problem import BoundaryValueProblem, SingularSystemError
 from flex_planner.collocation.solution import CollocationSolution
 import numpy as np
 
@@ -66,8 +67,8 @@ def linearise(problem: BoundaryValueProblem, solution: CollocationSolution,
 
 
 def factorise(problem: BoundaryValueProblem, solution: CollocationSolution,
-              jacobians: Array) -> NewtonSystem:
+              jacobians: Array) -> LinearSystem:
     """Return the linear system at a point, given its Jacobians."""
-    return NewtonSystem(solution.rule, solution.steps, jacobians,
-                        problem.left(solution.nodes[0])[1], problem.right(solution.nodes[-1])[1],
-                        magnitudes(problem, solution), problem.explicit)
+    return factorise_system(
+        solution.rule, solution.steps, jacobians, problem.left(solution.nodes[0])[1],
+        problem.right(solution.nodes[-1])[1], magnitudes(problem, solution), problem.explicit)

@@ -21,8 +21,8 @@ from flex_planner.collocation.equations import (
     linearise,
     magnitudes,
 )
-from flex_planner.collocation.linear import NewtonSystem, Residual, SingularSystemError
-from flex_planner.collocation.problem import BoundaryValueProblem
+from flex_planner.collocation.linear import LinearSystem, Residual
+from flex_planner.collocation.problem import BoundaryValueProblem, SingularSystemError
 from flex_planner.collocation.solution import CollocationSolution
 import numpy as np
 
@@ -46,7 +46,7 @@ class NewtonOutcome:
         Its size relative to the unknowns.
     iterations : int
         Linear systems factorised.
-    system : NewtonSystem or None
+    system : LinearSystem or None
         The last linear system.
     stopped : StopReason or None
         Set if the monitor ended it.
@@ -62,7 +62,7 @@ class NewtonOutcome:
     converged: bool
     correction: float
     iterations: int
-    system: NewtonSystem | None
+    system: LinearSystem | None
     stopped: StopReason | None
     message: str
     coarse: bool = False
@@ -115,7 +115,7 @@ class _Run:
                  tolerance: float, monitor: Monitor) -> None:
         self._problem, self._tolerance, self._monitor = problem, tolerance, monitor
         self._solution = guess
-        self._system: NewtonSystem | None = None
+        self._system: LinearSystem | None = None
         self._norm, self._step, self.iterations = np.inf, 1.0, 0
         self._previous: tuple[_Step, _Step] | None = None
         self._coarse = False
@@ -141,7 +141,7 @@ class _Run:
             return True
         return self._advance(system, full)
 
-    def _advance(self, system: NewtonSystem, full: _Step) -> bool:
+    def _advance(self, system: LinearSystem, full: _Step) -> bool:
         """Take a damped step, then corrections with the same matrix while they converge."""
         simplified = self._damp(system, full)
         self._previous = (full, simplified)
@@ -158,7 +158,7 @@ class _Run:
             self._solution, simplified, self._previous = trial, following, None
         return False
 
-    def _damp(self, system: NewtonSystem, full: _Step) -> _Step:
+    def _damp(self, system: LinearSystem, full: _Step) -> _Step:
         """Move to the first point along the correction that passes the test."""
         step = self._step = self._predict(full)
         bent, tried = 0.0, 1.0
@@ -190,7 +190,7 @@ class _Run:
         ratio = float(np.linalg.norm(simplified.nodes)) * before.norm / (difference * full.norm)
         return min(1.0, max(self._step * ratio, _SMALLEST_STEP))
 
-    def _measure(self, system: NewtonSystem, residual: Residual) -> _Step:
+    def _measure(self, system: LinearSystem, residual: Residual) -> _Step:
         nodes, stages = system.correction(residual)
         norm = self._size(nodes)
         if not np.isfinite(norm):

@@ -10,6 +10,12 @@ from numpy.typing import NDArray
 
 Indices = NDArray[np.intp]
 
+SINGULAR_STAGES = 'the stage equations of an interval are singular'
+
+
+class SingularSystemError(ArithmeticError):
+    """The linearised problem has no unique solution."""
+
 
 class BoundaryValueProblem(Protocol):
     """

@@ -13,7 +13,7 @@ from dataclasses import replace
 from flex_planner.base.errors import NoEquilibriumError
 from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationResult, CollocationSolution
-from flex_planner.collocation.linear import SingularSystemError
+from flex_planner.collocation.problem import SingularSystemError
 from flex_planner.optimal_control.boundary_conditions import PayloadEnds
 from flex_planner.optimal_control.free_problem import append_zeros
 from flex_planner.optimal_control.motion_problem import Indices, MotionProblem
