@@ -18,8 +18,9 @@ from flex_planner.collocation.linear import (
 from flex_planner.collocation.problem import Indices, SINGULAR_STAGES, SingularSystemError
 import numpy as np
 
-# what `factorise_system` of core.c returns
-_FAILURES = {1: SINGULAR_STAGES, 2: BAD_BOUNDARY_ROW, 3: SINGULAR_PROBLEM}
+# what functions of core.c return
+FAILURES = {1: SINGULAR_STAGES, 2: BAD_BOUNDARY_ROW, 3: SINGULAR_PROBLEM}
+Linearisation = tuple[Array, Array, Array, Array, Array, Indices]
 
 
 def factorise_system(rule: GaussRule, steps: Array, jacobians: Array, left: Array, right: Array,
@@ -30,12 +31,11 @@ def factorise_system(rule: GaussRule, steps: Array, jacobians: Array, left: Arra
     The arguments are those of `NewtonSystem`, and so are the errors.
 
     """
-    sizes = CoreSizes(scale.size, left.shape[0], explicit.size, rule.stages,
-                      int(jacobians.ndim == 4))
-    core = load_core(sizes)
+    core = load_core(CoreSizes(scale.size, left.shape[0], explicit.size, rule.stages,
+                               int(jacobians.ndim == 4)))
     if core is None:
         return NewtonSystem(rule, steps, jacobians, left, right, scale, explicit)
-    return CompiledSystem(core, rule, steps, jacobians, left, right, scale, explicit)
+    return CompiledSystem.factorise(core, rule, (steps, jacobians, left, right, scale, explicit))
 
 
 class CompiledSystem:
@@ -46,32 +46,39 @@ class CompiledSystem:
     ----------
     core : Core
         Compiled for these sizes.
-    rule, steps, jacobians, left, right, scale, explicit
-        Those of `NewtonSystem`.
-
-    Raises
-    ------
-    SingularSystemError
-        If a factor is singular or not finite.
+    rule : GaussRule
+        The method.
+    parts : tuple
+        The other arguments of `NewtonSystem`.
+    factors : numpy.ndarray
+        Memory in which core.c has factorised it.
 
     """
 
-    def __init__(self, core: Core, rule: GaussRule, steps: Array, jacobians: Array, left: Array,
-                 right: Array, scale: Array, explicit: Indices) -> None:
-        self._core, self._rule = core, rule
-        self._parts = steps, jacobians, left, right, scale, explicit
-        self._shape = steps.size, rule.stages, scale.size
-        # memory that has been used before: fresh pages cost as much as the arithmetic
-        self._factors = np.empty(core.factorisation_size(steps.size), dtype=np.uint8)
-        indices = (explicit, np.setdiff1d(np.arange(scale.size), explicit))
-        numbers = map(_contiguous, (steps, jacobians, left, right, scale))
-        arrays: list[Any] = [
-            pack_rule(rule), *numbers,
-            *(np.ascontiguousarray(part, dtype=np.intc) for part in indices)]
-        failure = core.factorise_system(self._factors.ctypes.data, steps.size,
-                                        *(array.ctypes.data for array in arrays))
+    def __init__(self, core: Core, rule: GaussRule, parts: Linearisation,
+                 factors: Array) -> None:
+        self._core, self._rule, self._parts, self._factors = core, rule, parts, factors
+
+    @classmethod
+    def factorise(cls, core: Core, rule: GaussRule, parts: Linearisation) -> CompiledSystem:
+        """
+        Return the system, factorised.
+
+        Raises
+        ------
+        SingularSystemError
+            If a factor is singular or not finite.
+
+        """
+        *numbers, explicit = parts
+        factors = core.allocate(numbers[0].size)
+        arrays: list[Any] = [pack_rule(rule), *map(_contiguous, numbers),
+                             *split_indices(numbers[-1].size, explicit)]
+        failure = core.factorise_system(factors.ctypes.data, numbers[0].size,
+                                        *(array.ctypes.data for array in arrays), None)
         if failure:
-            raise SingularSystemError(_FAILURES[failure])
+            raise SingularSystemError(FAILURES[failure])
+        return cls(core, rule, parts, factors)
 
     def with_rule(self, rule: GaussRule) -> LinearSystem:
         """Return the system of another rule on the same mesh, see `NewtonSystem.with_rule`."""
@@ -81,13 +88,20 @@ class CompiledSystem:
 
     def correction(self, residual: Residual) -> tuple[Array, Array]:
         """Return the correction of nodes (N + 1, m) and stage derivatives (N, s, m)."""
-        count, stages, size = self._shape
-        nodes, rates = np.empty((count + 1, size)), np.empty((count, stages, size))
+        count, size = self._parts[0].size, self._parts[4].size
+        nodes, rates = np.empty((count + 1, size)), np.empty((count, self._rule.stages, size))
         given = [_contiguous(part) for part in (residual.stages, residual.steps, residual.left,
                                                 residual.right)]
         self._core.correct(self._factors.ctypes.data, count,
                            *(array.ctypes.data for array in (*given, nodes, rates)))
         return nodes, rates
+
+
+def split_indices(size: int, explicit: Indices) -> tuple[Any, Any]:
+    """Return the explicit and the implicit unknowns as core.c wants them."""
+    implicit = np.ones(size, dtype=bool)
+    implicit[explicit] = False
+    return np.ascontiguousarray(explicit, dtype=np.intc), np.flatnonzero(implicit).astype(np.intc)
 
 
 def _contiguous(values: Any) -> Array:

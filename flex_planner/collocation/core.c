@@ -10,8 +10,11 @@
  * interval and those carried over from the interval before, with pivoting over all these rows:
  * the same rows as the band of linear.py has.
  */
+#define _POSIX_C_SOURCE 199309L
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #define UP(n) (((n) + 3) / 4 * 4)  /* whole vectors */
 
@@ -37,7 +40,47 @@ enum {
     TERMS = STAGES * IMPLICIT /* unknowns of exact stage equations */
 };
 
-enum { SOLVED = 0, SINGULAR_STAGES = 1, BAD_BOUNDARY_ROW = 2, SINGULAR_NODES = 3 };
+enum {
+    SOLVED = 0,
+    SINGULAR_STAGES = 1,
+    BAD_BOUNDARY_ROW = 2,
+    SINGULAR_NODES = 3,
+    RATE_NOT_FINITE = 4,
+    CORRECTION_NOT_FINITE = 5,
+    NO_STEP_HELPS = 6,
+    NOT_CONVERGED = 7,
+    REFUSED = 8, /* by the boundary rows of the problem */
+    STOPPED = 9, /* by who watches */
+    NO_MEMORY = 10
+};
+
+/* who watches may stop the work; asked again after some milliseconds */
+struct watch {
+    int (*stop)(void);
+    double asked; /* [s] */
+};
+
+static const double PATIENCE = 5e-3; /* [s] */
+
+static double seconds(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return now.tv_sec + 1e-9 * now.tv_nsec;
+}
+
+static int ask(struct watch *watch)
+{
+    watch->asked = seconds();
+    return watch->stop();
+}
+
+/* whether to stop; the clock is looked at every few intervals only */
+static int interrupted(struct watch *watch, long long interval)
+{
+    if (!watch || interval % 8 || seconds() - watch->asked < PATIENCE) return 0;
+    return ask(watch);
+}
 
 /* what `pack_rule` of core.py writes, in this order; complex rows are laid out as lanes */
 struct rule {
@@ -83,6 +126,7 @@ struct scales {
 /* what is kept of a factorisation, in memory of the caller */
 struct factorisation {
     struct rule rule;
+    struct watch *watch; /* or none */
     struct scales scales;
     struct last_node last;
     struct interval intervals[];
@@ -729,18 +773,19 @@ static int eliminate_node(struct interval *k, double panel[ROWS][WIDTH])
 }
 
 /*
- * Factorise the linearised equations; what comes of it is kept in f.
+ * Factorise the linearised equations; what comes of it is kept in f. Nobody need watch.
  *
  * jacobians (N, m, m), or (N, s, m, m) with EXACT; left (l, m) and right (m - l, m): boundary rows.
  */
 int factorise_system(struct factorisation *f, long long count, const struct rule *rule,
                      const double *steps, const double *jacobians, const double *left,
                      const double *right, const double *scale, const int *explicit,
-                     const int *implicit)
+                     const int *implicit, struct watch *watch)
 {
     struct scales *s = &f->scales;
     double panel[ROWS][WIDTH], carried[LEFT + 1][SIZE], transition[SIZE][SIZE];
     f->rule = *rule;
+    f->watch = watch;
     memcpy(s->explicit, explicit, EXPLICIT * sizeof *explicit);
     memcpy(s->implicit, implicit, IMPLICIT * sizeof *implicit);
     memcpy(s->unknown, scale, sizeof s->unknown);
@@ -749,6 +794,7 @@ int factorise_system(struct factorisation *f, long long count, const struct rule
         for (int j = 0; j < SIZE; ++j) carried[i][j] = left[i * SIZE + j] * scale[j] / s->row[i];
     for (long long n = 0; n < count; ++n) {
         struct interval *k = f->intervals + n;
+        if (interrupted(f->watch, n)) return STOPPED;
         k->step = steps[n];
         if (!factorise_stages(k, s, &f->rule, jacobians + n * (long long)(sizeof k->jacobian / 8),
                               transition))
@@ -771,15 +817,16 @@ int factorise_system(struct factorisation *f, long long count, const struct rule
 }
 
 /* eliminate the nodes from the right-hand side; what is left of it stands in `nodes` */
-static void substitute_forwards(struct factorisation *f, long long count, const double *stages,
-                                const double *gaps, const double *left, const double *right,
-                                double *nodes)
+static int substitute_forwards(struct factorisation *f, long long count, const double *stages,
+                               const double *gaps, const double *left, const double *right,
+                               double *nodes)
 {
     const struct scales *s = &f->scales;
     double rhs[ROWS], end[SIZE];
     for (int i = 0; i < LEFT; ++i) rhs[i] = -left[i] / s->row[i];
     for (long long n = 0; n < count; ++n) {
         struct interval *k = f->intervals + n;
+        if (interrupted(f->watch, n)) return STOPPED;
         force_stages(k, s, &f->rule, (const double (*)[SIZE])(stages + n * STAGES * SIZE), end);
         for (int i = 0; i < SIZE; ++i)
             rhs[LEFT + i] = (-gaps[n * SIZE + i] - end[i]) / s->unknown[i];
@@ -795,6 +842,7 @@ static void substitute_forwards(struct factorisation *f, long long count, const 
     }
     for (int i = 0; i < RIGHT; ++i) rhs[LEFT + i] = -right[i] / s->row[LEFT + i];
     memcpy(nodes + count * SIZE, rhs, SIZE * sizeof *rhs);
+    return SOLVED;
 }
 
 /*
@@ -802,11 +850,11 @@ static void substitute_forwards(struct factorisation *f, long long count, const 
  *
  * stages (N, s, m), gaps (N, m), left (l,), right (m - l,): see `Residual` of linear.py.
  */
-void correct(struct factorisation *f, long long count, const double *stages, const double *gaps,
-             const double *left, const double *right, double *nodes, double *corrections)
+int correct(struct factorisation *f, long long count, const double *stages, const double *gaps,
+            const double *left, const double *right, double *nodes, double *corrections)
 {
     const struct scales *s = &f->scales;
-    substitute_forwards(f, count, stages, gaps, left, right, nodes);
+    if (substitute_forwards(f, count, stages, gaps, left, right, nodes)) return STOPPED;
     substitute(SIZE, SIZE, f->last.factors, f->last.pivots, nodes + count * SIZE);
     for (long long n = count - 1; n >= 0; --n) {
         double *node = nodes + n * SIZE;
@@ -817,7 +865,348 @@ void correct(struct factorisation *f, long long count, const double *stages, con
     }
     for (long long n = 0; n <= count; ++n)
         for (int i = 0; i < SIZE; ++i) nodes[n * SIZE + i] *= s->unknown[i];
-    for (long long n = 0; n < count; ++n)
+    for (long long n = 0; n < count; ++n) {
+        if (interrupted(f->watch, n)) return STOPPED;
         correct_stages(f->intervals + n, s, &f->rule, nodes + n * SIZE,
                        (double (*)[SIZE])(corrections + n * STAGES * SIZE));
+    }
+    return SOLVED;
+}
+
+/* ---- The equations --------------------------------------------------------------------------- */
+
+/*
+ * A compiled function of many points: in[0] holds points (n, m), the other inputs are the same for
+ * all of them; out[0] receives F (n, m), out[1] dF/dz (n, m, m) if the function has it.
+ */
+typedef int batch(long long n, int chain, const double *const *in, double *const *out);
+
+/* the boundary rows at the first and last node, and where asked for (not NULL) their Jacobians */
+typedef int boundary_rows(const double *first, const double *last, double *left, double *right,
+                          double *left_rows, double *right_rows);
+
+enum { MOST_INPUTS = 8 };
+
+struct problem {
+    batch *rate, *rate_jacobian;
+    boundary_rows *ends;
+    const double *shared[MOST_INPUTS]; /* inputs of the functions after the first */
+};
+
+struct residual {
+    double *stages, *gaps, left[LEFT + 1], right[RIGHT + 1];
+};
+
+static int all_finite(long long n, const double *x)
+{
+    double sum = 0; /* of zeros, unless one is not finite */
+    for (long long j = 0; j < n; ++j) sum += 0 * x[j];
+    return sum == 0;
+}
+
+static void find_stage_values(const struct rule *rule, double step, const double *node,
+                              const double *rates, double (*values)[SIZE])
+{
+    for (int i = 0; i < STAGES; ++i) {
+        memcpy(values[i], node, sizeof values[i]);
+        for (int j = 0; j < STAGES; ++j)
+            add_multiple(SIZE, values[i], step * rule->matrix[i][j], rates + j * SIZE);
+    }
+}
+
+/* the residual of one interval, and if asked for its Jacobian: the mean, or those of all stages */
+static int evaluate_interval(const struct problem *p, const struct rule *rule, double step,
+                             const double *node, const double *rates, double *residual,
+                             double *gap, double *jacobian)
+{
+    double values[STAGES][SIZE], rate[STAGES * SIZE], at_stages[STAGES * SIZE * SIZE];
+    const double *in[1 + MOST_INPUTS];
+    double *out[2] = {rate, at_stages};
+    find_stage_values(rule, step, node, rates, values);
+    in[0] = values[0];
+    memcpy(in + 1, p->shared, sizeof p->shared);
+    if ((jacobian ? p->rate_jacobian : p->rate)(STAGES, 0, in, out)) return NO_MEMORY;
+    for (int j = 0; j < STAGES * SIZE; ++j) residual[j] = rates[j] - rate[j];
+    for (int j = 0; j < SIZE; ++j) gap[j] = node[SIZE + j] - node[j];
+    for (int i = 0; i < STAGES; ++i) add_multiple(SIZE, gap, -step * rule->b[i], rates + i * SIZE);
+    if (!jacobian) return SOLVED; /* a correction that is not finite will tell */
+#if EXACT
+    memcpy(jacobian, at_stages, sizeof at_stages);
+    if (!all_finite(STAGES * SIZE * SIZE, jacobian)) return RATE_NOT_FINITE;
+#else
+    memset(jacobian, 0, SIZE * SIZE * sizeof *jacobian);
+    for (int i = 0; i < STAGES; ++i)
+        add_multiple(SIZE * SIZE, jacobian, rule->b[i], at_stages + i * SIZE * SIZE);
+    if (!all_finite(SIZE * SIZE, jacobian)) return RATE_NOT_FINITE;
+#endif
+    return all_finite(STAGES * SIZE, rate) ? SOLVED : RATE_NOT_FINITE;
+}
+
+/* the residual of all equations but the boundary rows, and if asked for the Jacobians */
+int evaluate(const struct problem *p, long long count, const struct rule *rule,
+             const double *steps, const double *nodes, const double *stages, double *residual,
+             double *gaps, double *jacobians, struct watch *watch)
+{
+    const int block = SIZE * SIZE * (EXACT ? STAGES : 1);
+    for (long long n = 0; n < count; ++n) {
+        if (interrupted(watch, n)) return STOPPED;
+        int failure = evaluate_interval(p, rule, steps[n], nodes + n * SIZE,
+                                        stages + n * STAGES * SIZE, residual + n * STAGES * SIZE,
+                                        gaps + n * SIZE, jacobians ? jacobians + n * block : NULL);
+        if (failure) return failure;
+    }
+    return SOLVED;
+}
+
+/* ---- Newton's method ------------------------------------------------------------------------- */
+
+/* nodes (N + 1, m) and stage derivatives (N, s, m): a point, or a correction and its size */
+struct point {
+    double *nodes, *stages, norm;
+};
+
+/* one run on one mesh, see newton.py; core.py has the same fields in the same order */
+struct newton {
+    long long count, most_iterations;
+    double tolerance, kept, smallest_step;
+    const struct rule *rule;
+    const double *steps, *least_scale;
+    const int *explicit, *implicit;
+    struct problem problem;
+    int (*stop)(void);
+    void (*report)(double norm);
+    double *nodes, *stages; /* first the guess, then the last point accepted */
+    /* the last linear system, and what it was made of */
+    struct factorisation *factorisation;
+    double *jacobians, *left_rows, *right_rows, *scale;
+    /* what comes of it */
+    double norm;
+    long long iterations, factorised, coarse;
+};
+
+/* what one run keeps besides */
+struct run {
+    struct newton *n;
+    struct watch watch;
+    struct point solution, trial, full, simplified, following;
+    struct residual residual;
+    double step;
+    /* of the last damped step: sizes of its corrections and how far they were apart; or none */
+    int remembers;
+    double before_norm, simplified_size, difference;
+};
+
+static double size_of(const struct run *r, const double *nodes)
+{
+    double sum = 0, inverse[SIZE];
+    const long long rows = r->n->count + 1;
+    for (int j = 0; j < SIZE; ++j) inverse[j] = 1 / r->n->scale[j];
+    for (long long n = 0; n < rows; ++n) {
+        double scaled[SIZE];
+        for (int j = 0; j < SIZE; ++j) scaled[j] = nodes[n * SIZE + j] * inverse[j];
+        sum += dot(SIZE, scaled, scaled);
+    }
+    return sqrt(sum / (rows * SIZE));
+}
+
+static void find_scale(struct run *r)
+{
+    memcpy(r->n->scale, r->n->least_scale, SIZE * sizeof(double));
+    for (long long n = 0; n <= r->n->count; ++n)
+        for (int j = 0; j < SIZE; ++j) {
+            double size = fabs(r->solution.nodes[n * SIZE + j]);
+            if (!(size <= r->n->scale[j])) r->n->scale[j] = size;
+        }
+}
+
+static int find_residual(struct run *r, const struct point *at, int with_jacobians)
+{
+    const struct newton *n = r->n;
+    const double *last = at->nodes + n->count * SIZE;
+    int failure = evaluate(&n->problem, n->count, n->rule, n->steps, at->nodes, at->stages,
+                           r->residual.stages, r->residual.gaps,
+                           with_jacobians ? n->jacobians : NULL, &r->watch);
+    if (failure) return failure;
+    return n->problem.ends(at->nodes, last, r->residual.left, r->residual.right,
+                           with_jacobians ? n->left_rows : NULL,
+                           with_jacobians ? n->right_rows : NULL);
+}
+
+/* the correction that belongs to the residual found last */
+static int measure(struct run *r, struct point *correction)
+{
+    int failure = correct(r->n->factorisation, r->n->count, r->residual.stages, r->residual.gaps,
+                          r->residual.left, r->residual.right, correction->nodes,
+                          correction->stages);
+    if (failure) return failure;
+    correction->norm = size_of(r, correction->nodes);
+    return isfinite(correction->norm) ? SOLVED : CORRECTION_NOT_FINITE;
+}
+
+static void move(const struct run *r, const struct point *step, double factor)
+{
+    const long long nodes = (r->n->count + 1) * SIZE, stages = r->n->count * STAGES * SIZE;
+    INDEPENDENT
+    for (long long j = 0; j < nodes; ++j)
+        r->trial.nodes[j] = r->solution.nodes[j] + factor * step->nodes[j];
+    INDEPENDENT
+    for (long long j = 0; j < stages; ++j)
+        r->trial.stages[j] = r->solution.stages[j] + factor * step->stages[j];
+}
+
+static void swap_points(struct point *a, struct point *b)
+{
+    struct point held = *a;
+    *a = *b;
+    *b = held;
+}
+
+/* how far a simplified correction is from what a linear problem would have, relative to scale */
+static double find_bend(struct run *r, double step)
+{
+    double *bend = r->following.nodes; /* free while a step is damped */
+    for (long long j = 0; j < (r->n->count + 1) * SIZE; ++j)
+        bend[j] = r->simplified.nodes[j] - (1 - step) * r->full.nodes[j];
+    return size_of(r, bend);
+}
+
+static void remember(struct run *r)
+{
+    double size = 0, difference = 0;
+    for (long long j = 0; j < (r->n->count + 1) * SIZE; ++j) {
+        double apart = r->simplified.nodes[j] - r->full.nodes[j];
+        size += r->simplified.nodes[j] * r->simplified.nodes[j];
+        difference += apart * apart;
+    }
+    r->remembers = 1;
+    r->before_norm = r->full.norm;
+    r->simplified_size = sqrt(size);
+    r->difference = sqrt(difference);
+}
+
+/* the step that the observed nonlinearity allows */
+static double predict(const struct run *r)
+{
+    if (!r->remembers || r->difference == 0) return 1;
+    double ratio = r->simplified_size * r->before_norm / (r->difference * r->full.norm);
+    return fmin(1, fmax(r->step * ratio, r->n->smallest_step));
+}
+
+/* move to the first point along the correction that passes the test */
+static int damp(struct run *r)
+{
+    double step = r->step = predict(r), bent = 0, tried = 1;
+    while (step >= r->n->smallest_step) {
+        if (ask(&r->watch)) return STOPPED;
+        move(r, &r->full, step);
+        int failure = find_residual(r, &r->trial, 0);
+        if (!failure) failure = measure(r, &r->simplified);
+        if (failure == REFUSED || failure == CORRECTION_NOT_FINITE) {
+            step /= 4;
+            continue;
+        }
+        if (failure) return failure;
+        if (r->simplified.norm <= (1 - step / 4) * r->full.norm) {
+            swap_points(&r->solution, &r->trial);
+            r->step = step;
+            return SOLVED;
+        }
+        bent = find_bend(r, step);
+        tried = step;
+        step = fmin(step / 2, fmax(step * step * r->full.norm / (2 * bent), step / 10));
+    }
+    /* a wrong matrix bends the correction with the step, nonlinearity with its square */
+    r->n->coarse = bent > 0.5 * tried * r->full.norm;
+    return NO_STEP_HELPS;
+}
+
+/* a damped step, then corrections with the same matrix while they converge */
+static int advance(struct run *r)
+{
+    struct newton *n = r->n;
+    int failure = damp(r);
+    if (failure) return failure;
+    remember(r);
+    double last = r->full.norm;
+    while (r->step == 1 && r->simplified.norm <= fmax(n->kept * last, n->tolerance)) {
+        n->norm = last = r->simplified.norm;
+        move(r, &r->simplified, 1);
+        if (last <= n->tolerance) {
+            swap_points(&r->solution, &r->trial);
+            return SOLVED;
+        }
+        failure = find_residual(r, &r->trial, 0);
+        if (!failure) failure = measure(r, &r->following);
+        if (failure) return failure;
+        if (r->following.norm > last) break;
+        swap_points(&r->solution, &r->trial);
+        swap_points(&r->simplified, &r->following);
+        r->remembers = 0;
+    }
+    return NOT_CONVERGED;
+}
+
+/* factorise once and move as far as the matrix is good for */
+static int iterate(struct run *r)
+{
+    struct newton *n = r->n;
+    if (ask(&r->watch)) return STOPPED;
+    find_scale(r);
+    int failure = find_residual(r, &r->solution, 1);
+    if (failure) return failure;
+    n->factorised = 0;
+    failure = factorise_system(n->factorisation, n->count, n->rule, n->steps, n->jacobians,
+                               n->left_rows, n->right_rows, n->scale, n->explicit,
+                               n->implicit, &r->watch);
+    if (failure) return failure;
+    n->factorised = 1;
+    failure = measure(r, &r->full);
+    if (failure) return failure;
+    n->iterations += 1;
+    n->norm = r->full.norm;
+    n->report(n->norm);
+    if (n->norm <= n->tolerance) {
+        move(r, &r->full, 1);
+        swap_points(&r->solution, &r->trial);
+        return SOLVED;
+    }
+    return advance(r);
+}
+
+/* share out memory among the points of a run; how much it takes where there is none */
+static long long place_points(struct run *r, double *memory)
+{
+    const long long nodes = (r->n->count + 1) * SIZE, stages = r->n->count * STAGES * SIZE;
+    struct point *points[] = {&r->trial, &r->full, &r->simplified, &r->following};
+    long long used = 0;
+    for (int i = 0; i < 4; ++i) {
+        points[i]->nodes = memory + used;
+        points[i]->stages = memory + used + nodes;
+        used += nodes + stages;
+    }
+    r->residual.gaps = memory + used;
+    r->residual.stages = memory + used + nodes;
+    return used + nodes + stages;
+}
+
+/* solve the collocation equations on one mesh; returns why it ended */
+int solve_newton(struct newton *n)
+{
+    struct run r = {.n = n, .watch = {.stop = n->stop}, .step = 1};
+    static double none[1];
+    double *memory = malloc(place_points(&r, none) * sizeof *memory);
+    int outcome = NOT_CONVERGED;
+    if (!memory) return NO_MEMORY;
+    place_points(&r, memory);
+    r.solution.nodes = n->nodes;
+    r.solution.stages = n->stages;
+    n->norm = INFINITY;
+    n->iterations = n->factorised = n->coarse = 0;
+    while (outcome == NOT_CONVERGED && n->iterations < n->most_iterations) outcome = iterate(&r);
+    if (r.solution.nodes != n->nodes) {
+        memcpy(n->nodes, r.solution.nodes, (n->count + 1) * SIZE * sizeof *memory);
+        memcpy(n->stages, r.solution.stages, n->count * STAGES * SIZE * sizeof *memory);
+    }
+    free(memory);
+    return outcome;
 }

@@ -8,23 +8,53 @@ the environment says ``FLEX_PLANNER_CORE=numpy``.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import ctypes
 from functools import cache
 import os
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from flex_planner.base.compiled_library import build_library, content_key, find_library
 from flex_planner.base.compiler import CompilerError
 from flex_planner.base.library_cache import warn_once
 from flex_planner.base.validation import Array
 from flex_planner.collocation.gauss import ComplexArray, GaussRule
+from flex_planner.collocation.problem import CompiledRate
 import numpy as np
 
 CORE_VARIABLE = 'FLEX_PLANNER_CORE'
 _SOURCE = Path(__file__).with_name('core.c')
 # no -ffast-math: it makes the whole process round tiny numbers to zero
 _OPTIONS = ('-O3', '-fno-math-errno', '-fno-trapping-math')
+
+
+_address, _number, _real = ctypes.c_void_p, ctypes.c_longlong, ctypes.c_double
+# functions that core.c calls: the boundary rows, who may stop it, and who hears of an iteration
+BOUNDARY_ROWS = ctypes.CFUNCTYPE(ctypes.c_int, *[_address] * 6)
+STOP = ctypes.CFUNCTYPE(ctypes.c_int)
+REPORT = ctypes.CFUNCTYPE(None, _real)
+MOST_INPUTS = 8
+
+
+class CoreProblem(ctypes.Structure):
+    """`struct problem` of core.c."""
+
+    _fields_ = [('rate', _address), ('rate_jacobian', _address), ('ends', BOUNDARY_ROWS),
+                ('shared', _address * MOST_INPUTS)]
+
+
+class CoreNewton(ctypes.Structure):
+    """`struct newton` of core.c."""
+
+    _fields_ = [
+        ('count', _number), ('most_iterations', _number), ('tolerance', _real), ('kept', _real),
+        ('smallest_step', _real), ('rule', _address), ('steps', _address),
+        ('least_scale', _address), ('explicit', _address), ('implicit', _address),
+        ('problem', CoreProblem), ('stop', STOP), ('report', REPORT), ('nodes', _address),
+        ('stages', _address), ('factorisation', _address), ('jacobians', _address),
+        ('left_rows', _address), ('right_rows', _address), ('scale', _address),
+        ('norm', _real), ('iterations', _number), ('factorised', _number), ('coarse', _number)]
 
 
 class CoreSizes(NamedTuple):
@@ -71,15 +101,21 @@ class Core:
 
     def __init__(self, library: Path) -> None:
         functions = ctypes.CDLL(str(library))
-        number, address = ctypes.c_longlong, ctypes.c_void_p
         self.factorisation_size = functions.factorisation_size
-        self.factorisation_size.argtypes = (number,)
-        self.factorisation_size.restype = number
+        self.factorisation_size.argtypes = (_number,)
+        self.factorisation_size.restype = _number
         self.factorise_system = functions.factorise_system
-        self.factorise_system.argtypes = (address, number, *[address] * 8)
+        self.factorise_system.argtypes = (_address, _number, *[_address] * 9)
         self.correct = functions.correct
-        self.correct.argtypes = (address, number, *[address] * 6)
-        self.correct.restype = None
+        self.correct.argtypes = (_address, _number, *[_address] * 6)
+        self.evaluate = functions.evaluate
+        self.evaluate.argtypes = (ctypes.POINTER(CoreProblem), _number, *[_address] * 8)
+        self.solve_newton = functions.solve_newton
+        self.solve_newton.argtypes = (ctypes.POINTER(CoreNewton),)
+
+    def allocate(self, intervals: int) -> Any:
+        """Return memory for a factorisation; it was often used before, and need not be cleared."""
+        return np.empty(self.factorisation_size(intervals), dtype=np.uint8)
 
 
 def load_core(sizes: CoreSizes) -> Core | None:
@@ -102,6 +138,15 @@ def _load_core(sizes: CoreSizes) -> Core | None:
     except CompilerError as error:
         warn_once(f'{error}: NumPy solves the equations of a motion, some three times slower')
     return None
+
+
+def core_problem(rate: CompiledRate, ends: Callable[..., int] | None = None) -> CoreProblem:
+    """Return a problem as core.c knows it."""
+    shared = [array.ctypes.data for array in rate.shared]
+    addresses = (ctypes.c_void_p * MOST_INPUTS)(*shared)
+    rows = BOUNDARY_ROWS(ends) if ends else BOUNDARY_ROWS()
+    return CoreProblem(rate=rate.rate, rate_jacobian=rate.rate_jacobian, ends=rows,
+                       shared=addresses)
 
 
 @cache

@@ -90,6 +90,10 @@ class BatchFunction(Protocol):
 
         """
 
+    @property
+    def address(self) -> int | None:
+        """Return the address of its loop over points, None if it is interpreted."""
+
 
 class _NativeFunction:
     """A function of a compiled library."""
@@ -122,6 +126,10 @@ class _NativeFunction:
                 raise MemoryError('no memory to evaluate a compiled function')
 
         return run
+
+    @property
+    def address(self) -> int | None:
+        return ctypes.cast(self._call, ctypes.c_void_p).value
 
 
 def _pointers(arrays: Sequence[Array]) -> ctypes.Array[ctypes.c_void_p]:
@@ -160,6 +168,10 @@ class _InterpretedFunction:
                 target[...] = result
 
         return run
+
+    @property
+    def address(self) -> int | None:
+        return None
 
 
 def load_functions(key: str, build: Builder) -> dict[str, BatchFunction]:

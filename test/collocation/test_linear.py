@@ -29,7 +29,7 @@ def factorise_by(method: str, rule: GaussRule, *parts: Any) -> LinearSystem:
     core = load_core(CoreSizes(scale.size, len(left), explicit.size, rule.stages,
                                int(jacobians.ndim == 4)))
     assert core is not None, 'there is no C compiler'
-    return CompiledSystem(core, rule, *parts)
+    return CompiledSystem.factorise(core, rule, parts)
 
 
 @pytest.fixture(params=['numpy', 'compiled'])
