@@ -991,9 +991,9 @@ struct run {
     struct point solution, trial, full, simplified, following;
     struct residual residual;
     double step;
-    /* of the last damped step: sizes of its corrections and how far they were apart; or none */
+    /* whether the simplified correction is still that of the last damped step, and its norm then */
     int remembers;
-    double before_norm, simplified_size, difference;
+    double before_norm;
 };
 
 static double size_of(const struct run *r, const double *nodes)
@@ -1070,25 +1070,18 @@ static double find_bend(struct run *r, double step)
     return size_of(r, bend);
 }
 
-static void remember(struct run *r)
-{
-    double size = 0, difference = 0;
-    for (long long j = 0; j < (r->n->count + 1) * SIZE; ++j) {
-        double apart = r->simplified.nodes[j] - r->full.nodes[j];
-        size += r->simplified.nodes[j] * r->simplified.nodes[j];
-        difference += apart * apart;
-    }
-    r->remembers = 1;
-    r->before_norm = r->full.norm;
-    r->simplified_size = sqrt(size);
-    r->difference = sqrt(difference);
-}
-
-/* the step that the observed nonlinearity allows */
+/* the step that the nonlinearity observed at the last one allows */
 static double predict(const struct run *r)
 {
-    if (!r->remembers || r->difference == 0) return 1;
-    double ratio = r->simplified_size * r->before_norm / (r->difference * r->full.norm);
+    if (!r->remembers) return 1;
+    double size = 0, difference = 0;
+    for (long long j = 0; j < (r->n->count + 1) * SIZE; ++j) {
+        double before = r->simplified.nodes[j], apart = before - r->full.nodes[j];
+        size += before * before;
+        difference += apart * apart;
+    }
+    if (difference == 0) return 1;
+    double ratio = sqrt(size) * r->before_norm / (sqrt(difference) * r->full.norm);
     return fmin(1, fmax(r->step * ratio, r->n->smallest_step));
 }
 
@@ -1126,7 +1119,8 @@ static int advance(struct run *r)
     struct newton *n = r->n;
     int failure = damp(r);
     if (failure) return failure;
-    remember(r);
+    r->remembers = 1;
+    r->before_norm = r->full.norm;
     double last = r->full.norm;
     while (r->step == 1 && r->simplified.norm <= fmax(n->kept * last, n->tolerance)) {
         n->norm = last = r->simplified.norm;
