@@ -125,6 +125,12 @@ def load_core(sizes: CoreSizes) -> Core | None:
     return _load_core(sizes)
 
 
+def prepare_core(size: int, left: int, explicit: int, stages: int) -> None:
+    """Compile what solving a problem takes, unless it is kept: its rule and that of estimates."""
+    for count in (stages, stages + 1):
+        load_core(CoreSizes(size, left, explicit, count, 0))
+
+
 @cache
 def _load_core(sizes: CoreSizes) -> Core | None:
     source = _SOURCE.read_text()

@@ -16,6 +16,8 @@ from flex_planner.arms.arm import Arm
 from flex_planner.base.compiled_library import content_key
 from flex_planner.base.errors import InvalidTaskError
 from flex_planner.base.validation import Array
+from flex_planner.collocation import SolverSettings
+from flex_planner.collocation.core import prepare_core
 from flex_planner.collocation.problem import CompiledRate
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.cache_key import cache_key, describe_fields, FREE_FIELDS
@@ -87,9 +89,11 @@ class ArmModel(ArmDynamics):
         return cls.of(arm) if missed.any() else given
 
     def prepare(self) -> None:
-        """Load the functions from disk, or compile them."""
+        """Load the functions and the core of the solver from disk, or compile them."""
         super().prepare()
         self._load_optimality('optimality')
+        half = 2 * self.arm.n_coordinates
+        prepare_core(2 * half, half, half, SolverSettings().stages)
 
     def optimality(self, z: Array, p: Array) -> Array:
         """Return z' of eqs. (11) and (12), shape (k, 4 n_t)."""
