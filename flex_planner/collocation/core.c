@@ -1148,6 +1148,7 @@ static int iterate(struct run *r)
     find_scale(r);
     int failure = find_residual(r, &r->solution, 1);
     if (failure) return failure;
+    if (ask(&r->watch)) return STOPPED; /* between the two long parts */
     n->factorised = 0;
     failure = factorise_system(n->factorisation, n->count, n->rule, n->steps, n->jacobians,
                                n->left_rows, n->right_rows, n->scale, n->explicit,
