@@ -8,7 +8,7 @@ the compiled functions stay in the user's cache folder.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 import math
 import os
 from pathlib import Path
@@ -18,6 +18,8 @@ from applied_torques import Case, crane_plan
 from factories import PlanFactory, TaskFactory
 from flex_planner.arms.arm import Arm, Joint, Link, Motor, Node
 from flex_planner.arms.arm_files import load_arm
+from flex_planner.collocation import core
+from flex_planner.dynamics import compiled_integration
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.task import postures_from_points, Task
 from flex_planner.planning.plan import Plan
@@ -58,6 +60,14 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 def _wholes(identifier: str) -> tuple[str, str]:
     """Return the ids of the test that a case is of, and of its file."""
     return identifier.partition('[')[0], identifier.partition('::')[0]
+
+
+@pytest.fixture(autouse=True)
+def failed_compilations_are_forgotten() -> Iterator[None]:
+    """Let what one test could not compile be compiled by the next; what is there is read again."""
+    yield
+    for load in (core._load_core, compiled_integration._load):
+        load.cache_clear()
 
 
 @pytest.fixture(scope='session')

@@ -93,6 +93,10 @@ class Monitor:
         """Return whether the work has used up its share; never, unless it has one."""
         return False
 
+    def iterations_left(self, intervals: int) -> float:
+        """Return how many iterations on a mesh there may be: any number of them."""
+        return math.inf
+
     def check(self) -> None:
         """Raise StoppedError if the work should stop now."""
         reason = self.stop_reason()
@@ -137,6 +141,11 @@ class LimitedMonitor(Monitor):
     def exhausted(self) -> bool:
         """Return whether its share is used up."""
         return self.share <= 0
+
+    def iterations_left(self, intervals: int) -> float:
+        """Return how many iterations on a mesh it has still, as a whole number or infinity."""
+        own = math.inf if math.isinf(self.share) else max(0, math.ceil(self.share / intervals))
+        return min(own, self.whole.iterations_left(intervals))
 
     def stop_reason(self) -> StopReason | None:
         """Return the reason to stop the whole work now, or None."""

@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
+import ctypes
+
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
-from flex_planner.collocation.linear import NewtonSystem, Residual, SingularSystemError
-from flex_planner.collocation.problem import BoundaryValueProblem
+from flex_planner.collocation.compiled_system import factorise_system
+from flex_planner.collocation.core import core_problem, CoreSizes, load_core, pack_rule
+from flex_planner.collocation.linear import LinearSystem, Residual
+from flex_planner.collocation.problem import (
+    BoundaryValueProblem,
+    compiled_rate_of,
+    RATE_NOT_FINITE,
+    SingularSystemError,
+)
 from flex_planner.collocation.solution import CollocationSolution
 import numpy as np
 
@@ -22,9 +31,32 @@ def magnitudes(problem: BoundaryValueProblem, solution: CollocationSolution) -> 
 def collocation_residual(problem: BoundaryValueProblem,
                          solution: CollocationSolution) -> Residual:
     """Return the residual of the collocation equations at a point."""
+    compiled = _compiled_residual(problem, solution)
+    if compiled is not None:
+        return compiled
     values = solution.stage_values().reshape(-1, problem.size)
     rate = problem.rate(solution.stage_times().ravel(), values)
     return _residual(problem, solution, rate.reshape(solution.stages.shape))
+
+
+def _compiled_residual(problem: BoundaryValueProblem,
+                       solution: CollocationSolution) -> Residual | None:
+    """Return the residual by compiled code, None where there is none."""
+    rate = compiled_rate_of(problem)
+    if rate is None:
+        return None
+    left, right = problem.left(solution.nodes[0])[0], problem.right(solution.nodes[-1])[0]
+    core = load_core(CoreSizes(problem.size, left.size, problem.explicit.size,
+                               solution.rule.stages, 0))
+    if core is None:
+        return None
+    given = [np.ascontiguousarray(values) for values in (
+        pack_rule(solution.rule), solution.steps, solution.nodes, solution.stages)]
+    stages, gaps = np.empty_like(given[-1]), np.empty((solution.intervals, problem.size))
+    addresses = (array.ctypes.data for array in (*given, stages, gaps))
+    if core.evaluate(ctypes.byref(core_problem(rate)), solution.intervals, *addresses, None, None):
+        raise MemoryError('no memory for the equations of a motion')
+    return Residual(stages, gaps, left, right)
 
 
 def _residual(problem: BoundaryValueProblem, solution: CollocationSolution,
@@ -61,13 +93,13 @@ def linearise(problem: BoundaryValueProblem, solution: CollocationSolution,
         by_stage = jacobian.reshape(-1, stages, size * size)
         mean[part] = (solution.rule.weights @ by_stage).reshape(-1, size, size)
     if not (np.isfinite(rate).all() and np.isfinite(mean).all()):
-        raise SingularSystemError('the right-hand side is not finite at the current point')
+        raise SingularSystemError(RATE_NOT_FINITE)
     return _residual(problem, solution, rate), mean
 
 
 def factorise(problem: BoundaryValueProblem, solution: CollocationSolution,
-              jacobians: Array) -> NewtonSystem:
+              jacobians: Array) -> LinearSystem:
     """Return the linear system at a point, given its Jacobians."""
-    return NewtonSystem(solution.rule, solution.steps, jacobians,
-                        problem.left(solution.nodes[0])[1], problem.right(solution.nodes[-1])[1],
-                        magnitudes(problem, solution), problem.explicit)
+    return factorise_system(
+        solution.rule, solution.steps, jacobians, problem.left(solution.nodes[0])[1],
+        problem.right(solution.nodes[-1])[1], magnitudes(problem, solution), problem.explicit)

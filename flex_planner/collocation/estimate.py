@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from flex_planner.base.validation import Array
 from flex_planner.collocation.equations import collocation_residual, magnitudes
 from flex_planner.collocation.gauss import GaussRule
-from flex_planner.collocation.linear import NewtonSystem, SingularSystemError
-from flex_planner.collocation.problem import BoundaryValueProblem
+from flex_planner.collocation.linear import LinearSystem
+from flex_planner.collocation.problem import BoundaryValueProblem, SingularSystemError
 from flex_planner.collocation.solution import CollocationSolution
 import numpy as np
 
@@ -42,7 +42,7 @@ class Estimate:
 
 
 def estimate_error(problem: BoundaryValueProblem, solution: CollocationSolution,
-                   system: NewtonSystem) -> Estimate:
+                   system: LinearSystem) -> Estimate:
     """
     Compare with the Gauss rule of one stage more, by a few corrections towards it.
 
@@ -52,7 +52,7 @@ def estimate_error(problem: BoundaryValueProblem, solution: CollocationSolution,
         What was solved.
     solution : CollocationSolution
         Of s stages; Newton's method has converged.
-    system : NewtonSystem
+    system : LinearSystem
         Its linear system, or that of a point near it.
 
     """

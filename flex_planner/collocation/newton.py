@@ -15,57 +15,26 @@ from dataclasses import dataclass
 
 from flex_planner.base.progress import Monitor, StoppedError, StopReason
 from flex_planner.base.validation import Array
+from flex_planner.collocation.compiled_newton import solve_compiled
 from flex_planner.collocation.equations import (
     collocation_residual,
     factorise,
     linearise,
     magnitudes,
 )
-from flex_planner.collocation.linear import NewtonSystem, Residual, SingularSystemError
-from flex_planner.collocation.problem import BoundaryValueProblem
+from flex_planner.collocation.linear import LinearSystem, Residual
+from flex_planner.collocation.newton_outcome import (
+    CORRECTION_NOT_FINITE,
+    KEPT,
+    NewtonOutcome,
+    NO_STEP_HELPS,
+    SMALLEST_STEP,
+)
+from flex_planner.collocation.problem import BoundaryValueProblem, SingularSystemError
 from flex_planner.collocation.solution import CollocationSolution
 import numpy as np
 
-_SMALLEST_STEP = 1e-4
-# an old matrix is kept while it shrinks the correction at least this much
-_KEPT = 0.25
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class NewtonOutcome:
-    """
-    Where Newton's method ended.
-
-    Attributes
-    ----------
-    solution : CollocationSolution
-        The last accepted point.
-    converged : bool
-        Whether the last correction was below the tolerance.
-    correction : float
-        Its size relative to the unknowns.
-    iterations : int
-        Linear systems factorised.
-    system : NewtonSystem or None
-        The last linear system.
-    stopped : StopReason or None
-        Set if the monitor ended it.
-    message : str
-        Why it ended, in words.
-    coarse : bool
-        Whether it failed because the matrix does not fit, and not because the problem bends: on a
-        finer mesh the mean Jacobian is a better one.
-
-    """
-
-    solution: CollocationSolution
-    converged: bool
-    correction: float
-    iterations: int
-    system: NewtonSystem | None
-    stopped: StopReason | None
-    message: str
-    coarse: bool = False
+_GIVEN_UP = 'given up, its share of the work is used up'
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,11 +65,16 @@ def newton(problem: BoundaryValueProblem, guess: CollocationSolution, *, toleran
         Told of every iteration; may stop it.
 
     """
+    left = monitor.iterations_left(guess.intervals)
+    if left < 1:
+        return _Run(problem, guess, tolerance, monitor).outcome(_GIVEN_UP)
+    max_iterations = int(min(max_iterations, left))
+    compiled = solve_compiled(problem, guess, tolerance, max_iterations, monitor)
+    if compiled is not None:
+        return compiled
     run = _Run(problem, guess, tolerance, monitor)
     try:
         while run.iterations < max_iterations:
-            if monitor.exhausted:
-                return run.outcome('given up, its share of the work is used up')
             if run.iterate():
                 return run.outcome('converged', converged=True)
         return run.outcome(f'not converged after {max_iterations} iterations')
@@ -117,7 +91,7 @@ class _Run:
                  tolerance: float, monitor: Monitor) -> None:
         self._problem, self._tolerance, self._monitor = problem, tolerance, monitor
         self._solution = guess
-        self._system: NewtonSystem | None = None
+        self._system: LinearSystem | None = None
         self._norm, self._step, self.iterations = np.inf, 1.0, 0
         self._previous: tuple[_Step, _Step] | None = None
         self._coarse = False
@@ -143,12 +117,12 @@ class _Run:
             return True
         return self._advance(system, full)
 
-    def _advance(self, system: NewtonSystem, full: _Step) -> bool:
+    def _advance(self, system: LinearSystem, full: _Step) -> bool:
         """Take a damped step, then corrections with the same matrix while they converge."""
         simplified = self._damp(system, full)
         self._previous = (full, simplified)
         last = full.norm
-        while self._step == 1.0 and simplified.norm <= max(_KEPT * last, self._tolerance):
+        while self._step == 1.0 and simplified.norm <= max(KEPT * last, self._tolerance):
             self._norm, last = simplified.norm, simplified.norm
             trial = _move(self._solution, simplified, 1.0)
             if last <= self._tolerance:
@@ -160,11 +134,11 @@ class _Run:
             self._solution, simplified, self._previous = trial, following, None
         return False
 
-    def _damp(self, system: NewtonSystem, full: _Step) -> _Step:
+    def _damp(self, system: LinearSystem, full: _Step) -> _Step:
         """Move to the first point along the correction that passes the test."""
         step = self._step = self._predict(full)
         bent, tried = 0.0, 1.0
-        while step >= _SMALLEST_STEP:
+        while step >= SMALLEST_STEP:
             self._monitor.check()
             trial = _move(self._solution, full, step)
             try:
@@ -179,7 +153,7 @@ class _Run:
             step = min(step / 2, max(step**2 * full.norm / (2 * bent), step / 10))
         # a wrong matrix bends the correction with the step, nonlinearity with its square
         self._coarse = bent > 0.5 * tried * full.norm
-        raise SingularSystemError("no step of Newton's method reduces the error")
+        raise SingularSystemError(NO_STEP_HELPS)
 
     def _predict(self, full: _Step) -> float:
         """Return the step that the observed nonlinearity allows."""
@@ -190,13 +164,13 @@ class _Run:
         if difference == 0:
             return 1.0
         ratio = float(np.linalg.norm(simplified.nodes)) * before.norm / (difference * full.norm)
-        return min(1.0, max(self._step * ratio, _SMALLEST_STEP))
+        return min(1.0, max(self._step * ratio, SMALLEST_STEP))
 
-    def _measure(self, system: NewtonSystem, residual: Residual) -> _Step:
+    def _measure(self, system: LinearSystem, residual: Residual) -> _Step:
         nodes, stages = system.correction(residual)
         norm = self._size(nodes)
         if not np.isfinite(norm):
-            raise SingularSystemError('the Newton correction is not finite')
+            raise SingularSystemError(CORRECTION_NOT_FINITE)
         return _Step(nodes, stages, norm)
 
     def _size(self, nodes: Array) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Protocol
 
 from flex_planner.base.validation import Array
@@ -9,6 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 Indices = NDArray[np.intp]
+
+SINGULAR_STAGES = 'the stage equations of an interval are singular'
+RATE_NOT_FINITE = 'the right-hand side is not finite at the current point'
+
+
+class SingularSystemError(ArithmeticError):
+    """The linearised problem has no unique solution."""
 
 
 class BoundaryValueProblem(Protocol):
@@ -55,3 +63,43 @@ class BoundaryValueProblem(Protocol):
 
     def right(self, z: Array) -> tuple[Array, Array]:
         """Return residual (m - l,) and Jacobian (m - l, m) of those at the last node."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CompiledRate:
+    """
+    F of a problem that does not depend on time, as machine code.
+
+    Both functions have the signature ``int f(long long n, int chain, const double *const *in,
+    double *const *out)``: ``in[0]`` are unknowns (n, m), the other inputs are shared by all
+    points; ``out[0]`` is F (n, m), ``out[1]`` dF/dz (n, m, m). They return 0, or 1 without memory.
+
+    Attributes
+    ----------
+    rate, rate_jacobian : int
+        Addresses of F alone, and of F with dF/dz.
+    shared : tuple of numpy.ndarray
+        The inputs after the first, contiguous.
+    kept : object
+        What must live as long as the addresses are used.
+
+    """
+
+    rate: int
+    rate_jacobian: int
+    shared: tuple[Array, ...]
+    kept: object
+
+
+class CompiledProblem(BoundaryValueProblem, Protocol):
+    """A problem that can be solved without a call of Python for every point."""
+
+    def compiled_rate(self) -> CompiledRate | None:
+        """Return F as machine code, None without a compiler."""
+
+
+def compiled_rate_of(problem: BoundaryValueProblem) -> CompiledRate | None:
+    """Return F of a problem as machine code if there is any."""
+    find = getattr(problem, 'compiled_rate', None)
+    found: CompiledRate | None = find() if find else None
+    return found

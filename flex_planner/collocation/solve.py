@@ -6,7 +6,8 @@ from flex_planner.base.progress import Monitor, StopReason
 from flex_planner.base.validation import Array
 from flex_planner.collocation.estimate import Estimate, estimate_error
 from flex_planner.collocation.mesh import defects, level_mesh, switching_times
-from flex_planner.collocation.newton import newton, NewtonOutcome
+from flex_planner.collocation.newton import newton
+from flex_planner.collocation.newton_outcome import NewtonOutcome
 from flex_planner.collocation.problem import BoundaryValueProblem
 from flex_planner.collocation.result import CollocationResult, SolverSettings, SolverStatus
 from flex_planner.collocation.solution import CollocationSolution

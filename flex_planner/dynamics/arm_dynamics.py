@@ -123,6 +123,11 @@ class ArmDynamics:
 
         return advance
 
+    @property
+    def runge_kutta_address(self) -> int | None:
+        """Return where the compiled function of these steps is, None if it is interpreted."""
+        return self._load('runge_kutta_step').address
+
     def controlled_steps(self, state: Array, reference: Array, timing: Array, controller: Array,
                          physical: Array) -> tuple[Array, Array, Array, Array]:
         """

@@ -14,7 +14,7 @@ import json
 from pathlib import Path
 
 from flex_planner.arms.arm import Arm
-from flex_planner.dynamics.compiled_functions import content_key
+from flex_planner.base.compiled_library import content_key
 import numpy as np
 
 # symbols in the functions, or nothing that they contain

@@ -13,29 +13,17 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 import ctypes
 from dataclasses import asdict, dataclass
-from functools import cache
-import hashlib
 from pathlib import Path
-import platform
 from typing import Any, Protocol
 
-from flex_planner.base.paths import PathError
+from flex_planner.base.compiled_library import build_library, find_library
+from flex_planner.base.compiler import CompilerError
+from flex_planner.base.library_cache import warn_once
 from flex_planner.base.validation import Array
-from flex_planner.dynamics.compiler import (
-    compile_library,
-    CompilerError,
-    find_compiler,
-    FLAGS,
-)
-from flex_planner.dynamics.library_cache import (
-    build_folders,
-    DamagedEntryError,
-    keep_library,
-    read_library,
-    scratch_folder,
-    warn_once,
-)
 import numpy as np
+
+# straight-line code gains nothing from more, and -O1 takes up to five times as long
+_OPTIONS = ('-Og',)
 
 Builder = Callable[[], Mapping[str, tuple[Any, int]]]
 
@@ -102,6 +90,10 @@ class BatchFunction(Protocol):
 
         """
 
+    @property
+    def address(self) -> int | None:
+        """Return the address of its loop over points, None if it is interpreted."""
+
 
 class _NativeFunction:
     """A function of a compiled library."""
@@ -134,6 +126,10 @@ class _NativeFunction:
                 raise MemoryError('no memory to evaluate a compiled function')
 
         return run
+
+    @property
+    def address(self) -> int | None:
+        return ctypes.cast(self._call, ctypes.c_void_p).value
 
 
 def _pointers(arrays: Sequence[Array]) -> ctypes.Array[ctypes.c_void_p]:
@@ -173,27 +169,9 @@ class _InterpretedFunction:
 
         return run
 
-
-def content_key(*parts: str | bytes) -> str:
-    """Return a short digest of what a library is made of, for its name on disk."""
-    digest = hashlib.sha256()
-    # this file writes the loops around the functions, and calls them
-    own = (Path(__file__).read_bytes(), ' '.join(FLAGS), platform.system(), _processor())
-    for part in (*parts, *own):
-        data = part.encode() if isinstance(part, str) else part
-        digest.update(len(data).to_bytes(8, 'little') + data)
-    return digest.hexdigest()[:24]
-
-
-@cache
-def _processor() -> str:
-    """Return the kind of processor: a home folder may serve machines of several kinds."""
-    try:
-        lines = Path('/proc/cpuinfo').read_text().splitlines()
-    except OSError:
-        lines = []
-    flags = next((line for line in lines if line.startswith(('flags', 'Features'))), '')
-    return f'{platform.machine()} {flags}'
+    @property
+    def address(self) -> int | None:
+        return None
 
 
 def load_functions(key: str, build: Builder) -> dict[str, BatchFunction]:
@@ -203,21 +181,20 @@ def load_functions(key: str, build: Builder) -> dict[str, BatchFunction]:
     Parameters
     ----------
     key : str
-        From :func:`content_key`; equal keys mean equal functions.
+        From `content_key`; equal keys mean equal functions.
     build : callable
         Returns the CasADi functions and the number of batched inputs of each, by name.
 
     """
-    try:
-        functions = read_library(key, _load)
-        if functions is not None:
-            return functions
-    except DamagedEntryError as error:
-        warn_once(f'compiled functions {key} are damaged ({error}) and are built again')
+    functions = find_library(key, _load)
+    if functions is not None:
+        return functions
     built = build()
     signatures = {name: Signature.of(f, batched) for name, (f, batched) in built.items()}
     try:
-        return _build_library(key, _source(built), signatures)
+        return build_library(key, _source(built), lambda library: _bind(library, signatures),
+                             record={name: asdict(s) for name, s in signatures.items()},
+                             options=_OPTIONS)
     except CompilerError as error:
         warn_once(f'{error}: functions are interpreted, which makes a plan 10 to 50 times slower')
     return {name: _InterpretedFunction(f, signatures[name]) for name, (f, _) in built.items()}
@@ -229,46 +206,6 @@ def _load(library: Path, functions: Mapping[str, Any]) -> dict[str, BatchFunctio
         name: Signature(entry['batched'], tuple(entry['inputs']),
                         tuple((rows, columns) for rows, columns in entry['outputs']))
         for name, entry in functions.items()})
-
-
-def _build_library(key: str, source: str,
-                   signatures: Mapping[str, Signature]) -> dict[str, BatchFunction]:
-    """
-    Compile, load and keep functions: in a temporary folder if the cache folder is of no use.
-
-    Raises
-    ------
-    CompilerError
-        If it works in neither.
-
-    """
-    compiler, reason = find_compiler(), ''
-    for folder in build_folders():
-        try:
-            with scratch_folder(folder) as scratch:
-                library = compile_library(compiler, source, Path(scratch))
-                # loaded before it is kept: then nobody can remove it in between
-                functions = _bind(library, signatures)
-                _keep(key, library, signatures, reason)
-                return functions
-        except CompilerError as error:
-            reason = str(error)
-        except OSError as error:
-            reason = f'{folder}: {error.strerror or error}'
-    raise CompilerError(reason)
-
-
-def _keep(key: str, library: Path, signatures: Mapping[str, Signature], reason: str) -> None:
-    """Keep a new library, unless there is a reason not to, and say so."""
-    try:
-        if not reason:
-            keep_library(key, library, {name: asdict(s) for name, s in signatures.items()})
-            return
-    except OSError as error:
-        reason = f'{library.parents[1]}: {error.strerror or error}'
-    except PathError as error:
-        reason = str(error)
-    warn_once(f'cannot keep compiled functions ({reason}): they are built again at the next start')
 
 
 def _source(built: Mapping[str, tuple[Any, int]]) -> str:

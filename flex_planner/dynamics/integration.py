@@ -16,12 +16,15 @@ from typing import Protocol
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.arm_dynamics import ArmDynamics, RUNGE_KUTTA_STAGES, RungeKuttaSteps
+from flex_planner.dynamics.compiled_integration import cross_intervals
 import numpy as np
 from numpy.polynomial.legendre import legvander
 
 _SAFETY, _LARGEST_GROWTH = 0.9, 5.0
 # an interval or a period is not cut finer: the motion must have run away
 _MOST_STEPS = 4096
+# steps of an interval up to which the torques of all intervals are found at once
+_TABLE_STEPS = 16
 # error of a step below which half as many are as good, with a margin: the order is 8
 _EASY = 2.0**-10
 _SMALLEST = float(np.finfo(np.float64).tiny)
@@ -83,6 +86,9 @@ class TorqueProfile(Protocol):
     def within(self, interval: int, basis: Array) -> Array:
         """Return the torques in an interval where `basis` was taken, shape (k, n) [N m]."""
 
+    def everywhere(self, basis: Array) -> Array:
+        """Return `within` of all intervals, shape (N, k, n) [N m]."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinearTorque:
@@ -108,6 +114,11 @@ class LinearTorque:
     def within(self, interval: int, basis: Array) -> Array:
         """Return the torques in an interval, shape (k, n)."""
         torques: Array = basis @ self.torques[interval:interval + 2]
+        return torques
+
+    def everywhere(self, basis: Array) -> Array:
+        """Return the torques in all intervals, shape (N, k, n)."""
+        torques: Array = basis @ np.stack([self.torques[:-1], self.torques[1:]], axis=1)
         return torques
 
 
@@ -143,26 +154,57 @@ def integrate(dynamics: ArmDynamics, physical: Array, state: Array, torque: Torq
         If the monitor stopped it.
 
     """
-    watch, advance = monitor or Monitor(), dynamics.runge_kutta_steps(physical)
-    basis = cache(lambda count: torque.basis(_stage_shares(count)))
+    watch = monitor or Monitor()
     states = np.full((torque.breaks.size, state.size), np.nan)
     states[0] = state
+    step = dynamics.runge_kutta_address
+    if step is None or not cross_intervals(
+            step, _StageTorques(torque, watch).at, torque.breaks, physical, states, rtol=rtol,
+            atol=atol, safety=_SAFETY, largest_growth=_LARGEST_GROWTH):
+        _cross_all(dynamics.runge_kutta_steps(physical), torque, watch, states, (rtol, atol))
+    return states
+
+
+class _StageTorques:
+    """The torques at the stages of steps, kept of all intervals where the steps are few."""
+
+    def __init__(self, torque: TorqueProfile, monitor: Monitor) -> None:
+        self._torque, self._monitor = torque, monitor
+        self._tables: dict[int, Array] = {}
+
+    def at(self, interval: int, count: int) -> Array | None:
+        """Return those of equal steps of an interval, None if they are too many."""
+        self._monitor.check()
+        if count > _MOST_STEPS:
+            return None
+        if count > _TABLE_STEPS:
+            return self._torque.within(interval, self._torque.basis(_stage_shares(count)))
+        if count not in self._tables:
+            basis = self._torque.basis(_stage_shares(count))
+            self._tables[count] = np.ascontiguousarray(self._torque.everywhere(basis))
+        torques: Array = self._tables[count][interval]
+        return torques
+
+
+def _cross_all(advance: RungeKuttaSteps, torque: TorqueProfile, monitor: Monitor, states: Array,
+               tolerances: tuple[float, float]) -> None:
+    """Fill in the states at the breaks: the reference of integration.c."""
+    basis = cache(lambda count: torque.basis(_stage_shares(count)))
     steps = 1.0  # that an interval needs
     with np.errstate(over='ignore', invalid='ignore'):
         for interval, length in enumerate(np.diff(torque.breaks).tolist()):
             error = np.inf
             while not error <= 1:
-                watch.check()
+                monitor.check()
                 count = int(np.ceil(steps))
                 if count > _MOST_STEPS:
-                    return states
+                    return
                 torques = torque.within(interval, basis(count)).reshape(count, -1)
                 after, error = _cross(advance, states[interval], torques, length / count,
-                                      (rtol, atol))
+                                      tolerances)
                 needed = error ** (1 / 8) / _SAFETY if np.isfinite(error) else _LARGEST_GROWTH
                 steps = count * min(max(needed, 1 / _LARGEST_GROWTH), _LARGEST_GROWTH)
             states[interval + 1] = after
-    return states
 
 
 class HeldTorqueIntegrator:

@@ -13,16 +13,17 @@ from dataclasses import dataclass
 from typing import Any
 
 from flex_planner.arms.arm import Arm
+from flex_planner.base.compiled_library import content_key
 from flex_planner.base.errors import InvalidTaskError
 from flex_planner.base.validation import Array
+from flex_planner.collocation import SolverSettings
+from flex_planner.collocation.core import prepare_core
+from flex_planner.collocation.problem import CompiledRate
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.cache_key import cache_key, describe_fields, FREE_FIELDS
-from flex_planner.dynamics.compiled_functions import (
-    BatchFunction,
-    content_key,
-    load_functions,
-)
+from flex_planner.dynamics.compiled_functions import BatchFunction, load_functions
 from flex_planner.optimal_control.torque_limits import has_caps, TorqueLimits
+import numpy as np
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -88,9 +89,11 @@ class ArmModel(ArmDynamics):
         return cls.of(arm) if missed.any() else given
 
     def prepare(self) -> None:
-        """Load the functions from disk, or compile them."""
+        """Load the functions and the core of the solver from disk, or compile them."""
         super().prepare()
         self._load_optimality('optimality')
+        half = 2 * self.arm.n_coordinates
+        prepare_core(2 * half, half, half, SolverSettings().stages)
 
     def optimality(self, z: Array, p: Array) -> Array:
         """Return z' of eqs. (11) and (12), shape (k, 4 n_t)."""
@@ -100,6 +103,25 @@ class ArmModel(ArmDynamics):
         """Return z' and dz'/dz, shapes (k, 4 n_t) and (k, 4 n_t, 4 n_t)."""
         rate, jacobian = self._load_optimality('optimality_jacobian')(z, p)
         return rate, jacobian
+
+    def compiled_rate(self, name: str, p: Array) -> CompiledRate | None:
+        """
+        Return rates and their Jacobian as machine code, None without a compiler.
+
+        Parameters
+        ----------
+        name : str
+            ``optimality``, ``free_payload`` or ``free_duration``.
+        p : numpy.ndarray
+            `Parameters.stack`.
+
+        """
+        functions = [self._load_optimality(part) for part in (name, f'{name}_jacobian')]
+        rate, jacobian = (function.address for function in functions)
+        if rate is None or jacobian is None:
+            return None
+        shared = np.ascontiguousarray(p, dtype=np.float64)
+        return CompiledRate(rate, jacobian, (shared,), functions)
 
     def controls(self, z: Array, p: Array) -> Controls:
         """Return torque, cost and Hamiltonian at points, see `Controls`."""

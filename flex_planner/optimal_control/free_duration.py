@@ -12,6 +12,7 @@ from dataclasses import replace
 
 from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationResult, CollocationSolution
+from flex_planner.collocation.problem import CompiledRate
 from flex_planner.optimal_control.free_problem import append_zeros
 from flex_planner.optimal_control.motion_problem import Indices, MotionProblem
 import numpy as np
@@ -54,6 +55,10 @@ class FreeDurationProblem:
         jacobian[:, :-1, :-1] = duration[..., None] * inner
         jacobian[:, :-1, -1] = rate
         return append_zeros(duration * rate, 1), jacobian
+
+    def compiled_rate(self) -> CompiledRate | None:
+        """Return both as machine code, None without a compiler."""
+        return self.motion.model.compiled_rate('free_duration', self.motion.p)
 
     def switches(self, t: Array, z: Array) -> Array:
         """Return the motion's."""

@@ -13,7 +13,7 @@ from dataclasses import replace
 from flex_planner.base.errors import NoEquilibriumError
 from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationResult, CollocationSolution
-from flex_planner.collocation.linear import SingularSystemError
+from flex_planner.collocation.problem import CompiledRate, SingularSystemError
 from flex_planner.optimal_control.boundary_conditions import PayloadEnds
 from flex_planner.optimal_control.free_problem import append_zeros
 from flex_planner.optimal_control.motion_problem import Indices, MotionProblem
@@ -69,6 +69,10 @@ class FreePayloadProblem:
         full[:, -1, :half], full[:, -1, half:-2] = by_payload[:, half:], -by_payload[:, :half]
         full[:, -1, -2] = -bend
         return rate, full
+
+    def compiled_rate(self) -> CompiledRate | None:
+        """Return both as machine code, None without a compiler."""
+        return self.motion.model.compiled_rate('free_payload', self.motion.p)
 
     def switches(self, t: Array, z: Array) -> Array:
         """Return the motion's, with the payload of the iterate."""

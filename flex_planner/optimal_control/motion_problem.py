@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationSolution, GaussRule
+from flex_planner.collocation.problem import CompiledRate
 from flex_planner.dynamics.statics import check_inertia, natural_modes
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.boundary_conditions import BoundaryConditions
@@ -82,6 +83,10 @@ class MotionProblem:
     def rate_jacobian(self, t: Array, z: Array) -> tuple[Array, Array]:
         """Return z' and its Jacobian."""
         return self.model.optimality_jacobian(z, self.p)
+
+    def compiled_rate(self) -> CompiledRate | None:
+        """Return both as machine code, None without a compiler."""
+        return self.model.compiled_rate('optimality', self.p)
 
     def switches(self, t: Array, z: Array, p: Array | None = None) -> Array:
         """Return the distances of the unbounded torque from its bounds, 2 n columns or more."""

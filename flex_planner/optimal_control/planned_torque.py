@@ -66,6 +66,10 @@ class PlannedTorque:
         """Return the torques where `basis` was taken, in a mesh interval, shape (k, n)."""
         return self._bounded(basis @ self.pieces.coefficients[interval])
 
+    def everywhere(self, basis: Array) -> Array:
+        """Return `within` of all mesh intervals, shape (N, k, n)."""
+        return self._bounded(basis @ self.pieces.coefficients)
+
     def _bounded(self, values: Array) -> Array:
         n = values.shape[-1] // 2
         torque: Array = self.limits.bound(values[..., :n], values[..., n:])

@@ -9,8 +9,8 @@ import struct
 
 from flex_planner import __version__
 from flex_planner.arms.arm_files import load_arm, preset_files
+from flex_planner.base.library_cache import cache_folder
 from flex_planner.cli import main
-from flex_planner.dynamics.library_cache import cache_folder
 import pytest
 
 PRESETS = sorted(preset_files())

@@ -12,7 +12,8 @@ import time
 from typing import Any
 
 from flex_planner.arms.arm import Arm, Joint, Link
-from flex_planner.dynamics import arm_dynamics, compiled_functions, compiler
+from flex_planner.base import compiler
+from flex_planner.dynamics import arm_dynamics, compiled_functions
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.cache_key import cache_key
 from flex_planner.dynamics.physical_parameters import PhysicalParameters

@@ -16,9 +16,11 @@ from typing import Any
 
 import flex_planner
 from flex_planner.arms.arm import Arm
+from flex_planner.base import compiled_library
+from flex_planner.base.compiled_library import content_key
+from flex_planner.base.library_cache import cache_folder, warn_once
 from flex_planner.dynamics import compiled_functions
-from flex_planner.dynamics.compiled_functions import content_key, load_functions
-from flex_planner.dynamics.library_cache import cache_folder, warn_once
+from flex_planner.dynamics.compiled_functions import load_functions
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.parameters import Parameters
 import numpy as np
@@ -245,14 +247,14 @@ def test_key_tells_processors_apart(monkeypatch: pytest.MonkeyPatch) -> None:
     # the code is compiled for one kind, and a home folder may serve several
     keys = []
     for flags in ('x86_64 flags: sse4_2 avx2', 'x86_64 flags: sse4_2', 'aarch64 Features: asimd'):
-        monkeypatch.setattr(compiled_functions, '_processor', lambda flags=flags: flags)
+        monkeypatch.setattr(compiled_library, '_processor', lambda flags=flags: flags)
         keys.append(content_key('same'))
     assert len(set(keys)) == 3
 
 
 def test_processor_is_known_by_its_flags_or_at_least_its_kind(
         monkeypatch: pytest.MonkeyPatch) -> None:
-    find = compiled_functions._processor.__wrapped__
+    find = compiled_library._processor.__wrapped__
     monkeypatch.setattr(Path, 'read_text', lambda self: 'model: x\nflags\t: sse avx\nflags\t: no')
     assert find() == f'{platform.machine()} flags\t: sse avx'
 

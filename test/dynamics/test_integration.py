@@ -10,9 +10,10 @@ from applied_torques import Case, every_case, torque_of
 from factories import PlanFactory
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import load_arm
+from flex_planner.base import compiler
 from flex_planner.base.progress import Monitor, StoppedError, StopReason
 from flex_planner.base.validation import Array
-from flex_planner.dynamics import compiler
+from flex_planner.dynamics import integration
 from flex_planner.dynamics.arm_dynamics import RUNGE_KUTTA_STAGES
 from flex_planner.dynamics.integration import integrate, PiecewisePolynomial, simulate
 from flex_planner.optimal_control.arm_model import ArmModel
@@ -119,6 +120,20 @@ def test_another_start_is_followed(plan_of: PlanFactory) -> None:
                         rtol=1e-12, atol=1e-14)
     np.testing.assert_allclose(end, expected, rtol=0, atol=1e-9)
     assert np.abs(end - plan.problem.goal).max() > 1e-3
+
+
+@pytest.mark.parametrize('payload', [1.0, 5.5])
+def test_loop_in_c_is_that_in_python(plan_of: PlanFactory, monkeypatch: pytest.MonkeyPatch,
+                                     payload: float) -> None:
+    plan = plan_of('ei5', payload)
+    torque = torque_of(plan)
+    for rtol in (1e-6, 1e-10):
+        found = end_of(plan, torque, rtol)
+        with monkeypatch.context() as patch:
+            patch.setattr(integration, 'cross_intervals', lambda *given, **more: False)
+            expected = end_of(plan, torque, rtol)
+        # the same steps, but for rounding
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
 
 
 def test_interpreted_functions_lead_to_the_same_end(

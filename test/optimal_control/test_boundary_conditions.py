@@ -10,7 +10,7 @@ from flex_planner.arms.arm import Arm, Joint, Motor
 from flex_planner.arms.kinematics import tip_jacobian, tip_position
 from flex_planner.base.errors import HoldingError, NoEquilibriumError, UnreachableError
 from flex_planner.base.validation import Array
-from flex_planner.collocation.linear import SingularSystemError
+from flex_planner.collocation.problem import SingularSystemError
 from flex_planner.dynamics.statics import equilibrium
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.boundary_conditions import BoundaryConditions, PayloadEnds

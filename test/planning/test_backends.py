@@ -5,6 +5,7 @@ from __future__ import annotations
 from factories import PlanFactory, TaskFactory
 from flex_planner.base.progress import Monitor
 from flex_planner.collocation import Solver
+from flex_planner.collocation.core import CORE_VARIABLE
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.strategies.catalogue import CATALOGUE
@@ -79,3 +80,16 @@ def test_solve_bvp_is_stopped_by_the_monitor(rigid_model: ArmModel,
     plan = plan_path(paper_task(rigid_model.arm), model=rigid_model,
                      solver=Solver(backend=solve_by_scipy, monitor=Monitor(canceled=lambda: True)))
     assert (plan.message, plan.solution) == ('canceled', None)
+
+
+@pytest.mark.parametrize('payload', [1.0, 5.5])
+def test_plan_by_numpy_is_that_by_the_core(ei50_model: ArmModel, paper_task: TaskFactory,
+                                           monkeypatch: pytest.MonkeyPatch,
+                                           payload: float) -> None:
+    task = paper_task(ei50_model.arm, payload_mass=payload)
+    compiled = plan_path(task, model=ei50_model, search='fast')
+    monkeypatch.setenv(CORE_VARIABLE, 'numpy')
+    by_numpy = plan_path(task, model=ei50_model, search='fast')
+    assert compiled.solved
+    assert by_numpy.cost == pytest.approx(compiled.cost, rel=1e-10)
+    assert by_numpy.mesh_intervals == compiled.mesh_intervals

@@ -11,11 +11,11 @@ import warnings
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import arm_from_mapping
 from flex_planner.arms.quantities import QUANTITIES
+from flex_planner.base import compiled_library
+from flex_planner.base.compiler import CompilerError
 from flex_planner.base.errors import FlexPlannerError, InvalidTaskError, InvalidValueError
 from flex_planner.base.progress import Monitor
 from flex_planner.control.default_gains import default_gains
-from flex_planner.dynamics import compiled_functions
-from flex_planner.dynamics.compiler import CompilerError
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
 from flex_planner.optimal_control.task import MAX_PAYLOAD, Task
@@ -38,7 +38,7 @@ def without_compiler(monkeypatch: pytest.MonkeyPatch,
         raise CompilerError('left out')
 
     monkeypatch.setenv('XDG_CACHE_HOME', str(tmp_path_factory.mktemp('cache')))
-    monkeypatch.setattr(compiled_functions, 'find_compiler', find_none)
+    monkeypatch.setattr(compiled_library, 'find_compiler', find_none)
     logging.disable(logging.WARNING)
     with warnings.catch_warnings():
         warnings.simplefilter('error')

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import argparse
 
-from flex_planner.cli.options import Commands
-from flex_planner.dynamics.library_cache import (
+from flex_planner.base.library_cache import (
     cache_folder,
     clear_cache,
     find_entries,
     largest_size,
     SIZE_VARIABLE,
 )
+from flex_planner.cli.options import Commands
 from flex_planner.reports.motion import table
 
 _MB = 1e6

@@ -10,8 +10,7 @@ import subprocess
 
 from flex_planner.base.errors import FlexPlannerError
 
-# -Og: straight-line code gains nothing from more, and -O1 takes up to five times as long
-FLAGS = ('-Og', '-march=native', '-fPIC', '-shared')
+FLAGS = ('-march=native', '-fPIC', '-shared')
 _SHOWN = 300  # characters of what a compiler says
 
 
@@ -35,9 +34,21 @@ def find_compiler() -> list[str]:
     raise CompilerError('no C compiler (cc, gcc or clang) found')
 
 
-def compile_library(compiler: list[str], source: str, folder: Path) -> Path:
+def compile_library(compiler: list[str], source: str, folder: Path,
+                    options: tuple[str, ...] = ()) -> Path:
     """
     Return the shared library that a compiler makes of C source in a folder.
+
+    Parameters
+    ----------
+    compiler : list of str
+        From `find_compiler`.
+    source : str
+        The C code.
+    folder : Path
+        Where it and the library are written.
+    options : tuple of str
+        Of the compiler, besides `FLAGS`.
 
     Raises
     ------
@@ -50,7 +61,7 @@ def compile_library(compiler: list[str], source: str, folder: Path) -> Path:
     code, library = folder / 'functions.c', folder / 'functions.so'
     code.write_text(source)
     try:
-        done = subprocess.run([*compiler, *FLAGS, str(code), '-o', str(library), '-lm'],
+        done = subprocess.run([*compiler, *FLAGS, *options, str(code), '-o', str(library), '-lm'],
                               stdin=subprocess.DEVNULL, capture_output=True, text=True,
                               errors='replace')
     except OSError as error:

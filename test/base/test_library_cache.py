@@ -14,11 +14,8 @@ import tempfile
 import time
 from typing import Any
 
-from flex_planner.base.paths import PathError
-from flex_planner.cli import main
-from flex_planner.dynamics import library_cache
-from flex_planner.dynamics.compiled_functions import load_functions
-from flex_planner.dynamics.library_cache import (
+from flex_planner.base import library_cache
+from flex_planner.base.library_cache import (
     clear_cache,
     find_entries,
     keep_library,
@@ -29,6 +26,9 @@ from flex_planner.dynamics.library_cache import (
     SIZE_VARIABLE,
     warn_once,
 )
+from flex_planner.base.paths import PathError
+from flex_planner.cli import main
+from flex_planner.dynamics.compiled_functions import load_functions
 import pytest
 
 KEYS = [f'{number:024x}' for number in range(5)]
@@ -214,7 +214,7 @@ def test_compiler_that_makes_nothing_is_none(compiler: str, monkeypatch: pytest.
 
 
 def test_processes_that_clear_and_build_at_once_do_not_disturb_each_other(tmp_path: Path) -> None:
-    code = ('import time; from flex_planner.dynamics.library_cache import clear_cache\n'
+    code = ('import time; from flex_planner.base.library_cache import clear_cache\n'
             'print("ready", flush=True)\n'
             'while True:\n    clear_cache(); time.sleep(0.001)')
     environment = {**os.environ, 'XDG_CACHE_HOME': str(tmp_path)}
