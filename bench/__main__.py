@@ -119,6 +119,23 @@ included.
 """
 
 
+SPEED = """
+## The solver against the first one
+
+CPU time of whole calls, certificates included, by turns as above: a commit whose solver was
+NumPy's linear algebra, and this one. Both follow the kind of motion of a straight start
+(`search='fast'`); the paper's motion, EI 50 with two modes a link where nothing else is said;
+payloads to 1e-3 kg.
+
+{table}
+"""
+
+
+def measured_speed() -> dict[str, object]:
+    """Measure plans and searches of the first solver and of this one."""
+    return {'speed': earlier.measure_speed()}
+
+
 def measured_earlier() -> dict[str, object]:
     """Measure the model and the lift against those of an earlier version."""
     return {'earlier': earlier.measure()}
@@ -184,8 +201,10 @@ def text(figures: dict[str, Any]) -> str:
 
 
 def earlier_text(figures: dict[str, Any]) -> str:
-    """Return the part on the earlier version, once it was measured."""
-    return EARLIER.format(table=earlier.tables(figures['earlier'])) if 'earlier' in figures else ''
+    """Return the parts on earlier versions, once they were measured."""
+    parts = [(EARLIER, 'earlier', earlier.tables), (SPEED, 'speed', earlier.speed_table)]
+    return ''.join(page.format(table=table(figures[name])) for page, name, table in parts
+                   if name in figures)
 
 
 def payload_text(figures: dict[str, Any]) -> str:
@@ -214,7 +233,7 @@ def main() -> None:
     kept = DOCS / 'benchmarks.json'
     figures = json.loads(kept.read_text()) if kept.exists() else {}
     parts = {'model': measured_model, 'solver': measured_solver, 'payload': measured_payload,
-             'earlier': measured_earlier, 'soak': measured_soak}
+             'earlier': measured_earlier, 'speed': measured_speed, 'soak': measured_soak}
     for name in sys.argv[1:] or parts:
         figures |= parts[name]()
     figures['versions'] = versions()

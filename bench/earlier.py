@@ -20,9 +20,12 @@ import tempfile
 from typing import Any
 
 from bench.earlier_probe import LIFTED, PRESETS
+from bench.speed_probe import JOBS
 
 ENERGIES = 'c8484632ad6e4d7bc3c20c30e315350d786de4e6'
 """The last commit whose equations of motion came from energies."""
+FIRST_SOLVER = '7a2131117437bfd62d749f910a0b08ac377d53e2'
+"""The last commit before the solver had compiled code of its own; its arms are older, too."""
 ROUNDS = 3
 _ROOT = Path(__file__).parents[1]
 
@@ -44,7 +47,8 @@ def measure() -> dict[str, Any]:
         rows = []
         for name in PRESETS:
             print(f'earlier: {name}', flush=True)
-            runs = [[_probe(*side, 'model', name) for side in sides] for _ in range(ROUNDS)]
+            runs = [[_probe('earlier_probe', *side, 'model', name) for side in sides]
+                    for _ in range(ROUNDS)]
             rows.append({
                 'name': name, 'build_seconds': [one['build_seconds'] for one in runs[0]],
                 'microseconds': [statistics.median(run[side]['microseconds'] for run in runs)
@@ -52,16 +56,44 @@ def measure() -> dict[str, Any]:
         lifts = []
         for index, (name, start, goal, duration, payload) in enumerate(LIFTED):
             print(f'earlier: lift {index}', flush=True)
-            both = [_probe(*side, 'lift', str(index)) for side in sides]
+            both = [_probe('earlier_probe', *side, 'lift', str(index)) for side in sides]
             lifts.append({'name': f'{name}, {start} to {goal} deg in {duration:g} s, '
                           f'{payload:g} kg', 'both': both})
     return {'presets': rows, 'lifts': lifts}
 
 
-def _probe(sources: Path, cache: str, *what: str) -> dict[str, Any]:
+def measure_speed() -> dict[str, Any]:
+    """Return CPU times of plans and searches of the first solver and of this one, by turns."""
+    with checkout(FIRST_SOLVER) as sources, tempfile.TemporaryDirectory() as caches:
+        sides = [(sources, f'{caches}/{FIRST_SOLVER}'), (_ROOT, f'{caches}/now')]
+        rows = []
+        for name in JOBS:
+            print(f'speed: {name}', flush=True)
+            runs = [[_probe('speed_probe', *side, name) for side in sides]
+                    for _ in range(ROUNDS)]
+            rows.append({'name': name, 'both': [{
+                **runs[0][side], 'seconds': statistics.median(run[side]['seconds']
+                                                              for run in runs)}
+                for side in range(2)]})
+    return {'jobs': rows}
+
+
+def speed_table(figures: dict[str, Any]) -> str:
+    """Return those figures as a Markdown table."""
+    lines = ['| job | first solver [ms] | now [ms] | ratio | J or kg |', f'|{"---|" * 5}']
+    for job in figures['jobs']:
+        before, now = job['both']
+        ratio = f'{before["seconds"] / now["seconds"]:.1f}' if before['solved'] else '-'
+        told = f'{before["seconds"] * 1e3:.4g}{"" if before["solved"] else " (not solved)"}'
+        lines.append(f'| {job["name"]} | {told} | {now["seconds"] * 1e3:.4g} | {ratio} | '
+                     f'{now["value"]:.9g} |')
+    return '\n'.join(lines)
+
+
+def _probe(script_name: str, sources: Path, cache: str, *what: str) -> dict[str, Any]:
     """Return figures of one version from a process of its own."""
     script = 'import runpy; runpy.run_path({!r}, run_name="__main__")'.format(
-        str(Path(__file__).with_name('earlier_probe.py')))
+        str(Path(__file__).with_name(f'{script_name}.py')))
     path = os.pathsep.join([str(sources), os.environ.get('PYTHONPATH', '')])
     done = subprocess.run([sys.executable, '-c', script, *what], check=True, cwd=sources,
                           capture_output=True, text=True,

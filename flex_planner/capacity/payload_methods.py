@@ -26,7 +26,7 @@ from flex_planner.planning.kinds.effort import SearchEffort
 from flex_planner.planning.kinds.kinds_strategy import as_guess
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_problem import INTERRUPTED_STATUS, plan_problem, STOP_STATUS
-from flex_planner.planning.proofs import bound_payload
+from flex_planner.planning.proofs import is_payload_bounded
 from flex_planner.planning.strategies.catalogue import QUICK
 from flex_planner.planning.strategies.extremals import Extremal, SearchStart
 from flex_planner.planning.strategies.free_parameters import PAYLOAD
@@ -103,7 +103,7 @@ def _hold_at_once(problem: MotionProblem, solver: Solver) -> MaxPayload | None:
 
 def _carry_the_most(problem: MotionProblem, solver: Solver) -> MaxPayload | None:
     """Return the outcome if the most that a task may carry is no limit, and is carried."""
-    if np.isfinite(bound_payload(problem).payload):
+    if is_payload_bounded(problem):
         return None
     solver.monitor.phase = 'the largest payload of all tasks'
     try:

@@ -16,7 +16,7 @@ _ROUNDING = 2e-6
 
 def with_bound(found: MaxPayload, problem: MotionProblem) -> MaxPayload:
     """Return an outcome with what is proved from above."""
-    bound = bound_payload(problem)
+    bound = bound_payload(problem, found.payload)
     return replace(found, proved_upper=bound.payload, proof=bound.proof)
 
 

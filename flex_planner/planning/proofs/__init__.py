@@ -9,6 +9,7 @@ from flex_planner.planning.proofs.proof import (
     bound_duration,
     bound_payload,
     find_proof,
+    is_payload_bounded,
     PayloadBound,
     Proof,
     ProofName,
@@ -22,4 +23,4 @@ from flex_planner.planning.proofs.short_durations import (
 
 __all__ = ['PayloadBound', 'Proof', 'ProofName', 'bound_duration', 'bound_payload',
            'check_duration', 'find_doubt', 'find_proof', 'guess_duration',
-           'prove_not_held']
+           'is_payload_bounded', 'prove_not_held']

@@ -21,7 +21,11 @@ from flex_planner.planning.proofs.duration_bounds import (
     SAFETY,
 )
 from flex_planner.planning.proofs.motion_facts import MotionFacts
-from flex_planner.planning.proofs.payload_bounds import payload_by_energy, payload_by_power
+from flex_planner.planning.proofs.payload_bounds import (
+    is_any_excluded,
+    payload_by_energy,
+    payload_by_power,
+)
 import numpy as np
 
 # share of the duration from which on the bound by power calls for the closer one
@@ -138,7 +142,7 @@ def bound_duration(problem: MotionProblem) -> float:
     return max(bound(facts).seconds for bound in (bound_by_power, bound_by_energy))
 
 
-def bound_payload(problem: MotionProblem) -> PayloadBound:
+def bound_payload(problem: MotionProblem, carried: float = 0.0) -> PayloadBound:
     """
     Return a payload that no motion of a task exceeds in its duration.
 
@@ -146,6 +150,8 @@ def bound_payload(problem: MotionProblem) -> PayloadBound:
     ----------
     problem : MotionProblem
         Start, goal and duration; its payload does not matter.
+    carried : float
+        A payload that a motion carries, if one is known [kg].
 
     """
     bounds = [_bound_by_holding(problem)]
@@ -153,8 +159,19 @@ def bound_payload(problem: MotionProblem) -> PayloadBound:
         facts = MotionFacts(problem)
         bounds.append(_bounded(ProofName.POWER, payload_by_power(facts), facts))
         known = min(bound.payload for bound in bounds)
-        bounds.append(_bounded(ProofName.ENERGY, payload_by_energy(facts, known), facts))
+        bounds.append(_bounded(ProofName.ENERGY, payload_by_energy(facts, known, carried),
+                               facts))
     return min(bounds, key=lambda bound: bound.payload)
+
+
+def is_payload_bounded(problem: MotionProblem) -> bool:
+    """Return whether `bound_payload` finds a bound, which takes a twentieth of its time."""
+    if np.isfinite(_bound_by_holding(problem).payload):
+        return True
+    if problem.task.time_weight:
+        return False
+    facts = MotionFacts(problem)
+    return bool(np.isfinite(payload_by_power(facts)) or is_any_excluded(facts))
 
 
 def prove_not_held(error: HoldingError, payload: float) -> Proof:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from flex_planner.base.errors import InvalidTaskError
 from flex_planner.base.validation import Array
+from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import MAX_DURATION, MAX_VELOCITY
 from flex_planner.planning.proofs.duration_bounds import bound_by_energy, bound_by_power
@@ -20,6 +21,7 @@ import numpy as np
 _FASTER = 3.0
 # a first guess of a shortest duration, in units of what is known to be too short
 _LEAST_GUESS, _LONGEST_GUESS = 3.0, 30.0
+_SAMPLES = 41
 
 
 def check_duration(problem: MotionProblem) -> None:
@@ -47,13 +49,40 @@ def find_doubt(problem: MotionProblem) -> str | None:
     """Return why a motion of an arm that bends is not worth looking for; None if it is."""
     if not problem.model.arm.n_passive or problem.task.time_weight:
         return None
-    asked, needed = problem.task.duration, rigid_bound(problem)
+    asked = problem.task.duration
+    if _moves_evenly(problem, _FASTER * asked):  # then no bound is above that
+        return None
+    needed = rigid_bound(problem)
     if asked * _FASTER >= needed:
         return None
     joints = ' and joints' if problem.model.arm.elastic_joints else ''
     return (f'not looked for: with rigid links{joints} the motion takes at least {needed:.4g} s, '
             f'which is proved, and bending does not make an arm {_FASTER:g} times as fast, which '
             f'is not; {asked:g} s were asked for')
+
+
+def _moves_evenly(problem: MotionProblem, duration: float) -> bool:
+    """
+    Return whether the arm made rigid can do a motion of a simple shape in a duration.
+
+    All joints follow the polynomial of degree five that begins and ends at rest; where the task
+    does not, this says no.
+
+    """
+    task, arm, n = problem.task, problem.task.arm.rigid(), problem.task.arm.n_joints
+    if (np.any(task.start_velocities) or np.any(task.goal_velocities)
+            or not np.isinf(problem.goal_weights).all()):
+        return False
+    s = np.linspace(0.0, 1.0, _SAMPLES)[:, None]
+    stroke = problem.goal[:n] - problem.start[:n]
+    positions = problem.start[:n] + stroke * s**3 * (10 - 15 * s + 6 * s**2)
+    speeds = stroke * 30 * (s * (1 - s))**2 / duration
+    accelerations = stroke * 60 * s * (1 - s) * (1 - 2 * s) / duration**2
+    parameters = problem.parameters.drop_modes()
+    torques = ArmModel.of(arm).inverse_dynamics(np.hstack([positions, speeds]), accelerations,
+                                                parameters.physical)
+    lower, upper = parameters.torque_limits.bounds(speeds)
+    return bool((lower <= torques).all() and (torques <= upper).all())
 
 
 def rigid_bound(problem: MotionProblem) -> float:
