@@ -12,7 +12,7 @@ import subprocess
 import sys
 from typing import Any
 
-from bench import earlier, growth, model, payload, soak, solver
+from bench import battery, earlier, growth, model, payload, soak, solver
 import numpy as np
 
 DOCS = Path(__file__).parents[1] / 'docs'
@@ -131,6 +131,24 @@ payloads to 1e-3 kg.
 """
 
 
+BATTERY = """
+## Arms that people have
+
+Published arms and one from data sheets (`config/arms/`). T is the shortest time of the same arm
+made rigid, P the period of its lowest mode with the joints held; a motion takes max(3 T, 1.5 P)
+(moderate), 1.2 T + P/2 (fast), 2 T + P (long, another start and goal) or 2.5 T + P (with a load).
+Planned at default settings within {limit:g} s of time, other kinds of motion included; the CPU
+time counts helper processes that have ended.
+
+{table}
+"""
+
+
+def measured_battery() -> dict[str, object]:
+    """Measure motions of published arms."""
+    return {'battery': battery.measure()}
+
+
 def measured_speed() -> dict[str, object]:
     """Measure plans and searches of the first solver and of this one."""
     return {'speed': earlier.measure_speed()}
@@ -197,7 +215,8 @@ def text(figures: dict[str, Any]) -> str:
         table=solver.table([solver.Row(**row) for row in figures['solver']]), shares=shares,
         cold_1=cold_1, warm_1=warm_1, cold_2=cold_2, warm_2=warm_2, limit=growth.TIME_LIMIT,
         growth=growth.table([growth.Growth(**row) for row in figures['growth']])) + (
-        payload_text(figures) + earlier_text(figures) + soak_text(figures))
+        payload_text(figures) + earlier_text(figures) + battery_text(figures)
+        + soak_text(figures))
 
 
 def earlier_text(figures: dict[str, Any]) -> str:
@@ -205,6 +224,13 @@ def earlier_text(figures: dict[str, Any]) -> str:
     parts = [(EARLIER, 'earlier', earlier.tables), (SPEED, 'speed', earlier.speed_table)]
     return ''.join(page.format(table=table(figures[name])) for page, name, table in parts
                    if name in figures)
+
+
+def battery_text(figures: dict[str, Any]) -> str:
+    """Return the part on arms that people have, once it was measured."""
+    if 'battery' not in figures:
+        return ''
+    return BATTERY.format(limit=battery.LIMITS[-1], table=battery.table(figures['battery']))
 
 
 def payload_text(figures: dict[str, Any]) -> str:
@@ -233,7 +259,8 @@ def main() -> None:
     kept = DOCS / 'benchmarks.json'
     figures = json.loads(kept.read_text()) if kept.exists() else {}
     parts = {'model': measured_model, 'solver': measured_solver, 'payload': measured_payload,
-             'earlier': measured_earlier, 'speed': measured_speed, 'soak': measured_soak}
+             'earlier': measured_earlier, 'speed': measured_speed,
+             'battery': measured_battery, 'soak': measured_soak}
     for name in sys.argv[1:] or parts:
         figures |= parts[name]()
     figures['versions'] = versions()
