@@ -124,7 +124,7 @@ def test_number_of_starts_is_what_is_asked() -> None:
 def test_bound_that_is_proved_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     proof = Proof(name=ProofName.POWER, sentence='the motors give no more')
     monkeypatch.setattr(payload_outcome, 'bound_payload',
-                        lambda problem: PayloadBound(payload=4.5, proof=proof))
+                        lambda problem, carried: PayloadBound(payload=4.5, proof=proof))
     for method in PayloadMethod:
         found = followed(one_link(2.0), method=method)
         assert found.solved, found.message

@@ -19,9 +19,12 @@ from flex_planner.optimal_control.task import Task
 from flex_planner.planning.proofs import (
     bound_duration,
     bound_payload,
+    find_doubt,
     find_proof,
+    is_payload_bounded,
     ProofName,
     prove_not_held,
+    short_durations,
 )
 from flex_planner.planning.proofs.duration_bounds import bound_by_power
 from flex_planner.planning.proofs.motion_facts import MotionFacts
@@ -457,3 +460,40 @@ def test_torques_are_looked_at_where_power_is_scarce_or_the_motion_hasty() -> No
     assert hasty.name is ProofName.ENERGY
     enough = quick.with_changes(duration=1.01 * bound_duration(quick))
     assert find_proof(enough, thorough=True) is None
+
+
+# What is asked for less often
+
+
+@pytest.mark.parametrize('carried', [0.1, 0.8, 1.5])
+def test_bound_that_begins_at_what_is_carried_is_as_close(carried: float) -> None:
+    problem = problem_of(with_motor(one_link(1.6), 0.1, no_load_speed=2.5))
+    exact, found = bound_payload(problem).payload, bound_payload(problem, carried).payload
+    assert carried < exact
+    assert found == pytest.approx(exact, rel=6e-3)  # each is within 5e-3 of the least excluded
+
+
+@pytest.mark.parametrize('task', [
+    two_links(), with_motor(two_links(duration=0.4), stall_torque=4.0), one_link(1.6),
+    with_motor(two_links(), stall_torque=inf)])
+def test_it_is_known_whether_there_is_a_bound_before_it_is(task: Task) -> None:
+    problem = problem_of(task)
+    assert is_payload_bounded(problem) is bool(np.isfinite(bound_payload(problem).payload))
+
+
+@pytest.mark.parametrize(('duration', 'doubted'), [
+    # the even motion takes 3 T for the first; rigid links cannot do it in 3 T for the last
+    (1.0, False), (0.3, False), (0.05, True)])
+def test_doubt_is_the_same_without_an_even_motion(duration: float, doubted: bool,
+                                                  monkeypatch: pytest.MonkeyPatch) -> None:
+    links = tuple(replace(link, modes=1, flexural_rigidity=50.0) for link in two_links().arm.links)
+    task = two_links(duration=duration)
+    problem = problem_of(replace(
+        task, arm=replace(task.arm, links=links), position_weights=np.zeros(4),
+        **{name: np.zeros(4) for name in ('velocity_weights', 'start_velocities',
+                                          'goal_velocities')},
+        **{name: np.full(4, inf) for name in ('goal_position_weights',
+                                              'goal_velocity_weights')}))
+    assert (find_doubt(problem) is not None) is doubted
+    monkeypatch.setattr(short_durations, '_moves_evenly', lambda problem, duration: False)
+    assert (find_doubt(problem) is not None) is doubted
