@@ -45,6 +45,8 @@ RIVALS: dict[str, tuple[Runner, Runner, Sequence[float]]] = {
     # of degree 8 as ours; of the usual degree 3 it takes many times longer
     'IPOPT, Radau 8': (lambda p, n, m: direct_run(p, 'radau', n, m, degree=8),
                        lambda p, n, m: warm_direct_run(p, 'radau', n, m, degree=8), INTERVALS),
+    'IPOPT, Gauss 8': (lambda p, n, m: direct_run(p, 'gauss', n, m, degree=8),
+                       lambda p, n, m: warm_direct_run(p, 'gauss', n, m, degree=8), INTERVALS),
     'IPOPT, Hermite-Simpson': (lambda p, n, m: direct_run(p, 'hermite_simpson', n, m),
                                lambda p, n, m: warm_direct_run(p, 'hermite_simpson', n, m),
                                INTERVALS),

@@ -99,7 +99,23 @@ class CompiledProblem(BoundaryValueProblem, Protocol):
 
 
 def compiled_rate_of(problem: BoundaryValueProblem) -> CompiledRate | None:
-    """Return F of a problem as machine code if there is any."""
+    """
+    Return F of a problem as machine code if there is any.
+
+    A subclass or an instance that has an F of its own, but no machine code, has none.
+
+    """
     find = getattr(problem, 'compiled_rate', None)
-    found: CompiledRate | None = find() if find else None
+    compiled = _depth(problem, 'compiled_rate')
+    if find is None or min(_depth(problem, 'rate'), _depth(problem, 'rate_jacobian')) < compiled:
+        return None
+    found: CompiledRate | None = find()
     return found
+
+
+def _depth(problem: object, name: str) -> int:
+    """Return where an attribute is defined: -1 for the object, 0 for its class, 1 for the next."""
+    if name in getattr(problem, '__dict__', {}):
+        return -1
+    classes = type(problem).__mro__
+    return next((i for i, each in enumerate(classes) if name in vars(each)), len(classes))

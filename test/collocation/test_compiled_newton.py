@@ -13,7 +13,11 @@ from flex_planner.collocation import CollocationSolution, GaussRule, solve, Solv
 from flex_planner.collocation.core import CORE_VARIABLE
 from flex_planner.collocation.newton import newton
 from flex_planner.collocation.newton_outcome import NewtonOutcome
-from flex_planner.collocation.problem import CompiledRate, SingularSystemError
+from flex_planner.collocation.problem import (
+    compiled_rate_of,
+    CompiledRate,
+    SingularSystemError,
+)
 import numpy as np
 from numpy.typing import NDArray
 import pytest
@@ -198,3 +202,19 @@ def test_error_in_a_call_is_raised(library: ctypes.CDLL, place: str) -> None:
         monitor = Monitor(report=fail)
     with pytest.raises(KeyError, match=place):
         solve_from(problem, 0.0, monitor)
+
+
+def test_problem_with_a_right_hand_side_of_its_own_is_not_that_of_its_class(
+        library: ctypes.CDLL, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Straight(Bratu):
+        def rate(self, t: Array, z: Array) -> Array:
+            self.points += len(z)
+            return np.stack([z[:, 1], np.zeros(len(z))], axis=1)
+
+    derived, changed = Straight(library), Bratu(library)
+    monkeypatch.setattr(changed, 'rate', derived.rate)
+    for problem in (derived, changed):
+        assert compiled_rate_of(problem) is None
+    assert compiled_rate_of(Bratu(library)) is not None
+    assert np.abs(solve_from(derived, 0.0).solution.nodes).max() < 1e-9
+    assert derived.points
