@@ -31,9 +31,9 @@ def shell(script: str, *arguments: object, **environment: str) -> subprocess.Com
                           encoding='latin-1')
 
 
-def test_name_that_cannot_be_encoded_is_escaped(strange: Path) -> None:
-    ended = shell('"$@"', 'arm', strange, PYTHONIOENCODING='ascii', PYTHONUTF8='0',
-                  PYTHONCOERCECLOCALE='0', LC_ALL='C')
+def test_name_that_cannot_be_encoded_is_escaped(strange: Path, tmp_path: Path) -> None:
+    ended = shell('"$@"', 'arm', strange, '--output', tmp_path, PYTHONIOENCODING='ascii',
+                  PYTHONUTF8='0', PYTHONCOERCECLOCALE='0', LC_ALL='C')
     assert (ended.returncode, ended.stderr) == (0, '')
     assert ended.stdout.startswith('Gr\\xf6\\xdfe \\u03bb \\u9577\\u8155 \\U0001f9be\n')
 
@@ -41,8 +41,8 @@ def test_name_that_cannot_be_encoded_is_escaped(strange: Path) -> None:
 @pytest.mark.parametrize('script', [
     '"$@" <&- >&- 2>&-; echo $?', '"$@" 2>&1 | true; echo ${PIPESTATUS[0]}'],
     ids=['closed', 'no reader'])
-def test_streams_that_are_gone_are_no_failure(script: str) -> None:
-    ended = shell(script, 'arm', 'korayem_rigid')
+def test_streams_that_are_gone_are_no_failure(script: str, tmp_path: Path) -> None:
+    ended = shell(script, 'arm', 'korayem_rigid', '--output', tmp_path)
     assert (ended.stdout, ended.stderr) == ('0\n', '')
 
 
