@@ -11,7 +11,6 @@ link.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 import json
 import resource
 import subprocess
@@ -23,6 +22,7 @@ from flex_planner.base.errors import FlexPlannerError
 from flex_planner.dynamics.statics import equilibrium, natural_modes
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.parameters import Parameters
+from flex_planner.simulation.mismatch import Mismatch
 import numpy as np
 
 LIMITS = (1.0, 3.0, 10.0, 60.0)
@@ -47,7 +47,7 @@ def job_task(name: str, modes: int, kind: str) -> Task:
     short, far, load = ARMS[name]
     start, goal = np.deg2rad(far if kind == 'long' else short)
     payload = load if kind == 'load' else 0.0
-    arm = _with_modes(load_arm(name), modes)
+    arm = Mismatch(modes=modes).apply(load_arm(name))
     rigid = Task(arm=arm.rigid(), start_positions=start, goal_positions=goal, duration=1.0,
                  payload_mass=payload)
     shortest, period = find_min_duration(rigid).duration, _period(arm, start, payload)
@@ -57,12 +57,6 @@ def job_task(name: str, modes: int, kind: str) -> Task:
         duration = max(duration, 1.5 * period)
     return Task(arm=arm, start_positions=start, goal_positions=goal, duration=duration,
                 payload_mass=payload, allow_large_bending=True)
-
-
-def _with_modes(arm: Arm, modes: int) -> Arm:
-    """Return an arm with so many modes in each link that bends."""
-    links = [link.with_modes(modes) if link.modes else link for link in arm.links]
-    return replace(arm, links=tuple(links))
 
 
 def _period(arm: Arm, posture: Any, payload: float) -> float:

@@ -40,15 +40,20 @@ def checkout(commit: str) -> Iterator[Path]:
         yield Path(folder)
 
 
+@contextmanager
+def versions(commit: str) -> Iterator[list[tuple[Path, str]]]:
+    """Give sources and an empty cache folder of an earlier version and of this one."""
+    with checkout(commit) as sources, tempfile.TemporaryDirectory() as caches:
+        yield [(sources, f'{caches}/{commit}'), (_ROOT, f'{caches}/now')]
+
+
 def measure() -> dict[str, Any]:
     """Return the figures of both versions, earlier ones first."""
-    with checkout(ENERGIES) as sources, tempfile.TemporaryDirectory() as caches:
-        sides = [(sources, f'{caches}/{ENERGIES}'), (_ROOT, f'{caches}/now')]
+    with versions(ENERGIES) as sides:
         rows = []
         for name in PRESETS:
             print(f'earlier: {name}', flush=True)
-            runs = [[_probe('earlier_probe', *side, 'model', name) for side in sides]
-                    for _ in range(ROUNDS)]
+            runs = _by_turns('earlier_probe', sides, 'model', name)
             rows.append({
                 'name': name, 'build_seconds': [one['build_seconds'] for one in runs[0]],
                 'microseconds': [statistics.median(run[side]['microseconds'] for run in runs)
@@ -64,13 +69,11 @@ def measure() -> dict[str, Any]:
 
 def measure_speed() -> dict[str, Any]:
     """Return CPU times of plans and searches of the first solver and of this one, by turns."""
-    with checkout(FIRST_SOLVER) as sources, tempfile.TemporaryDirectory() as caches:
-        sides = [(sources, f'{caches}/{FIRST_SOLVER}'), (_ROOT, f'{caches}/now')]
+    with versions(FIRST_SOLVER) as sides:
         rows = []
         for name in JOBS:
             print(f'speed: {name}', flush=True)
-            runs = [[_probe('speed_probe', *side, name) for side in sides]
-                    for _ in range(ROUNDS)]
+            runs = _by_turns('speed_probe', sides, name)
             rows.append({'name': name, 'both': [{
                 **runs[0][side], 'seconds': statistics.median(run[side]['seconds']
                                                               for run in runs)}
@@ -88,6 +91,12 @@ def speed_table(figures: dict[str, Any]) -> str:
         lines.append(f'| {job["name"]} | {told} | {now["seconds"] * 1e3:.4g} | {ratio} | '
                      f'{now["value"]:.9g} |')
     return '\n'.join(lines)
+
+
+def _by_turns(script_name: str, sides: list[tuple[Path, str]],
+              *what: str) -> list[list[dict[str, Any]]]:
+    """Return figures of both versions in every round."""
+    return [[_probe(script_name, *side, *what) for side in sides] for _ in range(ROUNDS)]
 
 
 def _probe(script_name: str, sources: Path, cache: str, *what: str) -> dict[str, Any]:

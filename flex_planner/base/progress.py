@@ -139,8 +139,8 @@ class LimitedMonitor(Monitor):
 
     @property
     def exhausted(self) -> bool:
-        """Return whether its share is used up."""
-        return self.share <= 0
+        """Return whether its share, or that of the whole, is used up."""
+        return self.share <= 0 or self.whole.exhausted
 
     def iterations_left(self, intervals: int) -> float:
         """Return how many iterations on a mesh it has still, as a whole number or infinity."""

@@ -44,3 +44,12 @@ def test_parts_of_parts_use_up_the_shares_of_both() -> None:
     assert inner.exhausted
     inner.step(0.5, 20)
     assert outer.exhausted
+
+
+def test_part_is_exhausted_with_the_whole() -> None:
+    outer = LimitedMonitor.of(Monitor(), 10.0)
+    inner = LimitedMonitor.of(outer, 1e9)
+    assert not inner.exhausted
+    outer.step(0.5, 20)
+    assert inner.exhausted
+    assert inner.iterations_left(1) == 0

@@ -93,6 +93,11 @@ def test_upright_arm_is_called_unstable(capsys: pytest.CaptureFixture[str]) -> N
     assert 'joints free: unstable, unstable, ' in out
 
 
+def test_rigid_arm_has_no_modes(capsys: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = run(capsys, 'korayem_rigid', '--no-plot')
+    assert 'joints locked: none' in out
+
+
 def test_postures_may_be_repeated(capsys: pytest.CaptureFixture[str]) -> None:
     _, out, _ = run(capsys, 'korayem_ei5', '--no-plot', '--posture', '10,20', '--posture=-5,7.5')
     assert re.findall(r'at joint angles \((.*)\) deg', out) == ['10, 20', '-5, 7.5']

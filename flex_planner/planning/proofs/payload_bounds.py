@@ -10,9 +10,9 @@ from flex_planner.planning.proofs.motion_facts import MotionFacts
 import numpy as np
 
 # payloads below are not told from none [kg]
+_LEAST = 1e-6
 # how far above what is carried a bound is looked for first
 _FIRST_FACTOR = 1.1
-_LEAST = 1e-6
 
 
 def payload_by_power(facts: MotionFacts) -> float:
@@ -60,8 +60,7 @@ def payload_by_energy(facts: MotionFacts, known: float = MAX_PAYLOAD,
 
     """
     excluded = _excluded_by_energy(facts)
-    return np.inf if excluded is None else _least_excluded(
-        excluded, 5e-3, known, carried)
+    return np.inf if excluded is None else _least_excluded(excluded, 5e-3, known, carried)
 
 
 def is_any_excluded(facts: MotionFacts) -> bool:

@@ -12,6 +12,7 @@ from flex_planner.base.validation import Array
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import MAX_DURATION, MAX_VELOCITY
+from flex_planner.planning.kinds.paths import JointPath
 from flex_planner.planning.proofs.duration_bounds import bound_by_energy, bound_by_power
 from flex_planner.planning.proofs.motion_facts import MotionFacts
 from flex_planner.planning.strategies.initial_guesses import rigid_problem
@@ -65,19 +66,17 @@ def _moves_evenly(problem: MotionProblem, duration: float) -> bool:
     """
     Return whether the arm made rigid can do a motion of a simple shape in a duration.
 
-    All joints follow the polynomial of degree five that begins and ends at rest; where the task
-    does not, this says no.
+    All joints follow a straight `JointPath`, which begins and ends at rest; where the task does
+    not, this says no.
 
     """
     task, arm, n = problem.task, problem.task.arm.rigid(), problem.task.arm.n_joints
     if (np.any(task.start_velocities) or np.any(task.goal_velocities)
             or not np.isinf(problem.goal_weights).all()):
         return False
-    s = np.linspace(0.0, 1.0, _SAMPLES)[:, None]
-    stroke = problem.goal[:n] - problem.start[:n]
-    positions = problem.start[:n] + stroke * s**3 * (10 - 15 * s + 6 * s**2)
-    speeds = stroke * 30 * (s * (1 - s))**2 / duration
-    accelerations = stroke * 60 * s * (1 - s) * (1 - 2 * s) / duration**2
+    path = JointPath(problem.start[:n], problem.goal[:n], np.zeros((0, n)))
+    positions, speeds, accelerations = path(
+        np.linspace(0.0, 1.0, _SAMPLES, dtype=np.float64), duration)
     parameters = problem.parameters.drop_modes()
     torques = ArmModel.of(arm).inverse_dynamics(np.hstack([positions, speeds]), accelerations,
                                                 parameters.physical)
