@@ -131,6 +131,15 @@ class ArmModel(ArmDynamics):
                         hamiltonian=hamiltonian[:, 0], payload_share=share[:, 0],
                         acceleration=acceleration)
 
+    def barrier(self, name: str) -> BatchFunction:
+        """Return a function of `build_barrier_functions`; they are derived when first wanted."""
+        if name not in self._loaded:
+            key = cache_key(self.arm, 'dynamics', 'optimal_control')
+            self._loaded |= load_functions(
+                content_key(key, 'barrier', 'caps' if has_caps(self.arm) else ''),
+                self._build_barrier)
+        return self._loaded[name]
+
     def payload_sensitivity(self, z: Array, p: Array) -> tuple[Array, Array, Array]:
         """Return dz'/dm_p (k, 4 n_t), dH/dm_p and d2H/dm_p2 (k,)."""
         rate, share, bend = self._load_optimality('payload_sensitivity')(z, p)
@@ -143,6 +152,12 @@ class ArmModel(ArmDynamics):
             self._loaded |= load_functions(content_key(key, 'caps') if has_caps(self.arm) else key,
                                            self._build_optimality)
         return self._loaded[name]
+
+    def _build_barrier(self) -> Mapping[str, tuple[Any, int]]:
+        """Derive the functions of an interior-point method; CasADi is imported only here."""
+        from flex_planner.optimal_control.barrier_conditions import build_barrier_functions
+
+        return build_barrier_functions(self.arm)
 
     def _build_optimality(self) -> Mapping[str, tuple[Any, int]]:
         """Derive the functions; CasADi is imported only here."""

@@ -11,6 +11,7 @@ at fixed u.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,7 +24,35 @@ from flex_planner.optimal_control.free_rates import free_duration_rates, free_pa
 from flex_planner.optimal_control.parameters import ParameterSymbols
 from flex_planner.optimal_control.rate_jacobian import RateJacobian
 from flex_planner.optimal_control.running_cost import running_cost
-from flex_planner.optimal_control.torque_limits import free_torque, has_caps
+from flex_planner.optimal_control.torque_limits import (
+    free_torque,
+    has_caps,
+    TorqueSensitivity,
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TorqueLaw:
+    """
+    The torque that is chosen at a point, of symbols, shape (n, 1) each.
+
+    Attributes
+    ----------
+    torque : casadi.SX
+        u [N m].
+    multiplier : casadi.SX
+        What bounds that move with the speed add to the rates of the joints' second costates.
+    sensitivity : TorqueSensitivity
+        How both change.
+
+    """
+
+    torque: Any
+    multiplier: Any
+    sensitivity: TorqueSensitivity
+
+
+TorqueChoice = Callable[[Any, Any], TorqueLaw]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -45,6 +74,8 @@ class Conditions:
         dH/dm_p [1/kg].
     acceleration : casadi.SX, shape (n_t, 1)
         q''.
+    virtual : casadi.SX, shape (n_t, 1)
+        y = M^-1 psi_2.
 
     """
 
@@ -57,6 +88,7 @@ class Conditions:
     hamiltonian: Any
     payload_share: Any
     acceleration: Any
+    virtual: Any
 
 
 def build_optimality_functions(arm: Arm) -> dict[str, BatchedFunction]:
@@ -102,17 +134,30 @@ def build_optimality_functions(arm: Arm) -> dict[str, BatchedFunction]:
     return functions | free_payload_rates(functions) | free_duration_rates(functions)
 
 
-def derive_conditions(chain: Chain, parameters: ParameterSymbols) -> Conditions:
-    """Derive eqs. (8) and (11)-(14) for a chain."""
+def derive_conditions(chain: Chain, parameters: ParameterSymbols,
+                      choose: TorqueChoice | None = None) -> Conditions:
+    """
+    Derive eqs. (8) and (11)-(14) for a chain.
+
+    Parameters
+    ----------
+    chain : Chain
+        Of the arm.
+    parameters : ParameterSymbols
+        Weights and limits.
+    choose : callable, optional
+        From the torque without bounds and the joint speeds to the torque; eq. (14) by default.
+
+    """
     q, rates, a, y = (chain.coordinates, chain.rates, chain.accelerations, chain.virtual_rates)
     n_t, n = q.numel(), chain.rigidity.numel()
     psi_1, psi_2, u = (ca.SX.sym(name, size) for name, size in (
         ('psi_1', n_t), ('psi_2', n_t), ('u', n)))
-    solve, limits, R = solver_of(chain.mass_matrix()), parameters.torque_limits, parameters[
-        'effort_weights']
+    solve, R = solver_of(chain.mass_matrix()), parameters['effort_weights']
     virtual = solve(psi_2)
     free = free_torque(R, virtual[:n])
-    torque = limits.bound(free, rates[:n])
+    law = (choose or bounded_law(parameters))(free, rates[:n])
+    torque = law.torque
     acceleration = solve(ca.vertcat(torque, ca.SX(n_t - n, 1)) - chain.bias())
 
     def at_point(*expressions: Any) -> Any:
@@ -123,11 +168,19 @@ def derive_conditions(chain: Chain, parameters: ParameterSymbols) -> Conditions:
     gradient = ca.gradient(stand_in, ca.vertcat(x, chain.payload_mass))
     cost, slope = at_point(cost, gradient)
     costate_rate = -slope[:2 * n_t]
-    costate_rate[n_t:n_t + n] += limits.multiplier(R, free, rates[:n])
+    costate_rate[n_t:n_t + n] += law.multiplier
     return Conditions(
         z=ca.vertcat(x, psi_1, psi_2), rate=ca.vertcat(rates, acceleration, costate_rate),
         jacobian=RateJacobian.of(chain, gradient[:2 * n_t], at_point, solve,
-                                 limits.sensitivity(R, free, rates[:n])),
+                                 law.sensitivity),
         torque=torque, free_torque=free, cost=cost, payload_share=slope[-1],
         hamiltonian=cost + ca.dot(psi_1, rates) + ca.dot(psi_2, acceleration),
-        acceleration=acceleration)
+        acceleration=acceleration, virtual=virtual)
+
+
+def bounded_law(parameters: ParameterSymbols) -> TorqueChoice:
+    """Return the choice of eq. (14): the torque without bounds, put between them."""
+    limits, R = parameters.torque_limits, parameters['effort_weights']
+    return lambda free, speeds: TorqueLaw(
+        torque=limits.bound(free, speeds), multiplier=limits.multiplier(R, free, speeds),
+        sensitivity=limits.sensitivity(R, free, speeds))

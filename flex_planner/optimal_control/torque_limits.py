@@ -94,6 +94,12 @@ class TorqueLimits:
                 np.minimum(np.minimum(free, highest)[:, some] - cap, cap - lowest[:, some]),
                 np.maximum(np.maximum(free, lowest)[:, some] + cap, -cap - highest[:, some]))
 
+    def margins(self, torque: Any, speeds: Any) -> list[Any]:
+        """Return how far torques are from each limit, (..., n) each: lines first, then caps."""
+        lowest, highest = self.lines(speeds)
+        lines = [highest - torque, torque - lowest]
+        return lines if self.cap is None else [*lines, self.cap - torque, torque + self.cap]
+
     def multiplier(self, weights: Any, free: Any, speeds: Any) -> Any:
         """
         Return what a bound that moves with the speed adds to the rate of its costate.

@@ -1,0 +1,150 @@
+"""Motions with the motors' limits as a barrier, for the interior-point method."""
+
+from __future__ import annotations
+
+from flex_planner.base.validation import Array
+from flex_planner.collocation import CollocationSolution
+from flex_planner.collocation.problem import Indices
+from flex_planner.optimal_control.free_payload import FreePayloadProblem
+from flex_planner.optimal_control.motion_problem import MotionProblem
+import numpy as np
+
+# stands for a limit that there is none of
+_ENDLESS = 1e30
+# of its limits, within which a first torque stays
+_INSIDE = 0.9
+
+
+class MotionBarrier:
+    """
+    The conditions of `barrier_conditions` for a task: a `BarrierProblem` of z = (q, q', psi).
+
+    Parameters
+    ----------
+    motion : MotionProblem
+        Of the task.
+
+    """
+
+    def __init__(self, motion: MotionProblem) -> None:
+        self.motion = motion
+        self.size, self.explicit = motion.size, motion.explicit
+        self.free = motion.model.arm.n_joints
+        self._p = np.where(np.isfinite(motion.p), motion.p, _ENDLESS)
+
+    def scale(self, mu: float) -> Array:
+        """Return the magnitudes of the motion: limits that are not felt weigh nothing."""
+        return self.motion.scale
+
+    def condense(self, z: Array, y: Array, mu: float) -> tuple[Array, Array]:
+        """Return F and J of the step z' = F + J dz."""
+        rate, jacobian = self.motion.model.barrier('barrier')(z, y, np.append(self._p, mu))
+        return rate, jacobian
+
+    def find_step(self, z: Array, y: Array, dz: Array, mu: float) -> Array:
+        """Return the step of (torques, slacks, multipliers) that goes with one of z."""
+        return self.motion.model.barrier('barrier_direction')(z, y, dz,
+                                                              np.append(self._p, mu))[0]
+
+    def left(self, z: Array) -> tuple[Array, Array]:
+        """Return the initial conditions."""
+        return self.motion.left(z)
+
+    def right(self, z: Array) -> tuple[Array, Array]:
+        """Return the final conditions."""
+        return self.motion.right(z)
+
+    def guess(self, solution: CollocationSolution, mu: float) -> Array:
+        """Return torques inside their limits, slacks and multipliers for a motion."""
+        z = solution.stage_values().reshape(-1, solution.nodes.shape[1])
+        return self._centre(z, mu).reshape(*solution.stages.shape[:2], -1)
+
+    def _centre(self, z: Array, mu: float) -> Array:
+        n_t, n = self.motion.model.arm.n_coordinates, self.motion.model.arm.n_joints
+        limits, speeds = self.motion.parameters.torque_limits, z[:, n_t:n_t + n]
+        lower, upper = limits.bounds(speeds)
+        middle, half = np.nan_to_num((lower + upper) / 2), _INSIDE * (upper - lower) / 2
+        free = self.motion.model.controls(z, self.motion.p).free_torque
+        torque = middle + np.clip(free - middle, -half, half)
+        margins = limits.margins(torque, speeds)
+        if not limits.capped.any():
+            margins = margins[:2]
+        slacks = np.hstack([np.where(np.isfinite(each), each, _ENDLESS) for each in margins])
+        return np.hstack([torque, slacks, mu / slacks])
+
+
+class PayloadBarrier(MotionBarrier):
+    """
+    The same with a free payload at a price, of (z, m_p, nu): see `FreePayloadProblem`.
+
+    Parameters
+    ----------
+    motion : MotionProblem
+        Of the task.
+    price : float
+        sigma [1/kg], > 0.
+
+    """
+
+    def __init__(self, motion: MotionProblem, price: float) -> None:
+        super().__init__(motion)
+        self.payload = FreePayloadProblem(motion, price)
+        self.size, self.explicit = self.payload.size, self.payload.explicit
+        self._price = price
+
+    def scale(self, mu: float) -> Array:
+        """
+        Return the magnitudes of the unknowns.
+
+        While the limits are a barrier alone a torque costs 2 mu / K_1^2, and costates are as large
+        as that.
+
+        """
+        limits = self.motion.parameters
+        with np.errstate(divide='ignore'):
+            grown = 2 * mu / (limits.effort_weights * limits.torque_limits.standstill**2)
+        half = self.motion.size // 2
+        scale = self.payload.scale.copy()
+        scale[half:2 * half] *= min(max(1.0, float(grown.max())), self._most)
+        return scale
+
+    @property
+    def _most(self) -> float:
+        return max(1.0, self._price)
+
+    def condense(self, z: Array, y: Array, mu: float) -> tuple[Array, Array]:
+        """Return F and J of the step z' = F + J dz."""
+        rate, jacobian = self.motion.model.barrier('payload_barrier')(
+            z, y, np.append(self._p, mu))
+        return rate, jacobian
+
+    def find_step(self, z: Array, y: Array, dz: Array, mu: float) -> Array:
+        """Return the step of (torques, slacks, multipliers) that goes with one of z."""
+        return self.motion.model.barrier('payload_barrier_direction')(
+            z, y, dz, np.append(self._p, mu))[0]
+
+    def left(self, z: Array) -> tuple[Array, Array]:
+        """Return the initial conditions."""
+        return self.payload.left(z)
+
+    def right(self, z: Array) -> tuple[Array, Array]:
+        """Return the final conditions."""
+        return self.payload.right(z)
+
+    def guess(self, solution: CollocationSolution, mu: float) -> Array:
+        """Return torques inside their limits, slacks and multipliers for a motion."""
+        z = solution.stage_values().reshape(-1, solution.nodes.shape[1])
+        return self._centre(z[:, :-2], mu).reshape(*solution.stages.shape[:2], -1)
+
+    def extend(self, solution: CollocationSolution) -> CollocationSolution:
+        """Return a motion with the payload of the task, whose price grows evenly."""
+        count, stages, size = solution.stages.shape
+        duration = solution.mesh[-1] - solution.mesh[0]
+        way = (solution.mesh - solution.mesh[0]) / duration
+        nodes = np.column_stack([solution.nodes, np.full(count + 1, self.motion.task.payload_mass),
+                                 -self._price * way])
+        added = np.zeros((count, stages, 2))
+        added[..., 1] = -self._price / duration
+        return CollocationSolution(solution.mesh, nodes,
+                                   np.concatenate([solution.stages, added], axis=-1),
+                                   solution.rule)
