@@ -13,6 +13,7 @@ import ctypes
 from functools import cache
 import os
 from pathlib import Path
+import re
 from typing import Any, NamedTuple
 
 from flex_planner.base.compiled_library import build_library, content_key, find_library
@@ -131,9 +132,15 @@ def prepare_core(size: int, left: int, explicit: int, stages: int) -> None:
         load_core(CoreSizes(size, left, explicit, count, 0))
 
 
+def read_source() -> str:
+    """Return core.c with its parts in the place of their includes: one text, and one key of it."""
+    return re.sub(r'#include "(.*)"', lambda part: (_SOURCE.parent / part[1]).read_text(),
+                  _SOURCE.read_text())
+
+
 @cache
 def _load_core(sizes: CoreSizes) -> Core | None:
-    source = _SOURCE.read_text()
+    source = read_source()
     key = content_key(source, *_OPTIONS, *sizes.definitions)
     core = find_library(key, lambda library, record: Core(library))
     if core is not None:
