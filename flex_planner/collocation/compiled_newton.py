@@ -42,16 +42,19 @@ _MESSAGES = {**FAILURES, 4: RATE_NOT_FINITE, 5: CORRECTION_NOT_FINITE, 6: NO_STE
 
 
 def solve_compiled(problem: BoundaryValueProblem, guess: CollocationSolution, tolerance: float,
-                   max_iterations: int, monitor: Monitor) -> NewtonOutcome | None:
+                   max_iterations: int, monitor: Monitor, *,
+                   exact: bool = False) -> NewtonOutcome | None:
     """Return what `newton` would, None if the problem or the core is not compiled."""
     rate = compiled_rate_of(problem)
     if rate is None:
         return None
     left = problem.left(guess.nodes[0])[0].size
-    core = load_core(CoreSizes(problem.size, left, problem.explicit.size, guess.rule.stages, 0))
+    core = load_core(CoreSizes(problem.size, left, problem.explicit.size, guess.rule.stages,
+                               int(exact)))
     if core is None:
         return None
-    return _CompiledRun(core, problem, rate, guess, left).solve(tolerance, max_iterations, monitor)
+    run = _CompiledRun(core, problem, rate, guess, left, exact=exact)
+    return run.solve(tolerance, max_iterations, monitor)
 
 
 class _Calls:
@@ -107,11 +110,12 @@ class _CompiledRun:
     """One run, with the memory that core.c works in."""
 
     def __init__(self, core: Core, problem: BoundaryValueProblem, rate: CompiledRate,
-                 guess: CollocationSolution, left: int) -> None:
+                 guess: CollocationSolution, left: int, *, exact: bool) -> None:
         self._core, self._problem, self._guess, self._left = core, problem, guess, left
         count, size = guess.intervals, problem.size
         self._nodes, self._stages = guess.nodes.copy(), guess.stages.copy()
-        self._parts = (guess.steps, np.empty((count, size, size)), np.empty((left, size)),
+        blocks = (count, guess.rule.stages) if exact else (count,)
+        self._parts = (guess.steps, np.empty((*blocks, size, size)), np.empty((left, size)),
                        np.empty((size - left, size)), np.empty(size), problem.explicit)
         self._factors, self._rate = core.allocate(count), rate
 

@@ -67,10 +67,12 @@ def _residual(problem: BoundaryValueProblem, solution: CollocationSolution,
                     problem.right(solution.nodes[-1])[0])
 
 
-def linearise(problem: BoundaryValueProblem, solution: CollocationSolution,
-              monitor: Monitor) -> tuple[Residual, Array]:
+def linearise(problem: BoundaryValueProblem, solution: CollocationSolution, monitor: Monitor,
+              *, exact: bool = False) -> tuple[Residual, Array]:
     """
     Return the residual and the mean of dF/dz over each interval, (N, m, m).
+
+    If exact, it is dF/dz at every stage, (N, s, m, m).
 
     Raises
     ------
@@ -82,7 +84,8 @@ def linearise(problem: BoundaryValueProblem, solution: CollocationSolution,
     """
     count, stages, size = solution.stages.shape
     times, values = solution.stage_times(), solution.stage_values()
-    rate, mean = np.empty_like(solution.stages), np.empty((count, size, size))
+    rate = np.empty_like(solution.stages)
+    jacobians = np.empty((count, stages, size, size) if exact else (count, size, size))
     chunk = max(1, _CHUNK // (stages * size**2))
     for first in range(0, count, chunk):
         monitor.check()
@@ -91,10 +94,11 @@ def linearise(problem: BoundaryValueProblem, solution: CollocationSolution,
                                                 values[part].reshape(-1, size))
         rate[part] = rates.reshape(rate[part].shape)
         by_stage = jacobian.reshape(-1, stages, size * size)
-        mean[part] = (solution.rule.weights @ by_stage).reshape(-1, size, size)
-    if not (np.isfinite(rate).all() and np.isfinite(mean).all()):
+        found = by_stage if exact else solution.rule.weights @ by_stage
+        jacobians[part] = found.reshape(jacobians[part].shape)
+    if not (np.isfinite(rate).all() and np.isfinite(jacobians).all()):
         raise SingularSystemError(RATE_NOT_FINITE)
-    return _residual(problem, solution, rate), mean
+    return _residual(problem, solution, rate), jacobians
 
 
 def factorise(problem: BoundaryValueProblem, solution: CollocationSolution,

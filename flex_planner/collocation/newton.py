@@ -47,7 +47,7 @@ class _Step:
 
 
 def newton(problem: BoundaryValueProblem, guess: CollocationSolution, *, tolerance: float,
-           max_iterations: int, monitor: Monitor) -> NewtonOutcome:
+           max_iterations: int, monitor: Monitor, exact: bool = False) -> NewtonOutcome:
     """
     Solve the collocation equations on the mesh of a guess.
 
@@ -63,16 +63,19 @@ def newton(problem: BoundaryValueProblem, guess: CollocationSolution, *, toleran
         Linear systems at most.
     monitor : Monitor
         Told of every iteration; may stop it.
+    exact : bool
+        See `SolverSettings`.
 
     """
     left = monitor.iterations_left(guess.intervals)
     if left < 1:
-        return _Run(problem, guess, tolerance, monitor).outcome(_GIVEN_UP)
+        return _Run(problem, guess, tolerance, monitor, exact).outcome(_GIVEN_UP)
     max_iterations = int(min(max_iterations, left))
-    compiled = solve_compiled(problem, guess, tolerance, max_iterations, monitor)
+    compiled = solve_compiled(problem, guess, tolerance, max_iterations, monitor,
+                              exact=exact)
     if compiled is not None:
         return compiled
-    run = _Run(problem, guess, tolerance, monitor)
+    run = _Run(problem, guess, tolerance, monitor, exact)
     try:
         while run.iterations < max_iterations:
             if run.iterate():
@@ -88,8 +91,9 @@ class _Run:
     """The state of one call of `newton`."""
 
     def __init__(self, problem: BoundaryValueProblem, guess: CollocationSolution,
-                 tolerance: float, monitor: Monitor) -> None:
+                 tolerance: float, monitor: Monitor, exact: bool) -> None:
         self._problem, self._tolerance, self._monitor = problem, tolerance, monitor
+        self._exact = exact
         self._solution = guess
         self._system: LinearSystem | None = None
         self._norm, self._step, self.iterations = np.inf, 1.0, 0
@@ -106,7 +110,8 @@ class _Run:
         """Factorise once and move as far as the matrix is good for; True if converged."""
         self._monitor.check()
         self._scale = magnitudes(self._problem, self._solution)
-        residual, jacobians = linearise(self._problem, self._solution, self._monitor)
+        residual, jacobians = linearise(self._problem, self._solution, self._monitor,
+                                        exact=self._exact)
         system = self._system = factorise(self._problem, self._solution, jacobians)
         full = self._measure(system, residual)
         self.iterations += 1

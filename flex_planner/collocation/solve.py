@@ -68,7 +68,8 @@ class _MeshRefinement:
         while True:
             tolerance = self._newton_tolerance()
             outcome = newton(self._problem, self._point, tolerance=tolerance,
-                             max_iterations=settings.max_iterations, monitor=self._monitor)
+                             max_iterations=settings.max_iterations, monitor=self._monitor,
+                             exact=settings.exact)
             self._iterations += outcome.iterations
             self._point = outcome.solution
             if not outcome.converged or outcome.system is None:
