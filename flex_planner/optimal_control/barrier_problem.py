@@ -32,6 +32,17 @@ class MotionBarrier:
         self.free = motion.model.arm.n_joints
         self._p = np.where(np.isfinite(motion.p), motion.p, _ENDLESS)
 
+    @property
+    def cost_rate(self) -> float:
+        """Return about the effort per time that a motion takes, or the motors can spend."""
+        motion, n = self.motion, self.free
+        # the scale of the second costates is a tenth of R times the torques
+        half = 3 * motion.size // 4
+        torque = np.maximum(10 * motion.scale[half:half + n] / motion.parameters.effort_weights,
+                            np.abs(motion.holding_torque))
+        torque = np.minimum(torque, motion.parameters.torque_limits.standstill)
+        return float(motion.parameters.effort_weights @ torque**2) / 2
+
     def scale(self, mu: float) -> Array:
         """Return the magnitudes of the motion: limits that are not felt weigh nothing."""
         return self.motion.scale

@@ -28,6 +28,7 @@ from flex_planner.planning.strategies.homotopies import (
     raise_weights_from,
 )
 from flex_planner.planning.strategies.initial_guesses import lift
+from flex_planner.planning.strategies.interior_point import pass_barrier_from
 from flex_planner.planning.strategies.strategy import Attempt
 
 # kinds that Newton's method is tried from
@@ -126,15 +127,23 @@ def _solve_first(problem: MotionProblem, bare: MotionProblem, kinds: list[KindOf
 def _solve_from(problem: MotionProblem, bare: MotionProblem, kind: KindOfMotion,
                 solver: Solver) -> CollocationResult:
     """Solve a problem from a kind of motion: without its weights first, then with them."""
-    guess = as_guess(bare, kind, solver)
-    if not has_weights(problem):
-        return solver.solve(problem, guess)
-    result = solver.coarse().solve(bare, guess)
-    return raise_weights_from(problem, result.solution, solver) if result.converged else result
+    weighted = has_weights(problem)
+    first = solver.coarse() if weighted else solver
+    result = first.solve(bare, as_guess(bare, kind, solver))
+    if not result.converged and result.status not in INTERRUPTED:
+        result = pass_barrier_from(bare, _stretch(bare, kind), first)
+    if not (weighted and result.converged):
+        return result
+    return raise_weights_from(problem, result.solution, solver)
 
 
 def as_guess(problem: MotionProblem, kind: KindOfMotion, solver: Solver) -> CollocationSolution:
     """Return the motion of a kind as a guess, stretched to the duration, lifted if need be."""
-    motion = kind.motion.solution
-    guess = motion.stretched(problem.task.duration / motion.mesh[-1])
+    guess = _stretch(problem, kind)
     return guess if guess.nodes.shape[1] == problem.size else lift(problem, guess, solver)
+
+
+def _stretch(problem: MotionProblem, kind: KindOfMotion) -> CollocationSolution:
+    """Return the motion of a kind, stretched to the duration."""
+    motion = kind.motion.solution
+    return motion.stretched(problem.task.duration / motion.mesh[-1])

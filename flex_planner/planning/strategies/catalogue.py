@@ -14,6 +14,10 @@ from flex_planner.planning.strategies.initial_guesses import (
     direct_collocation,
     lift_rigid_motion,
 )
+from flex_planner.planning.strategies.interior_point import (
+    pass_barrier,
+    pass_barrier_from_rigid,
+)
 from flex_planner.planning.strategies.limit_strategies import (
     continue_in_duration,
     continue_in_payload,
@@ -23,6 +27,8 @@ from flex_planner.planning.strategies.strategy import Strategy
 CATALOGUE: tuple[Strategy, ...] = (
     Strategy('cold start', cold_start, quick=True),
     Strategy('rigid motion first', lift_rigid_motion, quick=True),
+    Strategy('interior point', pass_barrier),
+    Strategy('interior point from the rigid motion', pass_barrier_from_rigid),
     Strategy('homotopy in the weights', raise_weights, quick=True),
     Strategy('coarse mesh first', coarse_mesh, quick=True),
     Strategy('homotopy in vibration weights', lower_vibration_price),

@@ -1,0 +1,96 @@
+"""
+Motions by the interior-point method: the motors' limits as a barrier, then as they are.
+
+A start far from any solution meets limits that switch on and off from one iterate to the next.
+As a barrier they are smooth, and what comes out when it has vanished is so near the motion that
+Newton's method, with the Jacobian of every stage, needs few iterations more. It finds most
+motions of clamped links, whose inertia without a rotor is small, and saturated ones.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from flex_planner.base.errors import InvalidTaskError
+from flex_planner.collocation import (
+    CollocationResult,
+    CollocationSolution,
+    GaussRule,
+    Solver,
+    SolverStatus,
+)
+from flex_planner.collocation.interior_point import BarrierSchedule, solve_barrier
+from flex_planner.optimal_control.barrier_problem import MotionBarrier
+from flex_planner.optimal_control.motion_problem import MotionProblem
+from flex_planner.planning.strategies.initial_guesses import rigid_problem
+from flex_planner.planning.strategies.quasi_static_lift import bend_quasi_statically
+from flex_planner.planning.strategies.strategy import Attempt
+import numpy as np
+
+# of the method, and of its meshes, in those of `fewest_intervals`
+_STAGES, _FEWEST, _MESHES = 4, 20, (1.0, 2.0)
+# mu at first, in units of the cost per time: from a straight line, and near a motion
+_FAR, _NEAR = 0.1, 1e-3
+# mu at last, in the same units
+_LAST = 1e-7
+_TOLERANCE = 1e-2
+# iterations after which another mesh is better
+_PATIENCE = 60
+
+MakeGuess = Callable[[int], CollocationSolution]
+"""From a number of intervals to a guess."""
+
+
+def pass_barrier(problem: MotionProblem, solver: Solver) -> Attempt:
+    """Start from a straight line with the motors' limits as a barrier."""
+    def guess(intervals: int) -> CollocationSolution:
+        return problem.straight_line(intervals, GaussRule.of(_STAGES))
+
+    return Attempt(result=_pass_on_meshes(problem, guess, _FAR, solver))
+
+
+def pass_barrier_from_rigid(problem: MotionProblem, solver: Solver) -> Attempt | None:
+    """Start from the motion of the same arm made rigid, found by the same method."""
+    if not problem.task.arm.n_passive:
+        return None
+    try:
+        rigid = pass_barrier(rigid_problem(problem), solver).result
+    except InvalidTaskError:  # motors that hold the bent arm may be too weak for the straight one
+        return None
+    if not rigid.converged:
+        return Attempt(result=rigid)
+    return Attempt(result=pass_barrier_from(problem, rigid.solution, solver))
+
+
+def pass_barrier_from(problem: MotionProblem, near: CollocationSolution,
+                      solver: Solver) -> CollocationResult:
+    """Solve a problem from a motion near it, perhaps of the same arm made rigid."""
+    def guess(intervals: int) -> CollocationSolution:
+        mesh = np.linspace(0, problem.task.duration, intervals + 1, dtype=np.float64)
+        rule = GaussRule.of(_STAGES)
+        return (near.on_mesh(mesh, rule) if near.nodes.shape[1] == problem.size
+                else bend_quasi_statically(problem, near, mesh, rule))
+
+    return _pass_on_meshes(problem, guess, _NEAR, solver)
+
+
+def _pass_on_meshes(problem: MotionProblem, make_guess: MakeGuess, first: float,
+                    solver: Solver) -> CollocationResult:
+    """Return the solution that a guess leads to on the first mesh that is fine enough."""
+    barrier, exact = MotionBarrier(problem), solver.with_settings(exact=True)
+    rate = barrier.cost_rate
+    schedule = BarrierSchedule(first=first * rate, last=_LAST * rate, tolerance=_TOLERANCE,
+                               max_iterations=min(_PATIENCE, solver.settings.max_iterations))
+    for share in _MESHES:
+        count = int(share * max(_FEWEST, problem.fewest_intervals(_STAGES)))
+        guess = make_guess(min(count, solver.settings.max_intervals))
+        met = solve_barrier(barrier, guess, barrier.guess(guess, schedule.first), schedule,
+                            solver.monitor)
+        if not met.converged:
+            result = CollocationResult.failed(met.solution, f'with a barrier: {met.message}')
+            continue
+        result = exact.solve(problem, met.solution)
+        if result.status is not SolverStatus.NEWTON_FAILED:
+            break
+    return result
