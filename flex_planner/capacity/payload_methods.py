@@ -27,7 +27,7 @@ from flex_planner.planning.kinds.kinds_strategy import as_guess
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_problem import INTERRUPTED_STATUS, plan_problem, STOP_STATUS
 from flex_planner.planning.proofs import is_payload_bounded
-from flex_planner.planning.strategies.catalogue import QUICK
+from flex_planner.planning.strategies.catalogue import BARRIER, QUICK
 from flex_planner.planning.strategies.extremals import Extremal, SearchStart
 from flex_planner.planning.strategies.free_parameters import PAYLOAD
 import numpy as np
@@ -94,8 +94,10 @@ def _hold_at_once(problem: MotionProblem, solver: Solver) -> MaxPayload | None:
     if not np.isfinite(limit) or limit * _HELD <= problem.task.payload_mass:
         return None
     solver.monitor.phase = 'the payload that can be held'
-    plan = plan_problem(PAYLOAD.with_value(problem, limit * _HELD), solver.patient(_FIRST_TRY),
-                        QUICK[:2])
+    heaviest = PAYLOAD.with_value(problem, limit * _HELD)
+    plan = plan_problem(heaviest, solver.patient(_FIRST_TRY), QUICK[:2])
+    if plan.status is PlanStatus.NOT_CONVERGED:
+        plan = plan_problem(heaviest, solver, BARRIER)
     return _held(plan, limit, joint, MaxPayload(
         task=problem.task, method=PayloadMethod.DIRECT, status=plan.status,
         message=plan.message))

@@ -67,6 +67,9 @@ class BarrierProblem(Protocol):
     def find_step(self, z: Array, y: Array, dz: Array, mu: float) -> Array:
         """Return the step of y (k, n_y) that goes with one of z (k, m)."""
 
+    def longest(self, node: Array, step: Array) -> float:
+        """Return the share of a step that keeps the first node (m,) where it may be, at most 1."""
+
     def left(self, z: Array) -> tuple[Array, Array]:
         """Return residual and Jacobian of the conditions at the first node."""
 
@@ -206,8 +209,9 @@ def _advance(problem: BarrierProblem, at: BarrierOutcome, step: _Step,
              schedule: BarrierSchedule) -> BarrierOutcome:
     """Move as far as slacks and multipliers stay positive, and lower mu."""
     middle = problem.free + (at.y.shape[-1] - problem.free) // 2
-    primal = min(_longest(at.y, step.y, slice(problem.free, middle)), _LONGEST / step.norm
-                 if step.norm > _LONGEST else 1.0)
+    primal = min(_longest(at.y, step.y, slice(problem.free, middle)),
+                 problem.longest(at.solution.nodes[0], step.nodes[0]),
+                 _LONGEST / max(step.norm, _LONGEST))
     dual = _longest(at.y, step.y, slice(middle, None))
     share = np.full(at.y.shape[-1], primal)
     share[middle:] = dual

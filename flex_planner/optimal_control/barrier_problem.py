@@ -13,6 +13,8 @@ import numpy as np
 _ENDLESS = 1e30
 # of its limits, within which a first torque stays
 _INSIDE = 0.9
+# a payload keeps this share of itself in a step, and changes by no more than this of the links
+_LEAST_LEFT, _LARGEST_JUMP = 0.2, 0.4
 
 
 class MotionBarrier:
@@ -44,8 +46,23 @@ class MotionBarrier:
         return float(motion.parameters.effort_weights @ torque**2) / 2
 
     def scale(self, mu: float) -> Array:
-        """Return the magnitudes of the motion: limits that are not felt weigh nothing."""
-        return self.motion.scale
+        """
+        Return the magnitudes of the unknowns.
+
+        While the limits are a barrier alone a torque costs 2 mu / K_1^2, and costates are as large
+        as that.
+
+        """
+        half = self.motion.size // 2
+        scale = self.motion.scale.copy()
+        scale[half:] *= self._growth(mu)
+        return scale
+
+    def _growth(self, mu: float) -> float:
+        """Return by how much the barrier makes torques dearer, at least 1."""
+        limits = self.motion.parameters
+        grown = 2 * mu / (limits.effort_weights * limits.torque_limits.standstill**2)
+        return max(1.0, float(grown.max()))
 
     def condense(self, z: Array, y: Array, mu: float) -> tuple[Array, Array]:
         """Return F and J of the step z' = F + J dz."""
@@ -56,6 +73,10 @@ class MotionBarrier:
         """Return the step of (torques, slacks, multipliers) that goes with one of z."""
         return self.motion.model.barrier('barrier_direction')(z, y, dz,
                                                               np.append(self._p, mu))[0]
+
+    def longest(self, node: Array, step: Array) -> float:
+        """Return 1: the motion may go anywhere."""
+        return 1.0
 
     def left(self, z: Array) -> tuple[Array, Array]:
         """Return the initial conditions."""
@@ -101,27 +122,14 @@ class PayloadBarrier(MotionBarrier):
         super().__init__(motion)
         self.payload = FreePayloadProblem(motion, price)
         self.size, self.explicit = self.payload.size, self.payload.explicit
-        self._price = price
+        self.price = price
 
     def scale(self, mu: float) -> Array:
-        """
-        Return the magnitudes of the unknowns.
-
-        While the limits are a barrier alone a torque costs 2 mu / K_1^2, and costates are as large
-        as that.
-
-        """
-        limits = self.motion.parameters
-        with np.errstate(divide='ignore'):
-            grown = 2 * mu / (limits.effort_weights * limits.torque_limits.standstill**2)
+        """Return the magnitudes of the unknowns; costates are no larger than the price."""
         half = self.motion.size // 2
         scale = self.payload.scale.copy()
-        scale[half:2 * half] *= min(max(1.0, float(grown.max())), self._most)
+        scale[half:2 * half] *= min(self._growth(mu), max(1.0, self.price))
         return scale
-
-    @property
-    def _most(self) -> float:
-        return max(1.0, self._price)
 
     def condense(self, z: Array, y: Array, mu: float) -> tuple[Array, Array]:
         """Return F and J of the step z' = F + J dz."""
@@ -133,6 +141,13 @@ class PayloadBarrier(MotionBarrier):
         """Return the step of (torques, slacks, multipliers) that goes with one of z."""
         return self.motion.model.barrier('payload_barrier_direction')(
             z, y, dz, np.append(self._p, mu))[0]
+
+    def longest(self, node: Array, step: Array) -> float:
+        """Return the share of a step with which the payload stays positive, and is no jump."""
+        change, least = float(step[-2]), _LEAST_LEFT * float(node[-2])
+        most = _LARGEST_JUMP * sum(link.mass for link in self.motion.model.arm.links)
+        room = most if change > 0 else min(most, float(node[-2]) - least)
+        return min(1.0, room / max(abs(change), 1e-300))
 
     def left(self, z: Array) -> tuple[Array, Array]:
         """Return the initial conditions."""
@@ -153,9 +168,9 @@ class PayloadBarrier(MotionBarrier):
         duration = solution.mesh[-1] - solution.mesh[0]
         way = (solution.mesh - solution.mesh[0]) / duration
         nodes = np.column_stack([solution.nodes, np.full(count + 1, self.motion.task.payload_mass),
-                                 -self._price * way])
+                                 -self.price * way])
         added = np.zeros((count, stages, 2))
-        added[..., 1] = -self._price / duration
+        added[..., 1] = -self.price / duration
         return CollocationSolution(solution.mesh, nodes,
                                    np.concatenate([solution.stages, added], axis=-1),
                                    solution.rule)

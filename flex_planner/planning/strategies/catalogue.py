@@ -24,11 +24,12 @@ from flex_planner.planning.strategies.limit_strategies import (
 )
 from flex_planner.planning.strategies.strategy import Strategy
 
+BARRIER = (Strategy('interior point', pass_barrier),
+           Strategy('interior point from the rigid motion', pass_barrier_from_rigid))
 CATALOGUE: tuple[Strategy, ...] = (
     Strategy('cold start', cold_start, quick=True),
     Strategy('rigid motion first', lift_rigid_motion, quick=True),
-    Strategy('interior point', pass_barrier),
-    Strategy('interior point from the rigid motion', pass_barrier_from_rigid),
+    *BARRIER,
     Strategy('homotopy in the weights', raise_weights, quick=True),
     Strategy('coarse mesh first', coarse_mesh, quick=True),
     Strategy('homotopy in vibration weights', lower_vibration_price),

@@ -28,10 +28,11 @@ from flex_planner.planning.strategies.quasi_static_lift import bend_quasi_static
 from flex_planner.planning.strategies.strategy import Attempt
 import numpy as np
 
-# of the method, and of its meshes, in those of `fewest_intervals`
-_STAGES, _FEWEST, _MESHES = 4, 20, (1.0, 2.0)
-# mu at first, in units of the cost per time: from a straight line, and near a motion
-_FAR, _NEAR = 0.1, 1e-3
+# of the method, and intervals of its coarsest mesh
+_STAGES, _FEWEST = 4, 20
+# meshes, in units of it, and mu at first, in units of the cost per time: from a straight line,
+# and near a motion
+_FAR, _NEAR = ((1.0, 0.1), (2.0, 0.1), (2.0, 100.0)), ((1.0, 1e-3), (2.0, 1e-3))
 # mu at last, in the same units
 _LAST = 1e-7
 _TOLERANCE = 1e-2
@@ -75,16 +76,16 @@ def pass_barrier_from(problem: MotionProblem, near: CollocationSolution,
     return _pass_on_meshes(problem, guess, _NEAR, solver)
 
 
-def _pass_on_meshes(problem: MotionProblem, make_guess: MakeGuess, first: float,
-                    solver: Solver) -> CollocationResult:
-    """Return the solution that a guess leads to on the first mesh that is fine enough."""
+def _pass_on_meshes(problem: MotionProblem, make_guess: MakeGuess,
+                    tries: tuple[tuple[float, float], ...], solver: Solver) -> CollocationResult:
+    """Return the solution that a guess leads to, on the first mesh and with the first mu."""
     barrier, exact = MotionBarrier(problem), solver.with_settings(exact=True)
     rate = barrier.cost_rate
-    schedule = BarrierSchedule(first=first * rate, last=_LAST * rate, tolerance=_TOLERANCE,
-                               max_iterations=min(_PATIENCE, solver.settings.max_iterations))
-    for share in _MESHES:
+    for share, first in tries:
         count = int(share * max(_FEWEST, problem.fewest_intervals(_STAGES)))
         guess = make_guess(min(count, solver.settings.max_intervals))
+        schedule = BarrierSchedule(first=first * rate, last=_LAST * rate, tolerance=_TOLERANCE,
+                                   max_iterations=_PATIENCE)
         met = solve_barrier(barrier, guess, barrier.guess(guess, schedule.first), schedule,
                             solver.monitor)
         if not met.converged:
