@@ -87,26 +87,39 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
 
 
 def solve_from(problem: Bratu, height: float, monitor: Monitor | None = None, *,
-               intervals: int = 12, most: int = 40) -> NewtonOutcome:
+               intervals: int = 12, most: int = 40, exact: bool = False) -> NewtonOutcome:
     mesh = np.linspace(0, 1, intervals + 1)
     nodes = np.stack([4 * height * mesh * (1 - mesh), 4 * height * (1 - 2 * mesh)], axis=1)
     guess = CollocationSolution.from_values(mesh, nodes, GaussRule.of(4))
     return newton(problem, guess, tolerance=1e-10, max_iterations=most,
-                  monitor=monitor or Monitor())
+                  monitor=monitor or Monitor(), exact=exact)
 
 
 # near both solutions, where steps are damped, and where none helps
+@pytest.mark.parametrize('exact', [False, True])
 @pytest.mark.parametrize('height', [0.0, 3.0, 5.0, 7.0, 9.0])
-def test_iterates_are_those_of_python(library: ctypes.CDLL, height: float,
+def test_iterates_are_those_of_python(library: ctypes.CDLL, height: float, exact: bool,
                                       monkeypatch: pytest.MonkeyPatch) -> None:
-    found = solve_from(Bratu(library), height)
+    found = solve_from(Bratu(library), height, exact=exact)
     monkeypatch.setenv(CORE_VARIABLE, 'numpy')
-    expected = solve_from(Bratu(library), height)
+    expected = solve_from(Bratu(library), height, exact=exact)
     assert (found.converged, found.iterations, found.message, found.coarse) == (
         expected.converged, expected.iterations, expected.message, expected.coarse)
-    np.testing.assert_allclose(found.solution.nodes, expected.solution.nodes, rtol=0, atol=1e-11)
+    size = max(1.0, float(np.abs(expected.solution.nodes).max()))
+    np.testing.assert_allclose(found.solution.nodes, expected.solution.nodes, rtol=0,
+                               atol=1e-11 * size)
     np.testing.assert_allclose(found.solution.stages, expected.solution.stages, rtol=1e-11,
-                               atol=1e-10)
+                               atol=1e-10 * size)
+
+
+@pytest.mark.parametrize('core', ['', 'numpy'])
+def test_jacobians_of_all_stages_converge_where_their_mean_does_not_fit(
+        library: ctypes.CDLL, core: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(CORE_VARIABLE, core)
+    mean, exact = (solve_from(Bratu(library), 5.0, intervals=2, exact=exact)
+                   for exact in (False, True))
+    assert not mean.converged
+    assert exact.converged and exact.iterations <= 3
 
 
 def test_no_point_is_evaluated_in_python(library: ctypes.CDLL) -> None:
