@@ -68,7 +68,12 @@ class PlannedTorque:
 
     def everywhere(self, basis: Array) -> Array:
         """Return `within` of all mesh intervals, shape (N, k, n)."""
-        return self._bounded(basis @ self.pieces.coefficients)
+        count, size, width = self.pieces.coefficients.shape
+        # one product, and joint by joint: NumPy is slow where many axes are short
+        flat = self.pieces.coefficients.transpose(2, 0, 1).reshape(width * count, size) @ basis.T
+        free, speeds = flat.reshape(2, width // 2, -1)
+        torques = self.limits.column().bound(free, speeds)
+        return np.ascontiguousarray(torques.T).reshape(count, len(basis), width // 2)
 
     def _bounded(self, values: Array) -> Array:
         n = values.shape[-1] // 2
