@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import link_deflections
@@ -61,6 +62,7 @@ def estimate_left_out(task: Task, times: Array, weights: Array, torques: Array) 
     return _locked_deflection(richer, mass, stiffness[n:, n:], end)
 
 
+@lru_cache(maxsize=16)
 def _with_another_mode(arm: Arm) -> Arm:
     """Return the arm with one mode more in every link that has any, and can have another."""
     return replace(arm, links=tuple(
@@ -84,9 +86,9 @@ def _vibration_after(mass: Array, stiffness: Array, left: Array, forces: Array) 
     """
     n = forces.shape[1]
     rates, shapes = free_vibrations(mass, stiffness, n)
-    waves = np.exp(1j * np.multiply.outer(rates, left))
-    driven = (waves * (forces @ shapes[:n]).T).sum(axis=1)
-    return np.stack([shapes @ (driven.imag / rates), shapes @ driven.real])
+    phases, driving = np.multiply.outer(rates, left), (forces @ shapes[:n]).T
+    swung, speed = ((wave(phases) * driving).sum(axis=1) for wave in (np.sin, np.cos))
+    return np.stack([shapes @ (swung / rates), shapes @ speed])
 
 
 def _locked_deflection(arm: Arm, mass: Array, stiffness: Array, state: Array) -> float:
