@@ -72,6 +72,20 @@ def switching_times(problem: BoundaryValueProblem, solution: CollocationSolution
     return _distinct(np.sort(roots), solution.mesh[0], solution.mesh[-1])
 
 
+def are_on_nodes(mesh: Array, switches: Array, tolerance: float) -> bool:
+    """
+    Return whether each switch is near enough to a node.
+
+    A switch a distance d before the end of a step h is missed by every rule, and costs
+    (d / h)^2 of what the step adds.
+
+    """
+    right = np.clip(np.searchsorted(mesh, switches), 1, mesh.size - 1)
+    gaps = np.minimum(switches - mesh[right - 1], mesh[right] - switches)
+    allowed = np.sqrt(tolerance) * np.diff(mesh)[right - 1]
+    return bool((gaps <= np.maximum(allowed, _CLOSEST * (mesh[-1] - mesh[0]))).all())
+
+
 def _roots(problem: BoundaryValueProblem, solution: CollocationSolution,
            which: NDArray[np.intp], low: tuple[Array, Array],
            high: tuple[Array, Array]) -> Array:
