@@ -73,8 +73,13 @@ def switching_times(problem: BoundaryValueProblem, solution: CollocationSolution
 
 
 def are_on_nodes(mesh: Array, switches: Array, tolerance: float) -> bool:
+    """Return whether each switch is near enough to a node to cost less than a tolerance."""
+    return cost_of_gaps(mesh, switches) <= tolerance
+
+
+def cost_of_gaps(mesh: Array, switches: Array) -> float:
     """
-    Return whether each switch is near enough to a node.
+    Return the largest error, relative to what a step adds, by a switch beside its node.
 
     A switch a distance d before the end of a step h is missed by every rule, and costs
     (d / h)^2 of what the step adds.
@@ -82,8 +87,9 @@ def are_on_nodes(mesh: Array, switches: Array, tolerance: float) -> bool:
     """
     right = np.clip(np.searchsorted(mesh, switches), 1, mesh.size - 1)
     gaps = np.minimum(switches - mesh[right - 1], mesh[right] - switches)
-    allowed = np.sqrt(tolerance) * np.diff(mesh)[right - 1]
-    return bool((gaps <= np.maximum(allowed, _CLOSEST * (mesh[-1] - mesh[0]))).all())
+    counts = gaps > _CLOSEST * (mesh[-1] - mesh[0])
+    shares: Array = gaps[counts] / np.diff(mesh)[right - 1][counts]
+    return float((shares**2).max(initial=0.0))
 
 
 def _roots(problem: BoundaryValueProblem, solution: CollocationSolution,

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
-from flex_planner.collocation.mesh import are_on_nodes, defects, level_mesh, switching_times
+from flex_planner.collocation.mesh import cost_of_gaps, defects, level_mesh, switching_times
 from flex_planner.collocation.newton import newton
 from flex_planner.collocation.problem import BoundaryValueProblem
 from flex_planner.collocation.result import CollocationResult, SolverSettings, SolverStatus
@@ -21,12 +21,13 @@ from flex_planner.collocation.solution import CollocationSolution
 from flex_planner.collocation.solve import solve
 import numpy as np
 
-# of Newton's method: where it shows the switches, and where it ends
-_NEAR, _SOLVED = 1e-2, 1e-7
+# Newton's method shows the switches so near a solution, and ends at this share of the tolerance
+_NEAR, _NEWTON_SHARE = 1e-2, 0.03
 # linear systems on a mesh: what takes more is not near
 _MOST_SYSTEMS = 3
-# meshes that are made to fit the switches
-_PLACEMENTS = 3
+# meshes that are made to fit the switches, and what they may be beside their nodes: a share of the
+# tolerance
+_PLACEMENTS, _PLACED = 3, 0.01
 # an error that is carried over counts so many times, and is so again each time: after some
 # restarts it is estimated anew. Where the defects have grown so many times, too
 _DOUBT, _MOST_GROWTH = 2.0, 3.0
@@ -105,11 +106,12 @@ class _Restart:
             if not self._converge(_NEAR):
                 return None
             after = switching_times(self._problem, self.nearest)
+        tolerance = self._settings.error_tolerance
         for _ in range(_PLACEMENTS):
-            if not self._place(before, after) or not self._converge(_SOLVED):
+            if not self._place(before, after) or not self._converge(_NEWTON_SHARE * min(tolerance, _NEAR)):
                 return None
             before, after = after, switching_times(self._problem, self.nearest)
-            if are_on_nodes(self.nearest.mesh, after, self._settings.error_tolerance):
+            if cost_of_gaps(self.nearest.mesh, after) <= _PLACED * tolerance:
                 return self._judge(after)
         return None
 
@@ -157,6 +159,7 @@ class _Restart:
         growth = max(residual / known.residual, 1.0)
         # the defect falls with the power s + 1 of the step, the error with 2 s
         errors = _DOUBT * growth**(2 * stages / (stages + 1)) * known.errors
+        errors = errors + cost_of_gaps(self.nearest.mesh, switches)
         if not (growth <= _MOST_GROWTH and errors.max() <= self._settings.error_tolerance):
             return None
         return CollocationResult(
