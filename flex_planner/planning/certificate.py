@@ -93,7 +93,7 @@ def certify(problem: MotionProblem, result: CollocationResult, monitor: Monitor,
         return Certificate(collocation_residual=result.residual)
     arm, n_t = problem.model.arm, problem.model.arm.n_coordinates
     miss = final - reached
-    tip, asked = tip_position(arm, final[:n_t]), tip_position(arm, reached[:n_t])
+    tip, asked = tip_position(arm, np.stack([final[:n_t], reached[:n_t]]))
     if problem.task.must_reach_point:
         asked = problem.task.goal_point
     return Certificate(

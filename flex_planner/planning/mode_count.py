@@ -86,9 +86,9 @@ def _vibration_after(mass: Array, stiffness: Array, left: Array, forces: Array) 
     """
     n = forces.shape[1]
     rates, shapes = free_vibrations(mass, stiffness, n)
-    phases, driving = np.multiply.outer(rates, left), (forces @ shapes[:n]).T
-    swung, speed = ((wave(phases) * driving).sum(axis=1) for wave in (np.sin, np.cos))
-    return np.stack([shapes @ (swung / rates), shapes @ speed])
+    waves = np.exp(1j * np.multiply.outer(rates, left))
+    driven = (waves * (forces @ shapes[:n]).T).sum(axis=1)
+    return np.stack([shapes @ (driven.imag / rates), shapes @ driven.real])
 
 
 def _locked_deflection(arm: Arm, mass: Array, stiffness: Array, state: Array) -> float:
