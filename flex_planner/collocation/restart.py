@@ -84,7 +84,8 @@ def solve_near(problem: BoundaryValueProblem, known: KnownSolution, settings: So
     watch = monitor or Monitor()
     restart = _Restart(problem, known, settings, watch)
     result = None
-    if known.solution.rule.stages == settings.stages + 1 and np.isfinite(known.errors).all():
+    if (known.solution.rule.stages == settings.stages + 1 and 0 < known.residual < np.inf
+            and np.isfinite(known.errors).all()):
         result = restart.run()
     return result or solve(problem, restart.nearest, settings, watch,
                            expected_error=settings.error_tolerance)
@@ -97,7 +98,7 @@ class _Restart:
                  settings: SolverSettings, monitor: Monitor) -> None:
         self._problem, self._known, self._settings = problem, known, settings
         self._monitor, self._iterations, self._meshes = monitor, 0, 1
-        self.nearest = known.solution
+        self.nearest, self._correction = known.solution, np.inf
 
     def run(self) -> CollocationResult | None:
         """Return the solution, None if it is not near or not known to be exact."""
@@ -121,7 +122,7 @@ class _Restart:
                          max_iterations=_MOST_SYSTEMS, monitor=self._monitor)
         self._iterations += outcome.iterations
         if outcome.converged:
-            self.nearest = outcome.solution
+            self.nearest, self._correction = outcome.solution, outcome.correction
         return outcome.converged
 
     def _place(self, before: Array, after: Array) -> bool:
@@ -159,7 +160,7 @@ class _Restart:
         growth = max(residual / known.residual, 1.0)
         # the defect falls with the power s + 1 of the step, the error with 2 s
         errors = _DOUBT * growth**(2 * stages / (stages + 1)) * known.errors
-        errors = errors + cost_of_gaps(self.nearest.mesh, switches)
+        errors = errors + cost_of_gaps(self.nearest.mesh, switches) + self._correction
         if not (growth <= _MOST_GROWTH and errors.max() <= self._settings.error_tolerance):
             return None
         return CollocationResult(
