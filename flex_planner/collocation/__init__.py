@@ -20,5 +20,5 @@ from flex_planner.collocation.solve import solve
 from flex_planner.collocation.solver import Backend, Solver
 
 __all__ = ['INTERRUPTED', 'Backend', 'BoundaryValueProblem', 'CollocationResult',
-           'CollocationSolution', 'GaussRule', 'KnownSolution', 'Solver', 'SolverSettings', 'SolverStatus',
-           'differentiation_matrix', 'follow_homotopy', 'solve']
+           'CollocationSolution', 'GaussRule', 'KnownSolution', 'Solver', 'SolverSettings',
+           'SolverStatus', 'differentiation_matrix', 'follow_homotopy', 'solve']

@@ -137,7 +137,7 @@ def _polish(problem: BoundaryValueProblem, solution: CollocationSolution,
 
     """
     (a, f_a), (b, f_b) = low, high
-    c = a - f_a * (b - a) / (f_b - f_a)
+    c: Array = a - f_a * (b - a) / (f_b - f_a)
     settled = _SETTLED * (solution.mesh[-1] - solution.mesh[0])
     with np.errstate(divide='ignore', invalid='ignore'):
         for _ in range(_ROOT_STEPS):

@@ -1,9 +1,10 @@
 """
 A problem like one that is solved: from its solution, on its mesh, by its rule.
 
-One linear system and a few corrections with it are all that takes. What is known of the errors of
-the first solution is known of this one, too, as long as the defects have not grown: so no error
-is estimated anew, which would take a linear system of its own.
+One linear system and a few corrections with it are all that takes; the first of them is the tangent,
+how the solution moves with the problem. What is known of the errors of the first solution is known
+of this one, too, as long as the defects have hardly grown: so no error is estimated anew, which
+would take a linear system of its own.
 
 """
 
@@ -25,11 +26,11 @@ import numpy as np
 _NEAR, _NEWTON_SHARE = 1e-2, 0.03
 # linear systems on a mesh: what takes more is not near
 _MOST_SYSTEMS = 3
-# meshes that are made to fit the switches, and what they may be beside their nodes: a share of the
-# tolerance
+# meshes that are made to fit the switches, and what a switch beside its node may cost: a share of
+# the tolerance
 _PLACEMENTS, _PLACED = 3, 0.01
-# an error that is carried over counts so many times, and is so again each time: after some
-# restarts it is estimated anew. Where the defects have grown so many times, too
+# an error that is carried over counts so many times, each time: after some restarts it is too
+# large, and is estimated anew; so it is where the defects have grown by more than this factor
 _DOUBT, _MOST_GROWTH = 2.0, 3.0
 # of a piece of the mesh between switches
 _MOST_STRETCH = 2.0
@@ -109,7 +110,8 @@ class _Restart:
             after = switching_times(self._problem, self.nearest)
         tolerance = self._settings.error_tolerance
         for _ in range(_PLACEMENTS):
-            if not self._place(before, after) or not self._converge(_NEWTON_SHARE * min(tolerance, _NEAR)):
+            if not (self._place(before, after)
+                    and self._converge(_NEWTON_SHARE * min(tolerance, _NEAR))):
                 return None
             before, after = after, switching_times(self._problem, self.nearest)
             if cost_of_gaps(self.nearest.mesh, after) <= _PLACED * tolerance:
@@ -158,8 +160,8 @@ class _Restart:
         stages, known = self._settings.stages, self._known
         residual = float(defects(self._problem, self.nearest).max())
         growth = max(residual / known.residual, 1.0)
-        # the defect falls with the power s + 1 of the step, the error with 2 s
-        errors = _DOUBT * growth**(2 * stages / (stages + 1)) * known.errors
+        # with the step the defect falls by the power s + 2, the estimated error by 2 s
+        errors = _DOUBT * growth**(2 * stages / (stages + 2)) * known.errors
         errors = errors + cost_of_gaps(self.nearest.mesh, switches) + self._correction
         if not (growth <= _MOST_GROWTH and errors.max() <= self._settings.error_tolerance):
             return None

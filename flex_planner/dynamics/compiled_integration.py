@@ -26,9 +26,9 @@ class _Integration(ctypes.Structure):
 
     _fields_ = [('step', _address), ('torques', _TORQUES), ('stop', _STOP),
                 ('tables', _address), ('tabled', _number), ('width', _number),
-                ('intervals', _number), ('size', _number), ('breaks', _address), ('physical', _address), ('rtol', _real),
-                ('atol', _real), ('safety', _real), ('largest_growth', _real),
-                ('states', _address)]
+                ('intervals', _number), ('size', _number), ('breaks', _address),
+                ('physical', _address), ('rtol', _real), ('atol', _real), ('safety', _real),
+                ('largest_growth', _real), ('states', _address)]
 
 
 class StageTorques(Protocol):

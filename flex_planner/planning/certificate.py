@@ -35,7 +35,8 @@ class Certificate:
         Largest bending after the joints are locked at the end of the re-simulation [m].
     state_error, costate_error : float
         Estimated largest error of states and costates at the nodes of the mesh, relative to
-        the largest value of each.
+        the largest value of each. Of a plan that starts from another one it may be carried over,
+        at twice its size or more, see `collocation.restart`.
 
     """
 

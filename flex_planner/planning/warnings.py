@@ -162,8 +162,8 @@ class _Motion:
         points, n_t = sample_motion(problem, solution), problem.model.arm.n_coordinates
         coordinates = points.z[:, :n_t]
         return cls(problem=problem, solution=solution, times=points.times, weights=points.weights,
-                   coordinates=coordinates, speeds=points.z[:, n_t:n_t + problem.model.arm.n_joints],
-                   torques=points.controls.torque,
+                   coordinates=coordinates, torques=points.controls.torque,
+                   speeds=points.z[:, n_t:n_t + problem.model.arm.n_joints],
                    points=link_points(problem.model.arm, coordinates))
 
     @property
