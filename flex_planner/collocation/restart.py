@@ -1,10 +1,10 @@
 """
 A problem like one that is solved: from its solution, on its mesh, by its rule.
 
-One linear system and a few corrections with it are all that takes; the first of them is the tangent,
-how the solution moves with the problem. What is known of the errors of the first solution is known
-of this one, too, as long as the defects have hardly grown: so no error is estimated anew, which
-would take a linear system of its own.
+One linear system and a few corrections with it are all that takes; the first of them is the
+tangent, how the solution moves with the problem. What is known of the errors of the first solution
+is known of this one, too, as long as the defects have hardly grown: so no error is estimated anew,
+which would take a linear system of its own.
 
 """
 

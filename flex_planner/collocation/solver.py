@@ -22,8 +22,8 @@ from flex_planner.collocation.solve import solve
 _LOOSE_TOLERANCE, _CHEAP_ITERATIONS = 0.05, 15
 # of solutions along a continuation in a price: exact to some hundred times the value's accuracy
 _COARSE_TOLERANCE, _COARSE_ITERATIONS = 1e-2, 25
-# of solutions that start from one like them, in units of that of others: the cost is still right
-# to ten digits
+# of solutions that start from one like them, in units of that of others: a cost, which is
+# stationary, is still right to ten digits
 _RESTART_TOLERANCE = 100.0
 
 
@@ -67,11 +67,18 @@ class Solver:
                             expected_error=expected_error)
 
     def solve_near(self, problem: BoundaryValueProblem, known: KnownSolution) -> CollocationResult:
-        """Solve a problem from the solution of one like it, see `restart.solve_near`."""
+        """
+        Solve a problem from the solution of one like it, see `restart.solve_near`.
+
+        Errors may be a hundred times as large as of others; not with another method, which knows
+        of no restarts.
+
+        """
+        tolerance = self.settings.error_tolerance
         if self.backend is not solve:
-            return self.solve(problem, known.solution,
-                              expected_error=self.settings.error_tolerance)
-        return solve_near(problem, known, self.settings, self.monitor)
+            return self.solve(problem, known.solution, expected_error=tolerance)
+        settings = replace(self.settings, error_tolerance=min(_RESTART_TOLERANCE * tolerance, 1.0))
+        return solve_near(problem, known, settings, self.monitor)
 
     def watched_by(self, monitor: Monitor | None) -> Solver:
         """
@@ -87,11 +94,6 @@ class Solver:
     def with_settings(self, **changes: Any) -> Solver:
         """Return the same solver with fields of its settings changed."""
         return replace(self, settings=replace(self.settings, **changes))
-
-    def restarting(self) -> Solver:
-        """Return a solver for plans that start from another one."""
-        return self.with_settings(error_tolerance=min(
-            _RESTART_TOLERANCE * self.settings.error_tolerance, 1.0))
 
     def loose(self) -> Solver:
         """Return a solver for solutions along a homotopy."""

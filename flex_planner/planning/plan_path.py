@@ -62,8 +62,9 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
         Receives progress, and may cancel or limit the time; that of the solver if not given.
     start_from : Plan, KindOfMotion or CollocationSolution, optional
         A solved plan of a similar task, or its solution, tried first; any mesh, any duration, the
-        same number of coordinates. A plan lends its mesh and its errors, too, and a hundred times
-        the solver's tolerance will do, see `collocation.restart`. Or a kind of motion that a plan or a search has met.
+        same number of coordinates. A plan lends its mesh and its errors, too, and errors of a
+        hundred times the solver's tolerance will do, see `collocation.restart`. Or a kind of
+        motion that a plan or a search has met.
     objectives : Objectives, optional
         What the motion must keep besides: weights of the task are raised until it does, fig. 1
         of the paper. `Plan.objectives` tells how.

@@ -175,6 +175,6 @@ def restart(known: KnownSolution) -> Strategy:
         if known.solution.nodes.shape[1] != problem.size:
             return None
         factor = problem.task.duration / float(known.solution.mesh[-1])
-        return Attempt(result=solver.restarting().solve_near(problem, known.stretched(factor)))
+        return Attempt(result=solver.solve_near(problem, known.stretched(factor)))
 
     return Strategy(WARM_START, attempt, quick=True)
