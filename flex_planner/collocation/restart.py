@@ -121,7 +121,8 @@ class _Restart:
     def _converge(self, tolerance: float) -> bool:
         """Move to the solution on the mesh; False if it is far."""
         outcome = newton(self._problem, self.nearest, tolerance=tolerance,
-                         max_iterations=_MOST_SYSTEMS, monitor=self._monitor)
+                         max_iterations=_MOST_SYSTEMS, monitor=self._monitor,
+                         exact=self._settings.exact)
         self._iterations += outcome.iterations
         if outcome.converged:
             self.nearest, self._correction = outcome.solution, outcome.correction
