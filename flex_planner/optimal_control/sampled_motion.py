@@ -15,7 +15,7 @@ import numpy as np
 _KEPT = 2
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SampledMotion:
     """
     A motion at both ends and the Gauss points of each interval, in order.
@@ -59,6 +59,10 @@ def sample_motion(problem: MotionProblem, solution: CollocationSolution) -> Samp
     theta = np.concatenate([[0.0], rule.nodes, [1.0]])
     shares = np.concatenate([[0.0], rule.weights, [0.0]])
     z = solution.values_at(theta).reshape(-1, problem.size)
-    return SampledMotion(theta, solution.times_at(theta).ravel(),
-                         (solution.steps[:, None] * shares).ravel(), z,
-                         problem.model.controls(z, problem.p))
+    points = SampledMotion(
+        theta=theta, times=solution.times_at(theta).ravel(),
+        weights=(solution.steps[:, None] * shares).ravel(), z=z,
+        controls=problem.model.controls(z, problem.p))
+    for values in (points.theta, points.times, points.weights, points.z):
+        values.setflags(write=False)
+    return points
