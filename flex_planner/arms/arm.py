@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING
 
 from flex_planner.arms.joint import Elasticity, Joint, Motor, Node
@@ -136,9 +137,9 @@ class Arm:
     @property
     def modal_slices(self) -> tuple[slice, ...]:
         """Return the slice of each link's modal coordinates among the generalized ones."""
-        ends = np.cumsum([self.n_joints + len(self.elastic_joints),
-                          *(link.modes for link in self.links)])
-        return tuple(slice(int(a), int(b)) for a, b in zip(ends[:-1], ends[1:], strict=True))
+        ends = accumulate([self.n_joints + len(self.elastic_joints),
+                           *(link.modes for link in self.links)])
+        return tuple(slice(a, b) for a, b in pairwise(ends))
 
     @property
     def reach(self) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 import math
 
 from flex_planner.arms.beam_eigenmodes import MAX_LOAD_RATIO, TipLoad
@@ -220,11 +221,8 @@ class Link:
         return float(pieces @ [one.density for one in self.sections])
 
     def mode_shapes(self) -> LinkModes:
-        """Return the link's mode shapes and their integrals."""
-        load = TipLoad(mass_ratio=self.shape_mass / self.mass,
-                       inertia_ratio=self.shape_inertia / (self.mass * self.length**2))
-        pieces = tuple((one.share, one.density, one.rigidity) for one in self.sections)
-        return mode_shapes(self.mode_family, self.length, self.modes, load, pieces)
+        """Return the link's mode shapes and their integrals; they are computed once."""
+        return _find_modes(self)
 
     def with_modes(self, count: int) -> Link:
         """
@@ -257,3 +255,12 @@ class Link:
         return Link(length=self.length, linear_density=self.linear_density,
                     sections=self.sections, center_of_mass=self.center_of_mass,
                     inertia=self.inertia)
+
+
+@lru_cache(maxsize=256)
+def _find_modes(link: Link) -> LinkModes:
+    """Return what `Link.mode_shapes` keeps."""
+    load = TipLoad(mass_ratio=link.shape_mass / link.mass,
+                   inertia_ratio=link.shape_inertia / (link.mass * link.length**2))
+    pieces = tuple((one.share, one.density, one.rigidity) for one in link.sections)
+    return mode_shapes(link.mode_family, link.length, link.modes, load, pieces)

@@ -13,6 +13,7 @@ import ctypes
 from functools import cache
 import os
 from pathlib import Path
+import platform
 import re
 from typing import Any, NamedTuple
 
@@ -26,8 +27,10 @@ import numpy as np
 
 CORE_VARIABLE = 'FLEX_PLANNER_CORE'
 _SOURCE = Path(__file__).with_name('core.c')
+# with vectors of 512 bits GCC 12 stores as if an array on the stack were aligned, and is not
+_VECTORS = ('-mprefer-vector-width=256',) if platform.machine() in ('x86_64', 'AMD64') else ()
 # no -ffast-math: it makes the whole process round tiny numbers to zero
-_OPTIONS = ('-O3', '-fno-math-errno', '-fno-trapping-math')
+_OPTIONS = ('-O3', '-fno-math-errno', '-fno-trapping-math', *_VECTORS)
 
 
 _address, _number, _real = ctypes.c_void_p, ctypes.c_longlong, ctypes.c_double

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache
 
 from flex_planner.base.validation import Array
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 # density of nodes: at least this share of the largest, so that nothing is overlooked
 _LEAST_DENSITY = 0.1
 _SETTLED = 1e-13
-_ROOT_STEPS = 12
+_ROOT_STEPS, _POLISHING_STEPS = 12, 4
 # nodes closer than this share of the span are one
 _CLOSEST = 1e-9
 
@@ -67,9 +68,92 @@ def switching_times(problem: BoundaryValueProblem, solution: CollocationSolution
     if not k.size:
         return np.zeros(0)
     values = values.reshape(*times.shape, -1)
-    roots = _roots(problem, solution, e, (times[k, i], values[k, i, e]),
-                   (times[k, i + 1], values[k, i + 1, e]))
+    low, high = (times[k, i], values[k, i, e]), (times[k, i + 1], values[k, i + 1, e])
+    roots = _polish(problem, solution, e, _Interpolant.of(times, theta, values, (k, e)), low, high)
+    if roots is None:  # the function is no polynomial there
+        roots = _roots(problem, solution, e, low, high)
     return _distinct(np.sort(roots), solution.mesh[0], solution.mesh[-1])
+
+
+def are_on_nodes(mesh: Array, switches: Array, tolerance: float) -> bool:
+    """Return whether each switch is near enough to a node to cost less than a tolerance."""
+    return cost_of_gaps(mesh, switches) <= tolerance
+
+
+def cost_of_gaps(mesh: Array, switches: Array) -> float:
+    """
+    Return the largest error, relative to what a step adds, by a switch beside its node.
+
+    A switch a distance d before the end of a step h is missed by every rule, and costs
+    (d / h)^2 of what the step adds.
+
+    """
+    right = np.clip(np.searchsorted(mesh, switches), 1, mesh.size - 1)
+    gaps = np.minimum(switches - mesh[right - 1], mesh[right] - switches)
+    counts = gaps > _CLOSEST * (mesh[-1] - mesh[0])
+    shares: Array = gaps[counts] / np.diff(mesh)[right - 1][counts]
+    return float((shares**2).max(initial=0.0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Interpolant:
+    """
+    Polynomials through values of switching functions in intervals, r of them.
+
+    `starts` and `steps` (r,) are those of the intervals, `powers` (d + 1, r) the coefficients of
+    the powers of theta, the constant first.
+
+    """
+
+    starts: Array
+    steps: Array
+    powers: Array
+
+    @classmethod
+    def of(cls, times: Array, theta: Array, values: Array,
+           which: tuple[NDArray[np.intp], NDArray[np.intp]]) -> _Interpolant:
+        """Interpolate values (N, d + 1, e) at positions theta of the given intervals."""
+        k, e = which
+        powers = np.linalg.solve(np.vander(theta, increasing=True), values[k, :, e].T)
+        return cls(times[k, 0], times[k, -1] - times[k, 0], powers)
+
+    def __call__(self, at: Array) -> tuple[Array, Array]:
+        """Return values and rates at times (r,)."""
+        theta = (at - self.starts) / self.steps
+        value, slope = self.powers[-1], np.zeros_like(theta)
+        for coefficient in self.powers[-2::-1]:
+            value, slope = coefficient + theta * value, value + theta * slope
+        return value, slope / self.steps
+
+
+def _polish(problem: BoundaryValueProblem, solution: CollocationSolution,
+            which: NDArray[np.intp], interpolant: _Interpolant, low: tuple[Array, Array],
+            high: tuple[Array, Array]) -> Array | None:
+    """
+    Return the zeros of bracketed functions by Newton's method, None if it does not settle.
+
+    First those of polynomials through known values, at no price; then with their slopes those of
+    the functions themselves, of which two or three values do.
+
+    """
+    (a, f_a), (b, f_b) = low, high
+    c: Array = a - f_a * (b - a) / (f_b - f_a)
+    settled = _SETTLED * (solution.mesh[-1] - solution.mesh[0])
+    with np.errstate(divide='ignore', invalid='ignore'):
+        for _ in range(_ROOT_STEPS):
+            value, slope = interpolant(c)
+            step = value / slope
+            c = np.clip(c - step, a, b)
+            if not np.abs(step).max() > settled:
+                break
+        for _ in range(_POLISHING_STEPS):
+            value = problem.switches(c, solution(c))[np.arange(c.size), which]
+            step = value / interpolant(c)[1]
+            c = np.clip(c - step, a, b)
+            # a step that was cut off at an end of the bracket is none that is small
+            if np.abs(step).max() <= settled:
+                return c
+    return None
 
 
 def _roots(problem: BoundaryValueProblem, solution: CollocationSolution,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from flex_planner.base.progress import Monitor, StopReason
 from flex_planner.base.validation import Array
 from flex_planner.collocation.estimate import Estimate, estimate_error
-from flex_planner.collocation.mesh import defects, level_mesh, switching_times
+from flex_planner.collocation.mesh import are_on_nodes, defects, level_mesh, switching_times
 from flex_planner.collocation.newton import newton
 from flex_planner.collocation.newton_outcome import NewtonOutcome
 from flex_planner.collocation.problem import BoundaryValueProblem
@@ -126,24 +126,10 @@ class _MeshRefinement:
         self._point = self._point.on_mesh(mesh)
         return True
 
-    def _on_nodes(self, switches: Array) -> bool:
-        """
-        Return whether each switch is near enough to a node.
-
-        A switch a distance d before the end of a step h is missed by every rule, and costs
-        (d / h)^2 of what the step adds.
-
-        """
-        mesh = self._point.mesh
-        right = np.clip(np.searchsorted(mesh, switches), 1, mesh.size - 1)
-        gaps = np.minimum(switches - mesh[right - 1], mesh[right] - switches)
-        allowed = np.sqrt(self._settings.error_tolerance) * np.diff(mesh)[right - 1]
-        return bool((gaps <= np.maximum(allowed, 1e-9 * (mesh[-1] - mesh[0]))).all())
-
     def _place_nodes(self, switches: Array) -> bool:
         """Move nodes to the switches of a resolved solution; False if they are there."""
         if (self._expected > _RESOLVED or self._placements >= _MOST_PLACEMENTS
-                or self._on_nodes(switches)):
+                or are_on_nodes(self._point.mesh, switches, self._settings.error_tolerance)):
             return False
         self._placements += 1
         count = self._point.intervals

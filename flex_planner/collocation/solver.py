@@ -13,6 +13,7 @@ from typing import Any, Protocol
 
 from flex_planner.base.progress import Monitor
 from flex_planner.collocation.problem import BoundaryValueProblem
+from flex_planner.collocation.restart import KnownSolution, solve_near
 from flex_planner.collocation.result import CollocationResult, SolverSettings
 from flex_planner.collocation.solution import CollocationSolution
 from flex_planner.collocation.solve import solve
@@ -21,6 +22,9 @@ from flex_planner.collocation.solve import solve
 _LOOSE_TOLERANCE, _CHEAP_ITERATIONS = 0.05, 15
 # of solutions along a continuation in a price: exact to some hundred times the value's accuracy
 _COARSE_TOLERANCE, _COARSE_ITERATIONS = 1e-2, 25
+# of solutions that start from one like them, in units of that of others: a cost, which is
+# stationary, is still right to ten digits
+_RESTART_TOLERANCE = 100.0
 
 
 class Backend(Protocol):
@@ -61,6 +65,20 @@ class Solver:
         """Solve a problem from a guess, see :func:`flex_planner.collocation.solve.solve`."""
         return self.backend(problem, guess, self.settings, self.monitor,
                             expected_error=expected_error)
+
+    def solve_near(self, problem: BoundaryValueProblem, known: KnownSolution) -> CollocationResult:
+        """
+        Solve a problem from the solution of one like it, see `restart.solve_near`.
+
+        Errors may be a hundred times as large as of others; not with another method, which knows
+        of no restarts.
+
+        """
+        tolerance = self.settings.error_tolerance
+        if self.backend is not solve:
+            return self.solve(problem, known.solution, expected_error=tolerance)
+        settings = replace(self.settings, error_tolerance=min(_RESTART_TOLERANCE * tolerance, 1.0))
+        return solve_near(problem, known, settings, self.monitor)
 
     def watched_by(self, monitor: Monitor | None) -> Solver:
         """

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 import threading
 from typing import Any, TypeVar
 
@@ -27,6 +28,12 @@ _MOST_KEPT = 16
 Dynamics = TypeVar('Dynamics', bound='ArmDynamics')
 _lock = threading.Lock()
 _kept: OrderedDict[tuple[type, str], Any] = OrderedDict()
+
+
+@lru_cache(maxsize=4 * _MOST_KEPT)
+def _describe(arm: Arm) -> str:
+    """Return the fields of an arm as text, once for each object."""
+    return describe_fields(arm)
 
 
 class ArmDynamics:
@@ -51,7 +58,7 @@ class ArmDynamics:
     @classmethod
     def of(cls: type[Dynamics], arm: Arm) -> Dynamics:
         """Return the functions of an arm, the same ones for an equal arm: some arms are kept."""
-        key = cls, describe_fields(arm)
+        key = cls, _describe(arm)
         with _lock:
             found: Dynamics = _kept.pop(key, None) or cls(arm)
             _kept[key] = found

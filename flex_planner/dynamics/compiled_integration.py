@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 import ctypes
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from flex_planner.base.compiled_library import build_library, content_key, find_library
 from flex_planner.base.compiler import CompilerError
@@ -16,22 +15,38 @@ import numpy as np
 
 _SOURCE = Path(__file__).with_name('integration.c')
 _OPTIONS = ('-O2', '-fno-math-errno')
-_STOPPED, _NO_MEMORY = -1, -2
+_NO_MEMORY = -2
 _address, _number, _real = ctypes.c_void_p, ctypes.c_longlong, ctypes.c_double
 _TORQUES = ctypes.CFUNCTYPE(_address, _number, _number)
+_STOP = ctypes.CFUNCTYPE(ctypes.c_int)
 
 
 class _Integration(ctypes.Structure):
     """`struct integration` of integration.c."""
 
-    _fields_ = [('step', _address), ('torques', _TORQUES), ('intervals', _number),
-                ('size', _number), ('breaks', _address), ('physical', _address), ('rtol', _real),
-                ('atol', _real), ('safety', _real), ('largest_growth', _real),
-                ('states', _address)]
+    _fields_ = [('step', _address), ('torques', _TORQUES), ('stop', _STOP),
+                ('tables', _address), ('tabled', _number), ('width', _number),
+                ('intervals', _number), ('size', _number), ('breaks', _address),
+                ('physical', _address), ('rtol', _real), ('atol', _real), ('safety', _real),
+                ('largest_growth', _real), ('states', _address)]
 
 
-def cross_intervals(step: int, torques: Callable[[int, int], Array | None], breaks: Array,
-                    physical: Array, states: Array, **settings: float) -> bool:
+class StageTorques(Protocol):
+    """The torques at the stages of equal steps that cross an interval."""
+
+    @property
+    def most_tabled(self) -> int:
+        """Return up to how many steps the torques of all intervals stand in one table."""
+
+    def check(self) -> None:
+        """Raise an error to stop the integration; called before every try."""
+
+    def at(self, interval: int, count: int) -> Array | None:
+        """Return those of an interval, contiguous, shape (count, 12 n); None for too many."""
+
+
+def cross_intervals(step: int, torques: StageTorques, breaks: Array, physical: Array,
+                    states: Array, **settings: float) -> bool:
     """
     Fill in the states at the breaks of a torque; False if there is no compiler.
 
@@ -39,9 +54,8 @@ def cross_intervals(step: int, torques: Callable[[int, int], Array | None], brea
     ----------
     step : int
         Address of the compiled ``runge_kutta_step``.
-    torques : callable
-        Interval and number of steps to torques at their stages; None if these are too many, or
-        an error, ends it.
+    torques : StageTorques
+        Too many steps, or an error, end it.
     breaks : numpy.ndarray, shape (N + 1,)
         Times [s].
     physical : numpy.ndarray
@@ -49,34 +63,54 @@ def cross_intervals(step: int, torques: Callable[[int, int], Array | None], brea
     states : numpy.ndarray, shape (N + 1, 2 n_t)
         The first is given; those not reached stay.
     **settings : float
-        ``rtol``, ``atol``, ``safety`` and ``largest_growth``.
+        ``width``, entries of torques at the stages of a step, 12 n; ``rtol``, ``atol``,
+        ``safety`` and ``largest_growth``.
 
     """
     library = _load()
     if library is None:
         return False
-    kept: list[Any] = []
-
-    def find_torques(interval: int, count: int) -> int | None:
-        try:
-            values = torques(interval, count)
-            kept[:] = [None if values is None else np.ascontiguousarray(values)]
-        except BaseException as error:
-            kept[:] = [error]
-        # what is kept lives while integration.c reads it
-        return kept[0].ctypes.data if isinstance(kept[0], np.ndarray) else None
-
+    calls = _Calls(torques)
+    tables = (_address * (torques.most_tabled + 1))()
     arrays = [np.ascontiguousarray(values, dtype=np.float64) for values in (breaks, physical)]
     job = _Integration(
-        step=step, torques=_TORQUES(find_torques), intervals=len(states) - 1,
+        step=step, torques=_TORQUES(calls.find), stop=_STOP(calls.stop),
+        tables=ctypes.addressof(tables), tabled=torques.most_tabled, intervals=len(states) - 1,
         size=states.shape[1], breaks=arrays[0].ctypes.data, physical=arrays[1].ctypes.data,
         states=states.ctypes.data, **settings)
     outcome = library.integrate(ctypes.byref(job))
     if outcome == _NO_MEMORY:
         raise MemoryError('no memory to integrate a motion')
-    if outcome == _STOPPED and kept[0] is not None:
-        raise kept[0]
+    if calls.error is not None:
+        raise calls.error
     return True
+
+
+class _Calls:
+    """What integration.c calls of Python. An error is kept until it returns."""
+
+    def __init__(self, torques: StageTorques) -> None:
+        self._torques = torques
+        self._kept: Array | None = None
+        self.error: BaseException | None = None
+
+    def find(self, interval: int, count: int) -> int | None:
+        """Return the address of torques, which live while integration.c reads them."""
+        try:
+            self._kept = self._torques.at(interval, count)
+        except BaseException as error:
+            self.error = error
+            return None
+        return None if self._kept is None else self._kept.ctypes.data
+
+    def stop(self) -> int:
+        """Return whether to stop."""
+        try:
+            self._torques.check()
+        except BaseException as error:
+            self.error = error
+            return 1
+        return 0
 
 
 @cache

@@ -13,13 +13,18 @@
 typedef int batch(long long n, int chain, const double *const *in, double *const *out);
 /* torques at the stages of equal steps of an interval; NULL to stop, as where these are too many */
 typedef const double *torques(long long interval, long long count);
+/* whether to stop; asked before every try */
+typedef int stop(void);
 
 enum { STOPPED = -1, NO_MEMORY = -2 };
 
 struct integration {
     batch *step;
     torques *torques;
-    long long intervals, size;
+    stop *stop;
+    /* tables[c]: torques of all intervals for c steps, once they were asked for; c up to `tabled` */
+    const double **tables;
+    long long tabled, width, intervals, size; /* width: torques at the stages of a step */
     const double *breaks, *physical;
     double rtol, atol, safety, largest_growth;
     double *states; /* (N + 1, size), the first one given */
@@ -61,6 +66,15 @@ static int cross(const struct integration *g, const double *state, const double 
     return 0;
 }
 
+/* torques of an interval, looked up where those of all intervals stand in a table */
+static const double *find_torques(const struct integration *g, long long interval, long long count)
+{
+    if (g->stop()) return NULL;
+    if (count > g->tabled) return g->torques(interval, count);
+    if (!g->tables[count]) g->tables[count] = g->torques(0, count);
+    return g->tables[count] ? g->tables[count] + interval * count * g->width : NULL;
+}
+
 /* fill in the states at the breaks; returns how many intervals were crossed, or why it stopped */
 long long integrate(const struct integration *g)
 {
@@ -71,7 +85,7 @@ long long integrate(const struct integration *g)
         long long count = 0;
         while (!(error <= 1)) {
             count = (long long)ceil(steps);
-            const double *at_stages = g->torques(k, count);
+            const double *at_stages = find_torques(g, k, count);
             if (!at_stages) {
                 outcome = STOPPED;
                 break;

@@ -159,8 +159,9 @@ def integrate(dynamics: ArmDynamics, physical: Array, state: Array, torque: Torq
     states[0] = state
     step = dynamics.runge_kutta_address
     if step is None or not cross_intervals(
-            step, _StageTorques(torque, watch).at, torque.breaks, physical, states, rtol=rtol,
-            atol=atol, safety=_SAFETY, largest_growth=_LARGEST_GROWTH):
+            step, _StageTorques(torque, watch), torque.breaks, physical, states,
+            width=RUNGE_KUTTA_STAGES * dynamics.arm.n_joints, rtol=rtol, atol=atol,
+            safety=_SAFETY, largest_growth=_LARGEST_GROWTH):
         _cross_all(dynamics.runge_kutta_steps(physical), torque, watch, states, (rtol, atol))
     return states
 
@@ -172,13 +173,22 @@ class _StageTorques:
         self._torque, self._monitor = torque, monitor
         self._tables: dict[int, Array] = {}
 
+    @property
+    def most_tabled(self) -> int:
+        """Return up to how many steps the torques of all intervals stand in one table."""
+        return _TABLE_STEPS
+
+    def check(self) -> None:
+        """Ask the monitor whether to go on."""
+        self._monitor.check()
+
     def at(self, interval: int, count: int) -> Array | None:
         """Return those of equal steps of an interval, None if they are too many."""
-        self._monitor.check()
         if count > _MOST_STEPS:
             return None
         if count > _TABLE_STEPS:
-            return self._torque.within(interval, self._torque.basis(_stage_shares(count)))
+            return np.ascontiguousarray(
+                self._torque.within(interval, self._torque.basis(_stage_shares(count))))
         if count not in self._tables:
             basis = self._torque.basis(_stage_shares(count))
             self._tables[count] = np.ascontiguousarray(self._torque.everywhere(basis))

@@ -9,6 +9,7 @@ from flex_planner.collocation import CollocationSolution
 from flex_planner.collocation.mesh import switching_times
 from flex_planner.dynamics.integration import PiecewisePolynomial
 from flex_planner.optimal_control.motion_problem import MotionProblem
+from flex_planner.optimal_control.sampled_motion import sample_motion
 from flex_planner.optimal_control.torque_limits import TorqueLimits
 import numpy as np
 
@@ -42,11 +43,10 @@ class PlannedTorque:
         if cuts.size:
             solution = solution.on_mesh(_merge(solution.mesh, cuts))
         n, n_t = problem.model.arm.n_joints, problem.model.arm.n_coordinates
-        theta = np.concatenate([[0.0], solution.rule.nodes, [1.0]])
-        z = solution.values_at(theta).reshape(-1, problem.size)
-        free = problem.model.controls(z, problem.p).free_torque
-        values = np.hstack([free, z[:, n_t:n_t + n]]).reshape(solution.intervals, theta.size, -1)
-        return cls(PiecewisePolynomial.through(solution.mesh, theta, values),
+        points = sample_motion(problem, solution)
+        values = np.hstack([points.controls.free_torque, points.z[:, n_t:n_t + n]])
+        values = values.reshape(solution.intervals, points.theta.size, -1)
+        return cls(PiecewisePolynomial.through(solution.mesh, points.theta, values),
                    problem.parameters.torque_limits)
 
     @property
@@ -68,7 +68,12 @@ class PlannedTorque:
 
     def everywhere(self, basis: Array) -> Array:
         """Return `within` of all mesh intervals, shape (N, k, n)."""
-        return self._bounded(basis @ self.pieces.coefficients)
+        count, size, width = self.pieces.coefficients.shape
+        # one product, and joint by joint: NumPy is slow where many axes are short
+        flat = self.pieces.coefficients.transpose(2, 0, 1).reshape(width * count, size) @ basis.T
+        free, speeds = flat.reshape(2, width // 2, -1)
+        torques = self.limits.column().bound(free, speeds)
+        return np.ascontiguousarray(torques.T).reshape(count, len(basis), width // 2)
 
     def _bounded(self, values: Array) -> Array:
         n = values.shape[-1] // 2

@@ -49,6 +49,10 @@ class TorqueLimits:
             np.array([motor.torque_cap if line else np.inf
                       for motor, line in zip(motors, falls, strict=True)]))
 
+    def column(self) -> TorqueLimits:
+        """Return the limits for torques and speeds (n, k), one joint in each row."""
+        return TorqueLimits(self.stall[:, None], self.slope[:, None], self.cap[:, None])
+
     @property
     def standstill(self) -> Any:
         """Return the largest torque at standstill, shape (n,) [N m]."""

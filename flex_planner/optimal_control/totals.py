@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationSolution
 from flex_planner.optimal_control.motion_problem import MotionProblem
+from flex_planner.optimal_control.sampled_motion import sample_motion
 import numpy as np
 
 
@@ -28,9 +29,8 @@ class Totals:
 def integrate_totals(problem: MotionProblem, solution: CollocationSolution) -> Totals:
     """Return cost, effort and energy, by Gauss quadrature on the mesh."""
     n, n_t = problem.model.arm.n_joints, problem.model.arm.n_coordinates
-    z = solution.stage_values().reshape(-1, problem.size)
-    controls = problem.model.controls(z, problem.p)
-    weights = (solution.steps[:, None] * solution.rule.weights).ravel()
+    points = sample_motion(problem, solution)
+    z, controls, weights = points.z, points.controls, points.weights
 
     def integral(values: Array) -> float:
         return float(weights @ values)

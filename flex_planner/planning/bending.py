@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 from flex_planner.arms.arm import Arm
 from flex_planner.base.validation import Array
+from flex_planner.collocation import CollocationSolution
+from flex_planner.optimal_control.motion_problem import MotionProblem
+from flex_planner.optimal_control.sampled_motion import sample_motion
 import numpy as np
 
 # shares of a link's length. The model keeps the links' lengths and their small slopes: at a tenth
@@ -35,6 +39,14 @@ class Bending:
     link: int
     moment: int
     share: float
+
+
+@lru_cache(maxsize=2)
+def find_bending(problem: MotionProblem, solution: CollocationSolution) -> tuple[Bending, float]:
+    """Return where a link bends furthest on a motion, and when [s]; the last ones are kept."""
+    points, arm = sample_motion(problem, solution), problem.model.arm
+    found = find_largest_bending(arm, points.z[:, :arm.n_coordinates])
+    return found, float(points.times[found.moment])
 
 
 def find_largest_bending(arm: Arm, coordinates: Array) -> Bending:

@@ -35,7 +35,8 @@ class Certificate:
         Largest bending after the joints are locked at the end of the re-simulation [m].
     state_error, costate_error : float
         Estimated largest error of states and costates at the nodes of the mesh, relative to
-        the largest value of each.
+        the largest value of each. Of a plan that starts from another one it may be carried over,
+        at twice its size or more, see `collocation.restart`.
 
     """
 
@@ -93,7 +94,7 @@ def certify(problem: MotionProblem, result: CollocationResult, monitor: Monitor,
         return Certificate(collocation_residual=result.residual)
     arm, n_t = problem.model.arm, problem.model.arm.n_coordinates
     miss = final - reached
-    tip, asked = tip_position(arm, final[:n_t]), tip_position(arm, reached[:n_t])
+    tip, asked = tip_position(arm, np.stack([final[:n_t], reached[:n_t]]))
     if problem.task.must_reach_point:
         asked = problem.task.goal_point
     return Certificate(

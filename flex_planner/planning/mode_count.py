@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import link_deflections
@@ -61,6 +62,7 @@ def estimate_left_out(task: Task, times: Array, weights: Array, torques: Array) 
     return _locked_deflection(richer, mass, stiffness[n:, n:], end)
 
 
+@lru_cache(maxsize=16)
 def _with_another_mode(arm: Arm) -> Arm:
     """Return the arm with one mode more in every link that has any, and can have another."""
     return replace(arm, links=tuple(

@@ -15,7 +15,7 @@ from flex_planner.base.errors import HoldingError, InvalidTaskError
 from flex_planner.base.processes import helper_processes
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import integer
-from flex_planner.collocation import CollocationSolution, Solver
+from flex_planner.collocation import CollocationSolution, KnownSolution, Solver
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
 from flex_planner.optimal_control.task import Task
@@ -34,10 +34,11 @@ from flex_planner.planning.proofs import (
 )
 from flex_planner.planning.stiff_links import find_stiff_links
 from flex_planner.planning.strategies.catalogue import CATALOGUE
-from flex_planner.planning.strategies.initial_guesses import warm_start
+from flex_planner.planning.strategies.initial_guesses import restart, warm_start
 from flex_planner.planning.strategies.strategy import Strategy
 from flex_planner.planning.warnings import find_arm_warnings
 from flex_planner.planning.weight_search import adapt_weights
+import numpy as np
 
 
 def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | None = None,
@@ -61,7 +62,9 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
         Receives progress, and may cancel or limit the time; that of the solver if not given.
     start_from : Plan, KindOfMotion or CollocationSolution, optional
         A solved plan of a similar task, or its solution, tried first; any mesh, any duration, the
-        same number of coordinates. Or a kind of motion that a plan or a search has met.
+        same number of coordinates. A plan lends its mesh and its errors, too, and errors of a
+        hundred times the solver's tolerance will do, see `collocation.restart`. Or a kind of
+        motion that a plan or a search has met.
     objectives : Objectives, optional
         What the motion must keep besides: weights of the task are raised until it does, fig. 1
         of the paper. `Plan.objectives` tells how.
@@ -191,6 +194,16 @@ def _given(start: Plan | KindOfMotion | CollocationSolution | None, problem: Mot
     """Yield the strategy that starts from what was given."""
     if isinstance(start, KindOfMotion):
         yield warm_start(as_guess(problem, start, solver))
-    solution = start.solution if isinstance(start, Plan) else start
-    if isinstance(solution, CollocationSolution):
-        yield warm_start(solution)
+    if isinstance(start, Plan) and start.solution is not None:
+        yield restart(_what_is_known(start, start.solution))
+    if isinstance(start, CollocationSolution):
+        yield warm_start(start)
+
+
+def _what_is_known(plan: Plan, solution: CollocationSolution) -> KnownSolution:
+    """Return a solved plan as what a similar one starts from."""
+    certificate, half = plan.certificate, solution.nodes.shape[1] // 2
+    return KnownSolution(
+        solution=solution, residual=certificate.collocation_residual,
+        errors=np.repeat([certificate.state_error, certificate.costate_error], half),
+        switches=plan.switching_times)

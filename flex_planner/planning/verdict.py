@@ -6,11 +6,10 @@ from dataclasses import replace
 
 from flex_planner.collocation import CollocationSolution
 from flex_planner.optimal_control.motion_problem import MotionProblem
-from flex_planner.planning.bending import find_largest_bending, LARGEST
+from flex_planner.planning.bending import find_bending, LARGEST
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.warnings import find_warnings
 from flex_planner.planning.way_limits import find_limit_violations
-import numpy as np
 
 
 def judge(plan: Plan) -> Plan:
@@ -62,15 +61,12 @@ def find_refusal(problem: MotionProblem,
 def _find_bent_link(problem: MotionProblem,
                     solution: CollocationSolution) -> tuple[PlanStatus, str] | None:
     """Refuse a motion whose links bend further than their model holds."""
-    arm = problem.model.arm
-    if not arm.n_passive:
+    if not problem.model.arm.n_passive:
         return None
-    z = np.concatenate([solution.stage_values().reshape(-1, problem.size), solution.nodes])
-    found = find_largest_bending(arm, z[:, :arm.n_coordinates])
+    found, time = find_bending(problem, solution)
     if found.share <= LARGEST:
         return None
-    times = np.concatenate([solution.stage_times().ravel(), solution.mesh])
     return PlanStatus.BENT_TOO_FAR, (
         f'link {found.link + 1} bends by {found.share:.0%} of its length at '
-        f'{times[found.moment]:.4g} s, and beams are linear up to {LARGEST:.0%} at most: a longer '
+        f'{time:.4g} s, and beams are linear up to {LARGEST:.0%} at most: a longer '
         'duration bends it less, and allow_large_bending in the task accepts it')

@@ -18,7 +18,8 @@ from flex_planner.arms.kinematics import link_points
 from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationSolution
 from flex_planner.optimal_control.motion_problem import MotionProblem
-from flex_planner.planning.bending import find_largest_bending, NOTABLE
+from flex_planner.optimal_control.sampled_motion import sample_motion
+from flex_planner.planning.bending import find_bending, NOTABLE
 from flex_planner.planning.certificate import CertificateLimits
 from flex_planner.planning.link_overlaps import find_overlap
 from flex_planner.planning.mode_count import estimate_left_out
@@ -148,6 +149,7 @@ class _Motion:
     """
 
     problem: MotionProblem
+    solution: CollocationSolution
     times: Array
     weights: Array
     coordinates: Array  # (k, n_t)
@@ -157,15 +159,11 @@ class _Motion:
 
     @classmethod
     def of(cls, problem: MotionProblem, solution: CollocationSolution) -> _Motion:
-        rule, n_t = solution.rule, problem.model.arm.n_coordinates
-        theta = np.concatenate([[0.0], rule.nodes, [1.0]])
-        shares = np.concatenate([[0.0], rule.weights, [0.0]])
-        z = solution.values_at(theta).reshape(-1, problem.size)
-        coordinates = z[:, :n_t]
-        return cls(problem=problem, times=solution.times_at(theta).ravel(),
-                   weights=(solution.steps[:, None] * shares).ravel(), coordinates=coordinates,
-                   speeds=z[:, n_t:n_t + problem.model.arm.n_joints],
-                   torques=problem.model.controls(z, problem.p).torque,
+        points, n_t = sample_motion(problem, solution), problem.model.arm.n_coordinates
+        coordinates = points.z[:, :n_t]
+        return cls(problem=problem, solution=solution, times=points.times, weights=points.weights,
+                   coordinates=coordinates, torques=points.controls.torque,
+                   speeds=points.z[:, n_t:n_t + problem.model.arm.n_joints],
                    points=link_points(problem.model.arm, coordinates))
 
     @property
@@ -176,10 +174,9 @@ class _Motion:
 
 def _bending(motion: _Motion) -> PlanWarning | None:
     """Warn of links that bend beyond what a linear beam does."""
-    found = find_largest_bending(motion.problem.model.arm, motion.coordinates)
+    found, time = find_bending(motion.problem, motion.solution)
     if found.share <= NOTABLE:
         return None
-    time = float(motion.times[found.moment])
     return PlanWarning(
         kind=WarningKind.BENDING, value=found.share, time=time, sentence=(
             f'link {found.link + 1} bends by {found.share:.0%} of its length at {time:.4g} s: '

@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from applied_torques import crane_plan
+from factories import PlanFactory
 from flex_planner.arms.arm import Arm
+from flex_planner.collocation import Solver, SolverSettings
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import Plan
@@ -77,3 +79,50 @@ def test_given_start_does_not_change_with_the_payload(plan: Plan, crane_arm: Arm
     heavier = problem.with_changes(payload_mass=2 * task.payload_mass)
     assert np.array_equal(heavier.start, problem.start)
     assert not np.array_equal(heavier.goal, problem.goal)
+
+
+# Starting from the plan of a similar task
+
+
+@pytest.mark.parametrize('payload', [1.0, 5.3, 5.5])
+def test_plan_of_a_similar_task_is_as_good_as_a_first_one(plan_of: PlanFactory,
+                                                          payload: float) -> None:
+    first = plan_of('ei50', payload)
+    task = replace(first.task, payload_mass=1.005 * payload)
+    again, cold = (plan_path(task, start_from=start, search='fast') for start in (first, None))
+    assert again.solved, again.message
+    assert again.strategy == 'warm start'
+    # a tolerance of 1e-4 leaves ten digits of the cost, which is stationary
+    assert again.cost == pytest.approx(cold.cost, rel=1e-10)
+    certificate = again.certificate
+    assert max(certificate.state_error, certificate.costate_error) <= 1e-5
+    assert certificate.tip_error <= 1e-8
+
+
+def test_plan_of_a_similar_task_takes_one_linear_system(plan_of: PlanFactory) -> None:
+    first = plan_of('ei50')
+    again = plan_path(replace(first.task, payload_mass=1.02), start_from=first)
+    assert again.iterations == 1
+    assert np.array_equal(solution_of(again).mesh, solution_of(first).mesh)
+
+
+def test_errors_that_are_said_hold_along_many_plans(plan_of: PlanFactory) -> None:
+    at = plan_of('ei50')
+    for payload in np.linspace(1.0, 2.0, 11)[1:]:
+        at = plan_path(replace(at.task, payload_mass=payload), start_from=at)
+        assert at.solved
+    solution = solution_of(at)
+    exact = solution_of(plan_path(at.task, solver=Solver(SolverSettings(error_tolerance=1e-9)),
+                                  search='fast'))(solution.mesh)
+    error = np.abs(solution.nodes - exact).max(axis=0) / np.abs(exact).max(axis=0)
+    half = error.size // 2
+    assert error[:half].max() <= at.certificate.state_error <= 1e-4
+    assert error[half:].max() <= at.certificate.costate_error <= 1e-4
+
+
+def test_another_duration_starts_from_the_stretched_plan(plan_of: PlanFactory) -> None:
+    first = plan_of('ei50', 5.5)
+    task = replace(first.task, duration=1.01)
+    again, cold = (plan_path(task, start_from=start, search='fast') for start in (first, None))
+    assert (again.solved, again.strategy) == (True, 'warm start')
+    assert again.cost == pytest.approx(cold.cost, rel=1e-10)

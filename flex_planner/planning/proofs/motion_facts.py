@@ -184,9 +184,9 @@ class MotionFacts:
 
         """
         n_t = self.arm.n_coordinates
-        ends = [np.vstack([link_points(self.arm, state[:n_t])[:-1, -1],
-                           payload_position(self.arm, state[:n_t])])
-                for state in (self.problem.start, self.problem.goal)]
+        postures = np.stack([self.problem.start[:n_t], self.problem.goal[:n_t]])
+        ends = link_points(self.arm, postures)[:, :, -1]  # (2, n, 2)
+        ends[:, -1] = payload_position(self.arm, postures)
         apart: Array = np.linalg.norm(ends[1] - ends[0], axis=1)
         return apart
 

@@ -7,6 +7,9 @@ Other than the bounds of `duration_bounds` these are no proofs of the arm as it 
 
 from __future__ import annotations
 
+from functools import lru_cache
+
+from flex_planner.arms.arm import Arm
 from flex_planner.base.errors import InvalidTaskError
 from flex_planner.base.validation import Array
 from flex_planner.optimal_control.arm_model import ArmModel
@@ -70,7 +73,7 @@ def _moves_evenly(problem: MotionProblem, duration: float) -> bool:
     not, this says no.
 
     """
-    task, arm, n = problem.task, problem.task.arm.rigid(), problem.task.arm.n_joints
+    task, n = problem.task, problem.task.arm.n_joints
     if (np.any(task.start_velocities) or np.any(task.goal_velocities)
             or not np.isinf(problem.goal_weights).all()):
         return False
@@ -78,10 +81,16 @@ def _moves_evenly(problem: MotionProblem, duration: float) -> bool:
     positions, speeds, accelerations = path(
         np.linspace(0.0, 1.0, _SAMPLES, dtype=np.float64), duration)
     parameters = problem.parameters.drop_modes()
-    torques = ArmModel.of(arm).inverse_dynamics(np.hstack([positions, speeds]), accelerations,
-                                                parameters.physical)
+    torques = _rigid_model(task.arm).inverse_dynamics(
+        np.hstack([positions, speeds]), accelerations, parameters.physical)
     lower, upper = parameters.torque_limits.bounds(speeds)
     return bool((lower <= torques).all() and (torques <= upper).all())
+
+
+@lru_cache(maxsize=16)
+def _rigid_model(arm: Arm) -> ArmModel:
+    """Return the functions of an arm made rigid; those of the last arms are kept."""
+    return ArmModel.of(arm.rigid())
 
 
 def rigid_bound(problem: MotionProblem) -> float:

@@ -14,6 +14,7 @@ from flex_planner.collocation import (
     CollocationResult,
     CollocationSolution,
     INTERRUPTED,
+    KnownSolution,
     Solver,
     SolverStatus,
 )
@@ -166,3 +167,14 @@ def warm_start(solution: CollocationSolution, name: str = WARM_START) -> Strateg
                                            expected_error=solver.settings.error_tolerance))
 
     return Strategy(name, attempt, quick=True)
+
+
+def restart(known: KnownSolution) -> Strategy:
+    """Return a strategy that starts from what is known of a similar task, see `solve_near`."""
+    def attempt(problem: MotionProblem, solver: Solver) -> Attempt | None:
+        if known.solution.nodes.shape[1] != problem.size:
+            return None
+        factor = problem.task.duration / float(known.solution.mesh[-1])
+        return Attempt(result=solver.solve_near(problem, known.stretched(factor)))
+
+    return Strategy(WARM_START, attempt, quick=True)
