@@ -128,6 +128,7 @@ def test_casadi_is_imported_only_to_derive_and_to_compile() -> None:
         'dynamics.compiled_functions', 'dynamics.dynamics_functions', 'dynamics.joint_power',
         'dynamics.moving_frame', 'dynamics.torque_bounds',
         'optimal_control.direct.programme', 'optimal_control.free_rates',
+        'optimal_control.barrier_conditions',
         'optimal_control.pontryagin',
         'optimal_control.rate_jacobian', 'optimal_control.running_cost',
         'optimal_control.torque_limits'}

@@ -1,11 +1,11 @@
 """
 A primal-dual interior-point method for collocated conditions with inequalities.
 
-Besides z every stage has unknowns y = (free ones, slacks, multipliers) that fulfil algebraic conditions; the
-products of slacks and multipliers are to be mu, which falls to nearly nothing while Newton's
-method runs. A problem eliminates y point by point, so that each iteration solves the linear
-system of the collocation equations alone, with the Jacobian of every stage: multipliers vary by
-decades inside an interval, where the mean Jacobian says nothing.
+Besides z every stage has unknowns y = (free ones, slacks, multipliers) that fulfil algebraic
+conditions; the products of slacks and multipliers are to be mu, which falls to nearly nothing
+while Newton's method runs. A problem eliminates y point by point, so that each iteration solves
+the linear system of the collocation equations alone, with the Jacobian of every stage: multipliers
+vary by decades inside an interval, where the mean Jacobian says nothing.
 
 """
 

@@ -5,10 +5,10 @@ In place of eq. (14) every limit ``c_k(u, q') >= 0`` has a slack s and a multipl
 
     c_k(u, q') - s_k = 0        s_k l_k = mu        R u + y - sum_k l_k dc_k/du = 0
 
-with ``y = B^T M^-1 psi_2``, which for mu -> 0 are the conditions of eqs. (14) and (15), and for any mu
-those of the least of J - mu integral of sum_k ln c_k. A linearisation of the three gives (u, s, l) in terms of
-z, so a Newton step sees only ``z' = F + J dz``: the unknowns besides z are eliminated point by
-point, and found again from the step. What is condensed so is symmetric as J itself is.
+with ``y = B^T M^-1 psi_2``. For mu -> 0 these are eqs. (14) and (15) of Korayem et al. 2009, and
+for any mu they belong to the least of J less mu times the integral of sum_k ln c_k. Linearised
+they give (u, s, l) in terms of z, so that a Newton step sees only ``z' = F + J dz``: the unknowns
+besides z are eliminated point by point, and found again from the step.
 
 """
 
@@ -108,9 +108,9 @@ class _Point:
         u = forced - of_virtual / limits.curvature - limits.torque_by_speed * of_speeds
         s = [c - s + by_u * u + by_v * of_speeds for c, s, by_u, by_v in zip(
             self.margins, self.slacks, self.by_torque, self.by_speed, strict=True)]
-        multiplied = [self.mu / old - l - ratio * step for old, l, ratio, step in zip(
+        multipliers = [self.mu / slack - old - ratio * step for slack, old, ratio, step in zip(
             self.slacks, self.multipliers, ratios, s, strict=True)]
-        return u, s, multiplied
+        return u, s, multipliers
 
     def condense(self, rate: Any) -> Any:
         """Return a rate with what the step of (u, s, l) adds to it while z stays."""
@@ -171,7 +171,8 @@ class _Limits:
     @property
     def ratios(self) -> list[Any]:
         """Return l / s of each limit."""
-        return [l / s for l, s in zip(self.multipliers, self.slacks, strict=True)]
+        return [multiplier / slack for multiplier, slack in zip(
+            self.multipliers, self.slacks, strict=True)]
 
     @property
     def curvature(self) -> Any:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationSolution
-from flex_planner.collocation.problem import Indices
 from flex_planner.optimal_control.free_payload import FreePayloadProblem
 from flex_planner.optimal_control.motion_problem import MotionProblem
 import numpy as np
@@ -94,8 +93,8 @@ class MotionBarrier:
     def _centre(self, z: Array, mu: float) -> Array:
         n_t, n = self.motion.model.arm.n_coordinates, self.motion.model.arm.n_joints
         limits, speeds = self.motion.parameters.torque_limits, z[:, n_t:n_t + n]
-        lower, upper = limits.bounds(speeds)
-        middle, half = np.nan_to_num((lower + upper) / 2), _INSIDE * (upper - lower) / 2
+        lower, upper = (np.clip(each, -_ENDLESS, _ENDLESS) for each in limits.bounds(speeds))
+        middle, half = (lower + upper) / 2, _INSIDE * (upper - lower) / 2
         free = self.motion.model.controls(z, self.motion.p).free_torque
         torque = middle + np.clip(free - middle, -half, half)
         margins = limits.margins(torque, speeds)

@@ -1,9 +1,9 @@
 """
 The largest payload in one run of the interior-point method, at a price that is nearly endless.
 
-With the motors' limits as a barrier the payload that is worth its price comes to the limit while mu falls; no
-switch is placed and no price is walked. The motion is then solved as it is, within the limits, at
-the lower price that leaves the gap that is wanted.
+With the motors' limits as a barrier the payload that is worth its price comes to the limit while
+mu falls; no switch is placed and no price is walked. The motion is then solved as it is, within
+the limits, at the lower price that leaves the gap that is wanted.
 
 """
 
