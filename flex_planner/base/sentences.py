@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 
 def say_reason(status: str, reason: str) -> str:
     """
@@ -25,6 +27,13 @@ def say_os_error(error: OSError) -> str:
     """Return what the system says, and of which file, without numbers."""
     files = [str(name) for name in (error.filename, error.filename2) if name is not None]
     return ': '.join([*files, error.strerror or str(error)])
+
+
+def join_words(words: Sequence[str], last: str) -> str:
+    """Return words in a row, with a word such as ``or`` before the last."""
+    if len(words) < 2:
+        return ''.join(words)
+    return f'{", ".join(words[:-1])} {last} {words[-1]}'
 
 
 def count_of(count: int, singular: str) -> str:

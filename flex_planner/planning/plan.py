@@ -28,6 +28,7 @@ from flex_planner.planning.objectives import (
     ObjectiveSearch,
     WeightTrial,
 )
+from flex_planner.planning.strategies.try_strategies import TriedStrategy
 from flex_planner.planning.warnings import PlanWarning, WarningKind
 import numpy as np
 from numpy.typing import ArrayLike
@@ -130,6 +131,8 @@ class Plan:
         How objectives were met; None if there are none.
     iterations : int
         Newton iterations, failed strategies included.
+    tried : tuple of TriedStrategy
+        What was tried, in this order, and how long it took.
     planning_time : float
         [s].
 
@@ -152,6 +155,7 @@ class Plan:
     warnings: tuple[PlanWarning, ...] = ()
     objectives: ObjectiveSearch | None = None
     iterations: int = 0
+    tried: tuple[TriedStrategy, ...] = ()
     planning_time: float = 0.0
 
     @property
@@ -267,7 +271,7 @@ class Plan:
 _SAVED = (Plan, PlanStatus, Certificate, Task, Arm, Link, BeamSection, Joint, Elasticity, Motor,
           Node, ArmModel, MotionProblem, BoundaryConditions, Parameters, CollocationSolution,
           GaussRule, ObjectiveSearch, Objectives, Objective, WeightTrial, Margin, KindOfMotion,
-          ExploredMotion, PlanWarning, WarningKind)
+          ExploredMotion, PlanWarning, WarningKind, TriedStrategy)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-import math
 
-from flex_planner.base.progress import LimitedMonitor, StoppedError, StopReason
+from flex_planner.base.progress import StoppedError, StopReason
 from flex_planner.collocation import CollocationResult, Solver, SolverStatus
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import MAX_DURATION
 from flex_planner.optimal_control.totals import integrate_totals
+from flex_planner.planning.advice import suggest_changes
 from flex_planner.planning.certificate import CertificateLimits, certify
 from flex_planner.planning.kinds.cheaper import find_cheaper
 from flex_planner.planning.kinds.clusters import are_alike, MOST_KINDS
@@ -20,6 +20,7 @@ from flex_planner.planning.strategies.catalogue import CATALOGUE
 from flex_planner.planning.strategies.initial_guesses import WARM_START
 from flex_planner.planning.strategies.price_continuation import free_duration
 from flex_planner.planning.strategies.strategy import Attempt, Strategy
+from flex_planner.planning.strategies.try_strategies import TriedStrategy, try_strategies
 from flex_planner.planning.verdict import judge
 from flex_planner.planning.warnings import find_arm_warnings
 
@@ -30,9 +31,6 @@ STOP_STATUS = {StopReason.TIMEOUT: PlanStatus.TIMEOUT, StopReason.CANCELED: Plan
 _REFINEMENTS = 2
 _REFINEMENT_FACTOR = 10.0
 _STRICTER = 100.0
-# what a strategy is given in turn: iterations times intervals, a second or so of two links with a
-# mode each
-_SHARES = (1e4, 4e4, 1.6e5, math.inf)
 # longer guesses of a free duration
 _GUESSES = (2.0, 4.0, 8.0)
 
@@ -58,11 +56,12 @@ def plan_problem(problem: MotionProblem, solver: Solver,
         Whether cheaper kinds of motion are looked for.
 
     """
+    tried: list[TriedStrategy] = []
     try:
         if problem.task.time_weight:
-            problem, strategy, attempt = _solve_in_any_time(problem, solver, strategies)
+            problem, strategy, attempt = _solve_in_any_time(problem, solver, strategies, tried)
         else:
-            strategy, attempt = _solve_first(problem, solver, strategies)
+            strategy, attempt = try_strategies(problem, solver, strategies, tried)
         plan = _conclude(problem, strategy, attempt, solver)
         if (effort.explores and strategy != WARM_START and plan.solution is not None
                 and plan.status not in STOP_STATUS.values()
@@ -74,7 +73,7 @@ def plan_problem(problem: MotionProblem, solver: Solver,
     # where there is no motion to judge, the arm may say why
     warnings = plan.warnings or find_arm_warnings(problem.task.arm)
     return replace(plan, warnings=warnings, iterations=solver.monitor.iteration,
-                   planning_time=solver.monitor.elapsed)
+                   tried=tuple(tried), planning_time=solver.monitor.elapsed)
 
 
 def _look_for_cheaper(plan: Plan, attempt: Attempt, solver: Solver,
@@ -107,22 +106,22 @@ def _conclude_in_time(problem: MotionProblem, strategy: str, attempt: Attempt,
 
 
 def _solve_in_any_time(problem: MotionProblem, solver: Solver, strategies: Sequence[Strategy],
-                       ) -> tuple[MotionProblem, str, Attempt]:
+                       tried: list[TriedStrategy]) -> tuple[MotionProblem, str, Attempt]:
     """Solve for the duration of the task or a longer one, then free it."""
     useful = [_without_verdict(strategy) for strategy in strategies]
     quick = [strategy for strategy in useful if strategy.quick] or useful
     slow = [strategy for strategy in useful if strategy not in quick]
-    strategy, attempt = _solve_first(problem, solver, quick)
+    strategy, attempt = try_strategies(problem, solver, quick, tried)
     for factor in _GUESSES:
         longer = factor * problem.task.duration
         if attempt.result.status is not SolverStatus.NEWTON_FAILED or longer > MAX_DURATION:
             break
         stretched = problem.with_changes(duration=longer)
-        strategy, attempt = _solve_first(stretched, solver, quick)
+        strategy, attempt = try_strategies(stretched, solver, quick, tried)
         problem = stretched if attempt.result.converged else problem
     if attempt.result.status is SolverStatus.NEWTON_FAILED and slow:
         names, failure = strategy, attempt.result.message
-        strategy, attempt = _solve_first(problem, solver, slow)
+        strategy, attempt = try_strategies(problem, solver, slow, tried)
         if not attempt.decides:
             strategy = f'{names}, {strategy}'
             attempt = replace(attempt, result=replace(
@@ -152,46 +151,9 @@ def _conclude(problem: MotionProblem, strategy: str, attempt: Attempt, solver: S
                 kinds=attempt.kinds[:MOST_KINDS], starts=attempt.starts)
     if result.status in INTERRUPTED_STATUS:
         return replace(plan, status=INTERRUPTED_STATUS[result.status])
-    return _certify(plan, result, solver) if result.converged else plan
-
-
-def _solve_first(problem: MotionProblem, solver: Solver,
-                 strategies: Sequence[Strategy]) -> tuple[str, Attempt]:
-    """
-    Try the strategies in order; report the first that decides it, or all failures.
-
-    First each has a share of the work, in which most motions are found that it finds at all; those
-    that have used it up are tried again with more.
-
-    """
-    failures: dict[str, str] = {}
-    last, not_found = Attempt(result=_unsolved(problem, solver)), False
-    for share in _SHARES:
-        cut_off = []
-        for strategy in strategies:
-            solver.monitor.phase = strategy.name
-            limited = _rationed(solver, share / strategy.cost) if strategy.cost else solver
-            attempt = strategy.attempt(problem, limited)
-            if attempt is None:
-                continue
-            exhausted = limited.monitor.exhausted and not attempt.result.converged
-            if exhausted:
-                cut_off.append(strategy)
-                attempt = replace(attempt, hopeless=False, not_found=False)
-            last = attempt
-            if attempt.decides:
-                return strategy.name, attempt
-            failures[strategy.name] = attempt.result.message
-            not_found = not_found or attempt.not_found
-        strategies = cut_off
-    message = '; '.join(f'{name}: {why}' for name, why in failures.items())
-    return ', '.join(failures), Attempt(
-        result=replace(last.result, message=message or last.result.message), not_found=not_found)
-
-
-def _rationed(solver: Solver, share: float) -> Solver:
-    """Return the solver with a share of the work."""
-    return solver.watched_by(LimitedMonitor.of(solver.monitor, share))
+    if result.converged:
+        return _certify(plan, result, solver)
+    return replace(plan, message=f'{plan.message}; {suggest_changes(problem)}')
 
 
 def _certify(plan: Plan, result: CollocationResult, solver: Solver) -> Plan:
@@ -233,10 +195,3 @@ def describe_choice(plan: Plan) -> str:
     rigid = ', if the arm were rigid,' if plan.arm.n_passive else ''
     return (f'{PlanStatus.SOLVED.value}; the cheapest of {len(plan.kinds)} kinds of motion found '
             f'from {plan.starts} starts (J = {plan.cost:.4g}; of the others{rigid} {others})')
-
-
-def _unsolved(problem: MotionProblem, solver: Solver) -> CollocationResult:
-    """Return the result where no strategy had anything to add."""
-    return CollocationResult.failed(
-        problem.straight_line(solver.settings.intervals, solver.settings.rule),
-        'no strategy applies to this motion')

@@ -66,8 +66,19 @@ def plan_rows(plan: Plan) -> list[Row]:
     rows = [('status', plan.status.value),
             planning_row(plan.planning_time, plan.strategy, f'{plan.iterations} iterations',
                          intervals)]
+    rows += tried_rows(plan)
     rows += kind_rows(plan.kinds, plan.starts, 'J = ', '')
     return [*rows, *objective_rows(plan), *warning_rows(plan.warnings)]
+
+
+def tried_rows(plan: Plan) -> list[Row]:
+    """Return what was tried before, and for how long; empty if the first strategy did it."""
+    seconds: dict[str, float] = {}
+    for one in plan.tried:
+        seconds[one.name] = seconds.get(one.name, 0.0) + one.seconds
+    if len(seconds) < 2:
+        return []
+    return [('tried', ', '.join(f'{name} took {time:.2f} s' for name, time in seconds.items()))]
 
 
 def motion_rows(plan: Plan, peaks: Peaks) -> list[Row]:
