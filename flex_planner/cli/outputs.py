@@ -127,8 +127,8 @@ class Outputs:
 def add_outputs(parser: argparse.ArgumentParser) -> None:
     """Add the options for what is written."""
     add_folder(parser)
-    parser.add_argument('--no-plot', action='store_true', help='draw nothing')
-    parser.add_argument('--no-recording', action='store_true', help='record nothing')
+    parser.add_argument('--no-plot', action='store_true', help='draw no pictures')
+    parser.add_argument('--no-recording', action='store_true', help='write no recording')
 
 
 def check_folder(folder: Path) -> None:

@@ -109,7 +109,7 @@ def _draw_trials(axes: Sequence[Axes], found: MaxPayload) -> None:
         each.xaxis.set_major_locator(MaxNLocator(_FEW, integer=True, min_n_ticks=1))
         each.set_xlim(0.5, payloads.size + 0.5)
     finish(axes[0], 'payloads tried', 'payload [kg]', 'trial')
-    finish(axes[1], 'error at the goal under their torques', 'boundary error, eq. (17)', 'trial',
+    finish(axes[1], 'error at the goal under their torques', 'boundary error', 'trial',
            legend='upper left', columns=2)
 
 

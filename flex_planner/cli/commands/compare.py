@@ -56,7 +56,7 @@ def add_command(commands: Commands) -> None:
     add('--settling', type=number_argument, default=1.0, metavar='S',
         help='time to watch the arm after its arrival (default: %(default)g)')
     add_folder(parser)
-    add('--no-plot', action='store_true', help='draw nothing')
+    add('--no-plot', action='store_true', help='draw no pictures')
     parser.set_defaults(run=_compare)
 
 

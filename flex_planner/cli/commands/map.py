@@ -44,7 +44,7 @@ def add_command(commands: Commands) -> None:
         help='compute on the Dask cluster with this scheduler, such as tcp://host:8786')
     add('--draw', action='store_true', help='draw the stored cells, compute nothing')
     add('--reset', action='store_true', help='remove the existing map, and start anew')
-    add('--no-plot', action='store_true', help='draw nothing')
+    add('--no-plot', action='store_true', help='draw no pictures')
     parser.set_defaults(run=_map)
 
 
