@@ -133,7 +133,7 @@ class DemoClient(Node):  # type: ignore[misc]
             tip=np.array([(tip.point.x, tip.point.y) for tip in tips]))
 
 
-def motion_from_message(trajectory: FlexibleTrajectory) -> Motion:
+def motion_from_message(trajectory: FlexibleTrajectory, arm: Arm) -> Motion:
     """Return a trajectory message as arrays."""
     joints, bending = trajectory.joint_trajectory.points, trajectory.points
 
@@ -142,7 +142,7 @@ def motion_from_message(trajectory: FlexibleTrajectory) -> Motion:
 
     times = [duration_seconds(point.time_from_start) for point in joints]
     return Motion(
-        times=np.array(times),
+        arm=arm, times=np.array(times), joint_names=trajectory.joint_trajectory.joint_names,
         coordinates=np.hstack([rows(joints, 'positions'), rows(bending, 'modal_displacements')]),
         rates=np.hstack([rows(joints, 'velocities'), rows(bending, 'modal_rates')]),
         torques=rows(joints, 'effort'),
@@ -194,10 +194,9 @@ def run(folder: Path) -> str:
             client.destroy_node()
 
     def draw(path: Path) -> None:
-        from flex_planner.plotting import draw_motion
+        from flex_planner.plotting import draw_motion, save
 
-        draw_motion(path, arm, list(response.trajectory.joint_trajectory.joint_names),
-                    motion_from_message(response.trajectory), execution)
+        save(draw_motion(motion_from_message(response.trajectory, arm), execution), path)
 
     with SIGNALS.patient():
         files = [*drawn('picture', folder / 'motion.png', draw),

@@ -23,9 +23,6 @@ from flex_planner.reports.motion import Row
 
 if TYPE_CHECKING:
     from flex_planner.cli.recorder import RequestRecorder
-    from flex_planner.plotting import Motion
-
-_DRAWN_SAMPLES = 2001
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,10 +100,9 @@ class Outputs:
         solved = found.plan if found.plan is not None and found.plan.solved else None
 
         def draw(path: Path) -> None:
-            from flex_planner.plotting import draw_max_payload
+            from flex_planner.plotting import draw_max_payload, save
 
-            draw_max_payload(path, found, _joint_names(found.task.arm.n_joints),
-                             _fine_motion(solved) if solved else None)
+            save(draw_max_payload(found), path)
 
         if solved or found.front.payloads.size or found.trials:
             yield from drawn('picture of the search', self.folder / f'{self.stem}_max_payload.png',
@@ -117,9 +113,9 @@ class Outputs:
     def _draw_motion(self, plan: Plan, name: str) -> Iterator[Row]:
         """Draw the motion of a plan."""
         def draw(path: Path) -> None:
-            from flex_planner.plotting import draw_motion
+            from flex_planner.plotting import draw_motion, save
 
-            draw_motion(path, plan.arm, _joint_names(plan.arm.n_joints), _fine_motion(plan))
+            save(draw_motion(plan), path)
 
         yield from drawn('picture of the motion', self.folder / f'{self.stem}_{name}.png', draw)
 
@@ -155,12 +151,3 @@ def _recorder(request: Request, folder: Path) -> RequestRecorder | None:
         return None
 
 
-def _joint_names(count: int) -> list[str]:
-    return [f'joint{i}' for i in range(1, count + 1)]
-
-
-def _fine_motion(plan: Plan) -> Motion:
-    """Return a solved plan as arrays, finer than a controller needs it."""
-    from flex_planner.plotting import Motion
-
-    return Motion.of(plan.uniform_samples(_DRAWN_SAMPLES))

@@ -80,9 +80,9 @@ def _run(parser: argparse.ArgumentParser, options: argparse.Namespace) -> int:
         return 0
 
     def draw(path: Path) -> None:
-        from flex_planner.plotting import draw_arm
+        from flex_planner.plotting import draw_arm, save
 
-        draw_arm(path, model, postures, payload)
+        save(draw_arm(model, postures, payload), path)
 
     print()
     path = options.plot or options.output / f'{file_stem(options.arm)}_arm.png'

@@ -70,10 +70,10 @@ def _place(options: argparse.Namespace) -> Path:
 
 def _draw(path: Path) -> int:
     """Draw a map in a folder beside its store."""
-    from flex_planner.maps.draw_map import draw_map
+    from flex_planner.maps.draw_map import save_map
 
     with SIGNALS.patient():
-        pictures = draw_map(path, path.with_suffix(''))
+        pictures = save_map(path, path.with_suffix(''))
     print(table([('picture', str(picture)) for picture in pictures]))
     return 0
 
@@ -103,9 +103,9 @@ def _pictures(path: Path) -> Iterator[Row]:
     pictures: list[Path] = []
 
     def draw(folder: Path) -> None:
-        from flex_planner.maps.draw_map import draw_map
+        from flex_planner.maps.draw_map import save_map
 
-        pictures.extend(draw_map(path, folder))
+        pictures.extend(save_map(path, folder))
 
     for _ in drawn('pictures', path.with_suffix(''), draw):
         yield from (('picture', str(picture)) for picture in pictures)
