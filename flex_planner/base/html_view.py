@@ -25,7 +25,7 @@ def html_view(rows: Iterable[tuple[str, str]], picture: str = '') -> str:
     lines = ''.join(f'<tr><th style="{_CELL}; font-weight: normal; opacity: 0.7">{_shown(name)}'
                     f'</th><td style="{_CELL}">{_shown(value)}</td></tr>' for name, value in rows)
     return ('<div style="display: flex; flex-wrap: wrap; gap: 16px; align-items: flex-start">'
-            f'<table>{lines}</table>{picture}</div>')
+            f'<table style="flex: 1 1 280px; max-width: 560px">{lines}</table>{picture}</div>')
 
 
 def _shown(text: str) -> str:
