@@ -393,7 +393,8 @@ def build_package(package: str) -> None:
     run(
         [f'{VENV}/bin/colcon', '--log-base', 'log', 'build',
          '--base-paths', '.', 'flex_planner_interfaces', '--packages-select', package,
-         '--event-handlers', 'console_direct+', 'console_stderr-', 'desktop_notification-', 'status-',
+         '--event-handlers', 'console_direct+', 'console_stderr-', 'desktop_notification-',
+         'status-',
          '--cmake-args', f'-DPython3_EXECUTABLE={VENV}/bin/python', '-DBUILD_TESTING=OFF',
          '-DWITHOUT_CPP=ON'],
         f'The package {package} could not be built.', BuildProgress(f'building {package}'),
