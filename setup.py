@@ -1,4 +1,5 @@
 from glob import glob
+from pathlib import Path
 
 from setuptools import find_packages, setup
 
@@ -8,12 +9,19 @@ DATA_FOLDERS = {'flex_planner.config': 'config',
 
 setup(
     name=package_name,
-    version='0.1.0',
+    version='0.2.0',
     description='Trajectory planning for flexible-link manipulators',
+    long_description=Path(__file__).with_name('README.md').read_text(encoding='utf-8'),
+    long_description_content_type='text/markdown',
     maintainer='The flex_planner maintainers',
     maintainer_email='maintainers@flexplanner.example',
     license='Apache-2.0',
     python_requires='>=3.10',
+    classifiers=[
+        'Development Status :: 4 - Beta', 'Intended Audience :: Science/Research',
+        'License :: OSI Approved :: Apache Software License', 'Operating System :: POSIX',
+        'Programming Language :: Python :: 3', 'Topic :: Scientific/Engineering',
+        'Typing :: Typed'],
     # what is read without ROS lies inside the package, too: not every installation has a share
     packages=[*find_packages(include=['flex_planner', 'flex_planner.*']), *DATA_FOLDERS],
     package_dir=DATA_FOLDERS,
