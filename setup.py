@@ -53,6 +53,8 @@ setup(
     # for flex-planner map
     extras_require={'maps': ['dask>=2024.1', 'distributed>=2024.1', 'numcodecs>=0.12',
                              'xarray>=2024.10', 'zarr>=2.18,!=3.0.*'],
+                    # for progress bars
+                    'notebooks': ['tqdm>=4.60'],
                     'test': ['autograd', 'hypothesis', 'mcap-ros2-support', 'mpmath', 'pytest',
                              'pytest-timeout']},
     zip_safe=False,
