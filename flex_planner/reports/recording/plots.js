@@ -3,6 +3,7 @@
 'use strict';
 
 const WIDE = 1.5; // of the height of lines, that bounds may add on either side
+const DECADES = 4; // of a logarithmic axis: what is smaller is rounding, or nothing to see
 const BAND = 'rgba(60, 60, 60, 0.22)';
 const MARGIN = { left: 74, right: 14, top: 10, bottom: 42 };
 
@@ -177,6 +178,7 @@ class Plot {
   // What is shown for points there: somewhat more, and no less than is worth a look.
   spread(found) {
     if (found[0] > found[1]) return [0, 1, 0, 1];
+    if (this.spec.log) found[2] = Math.max(found[2], found[3] - DECADES);
     if (this.zoom) [found[0], found[1]] = this.zoom;
     const dotted = !this.zoom && this.series.some((entry) => entry.dots);
     for (const k of [0, 2]) {
