@@ -149,5 +149,3 @@ def _recorder(request: Request, folder: Path) -> RequestRecorder | None:
     except RecordingError as error:
         print(f'flex-planner: no recording is written: {error}', file=sys.stderr)
         return None
-
-
