@@ -69,8 +69,8 @@ def _draw_distance(axes: Axes, comparison: Comparison) -> None:
                       **_style(result))
     if not comparison.results:
         say(axes, 'neither plan was solved')
-    axes.set(title='distance of the tip from the goal', xlabel='time after arrival [s]',
-             ylabel='distance [mm]')
+    axes.set(title=f'distance of the tip from the goal (below {_FLOOR:g} mm drawn there)',
+             xlabel='time after arrival [s]', ylabel='distance [mm]')
     axes.grid(alpha=0.3)
 
 
