@@ -1,5 +1,5 @@
 .DEFAULT_GOAL := help
-.PHONY: help setup demo paper test test-thorough lint bench clean
+.PHONY: help setup demo demo-library paper test test-thorough lint bench clean
 
 # The interpreter for .venv; a finished .venv stays as it is unless PYTHON is given.
 ifeq ($(origin PYTHON),undefined)
@@ -11,6 +11,7 @@ CODE := bench examples flex_planner launch test tools setup.py
 
 help:
 	@echo 'make demo     plan motions of a flexible arm through a ROS 2 node; results in output/'
+	@echo 'make demo-library   plan and draw the same motion with the library alone, without ROS 2'
 	@echo 'make paper    recompute Korayem et al. 2009 and write docs/paper.md (1 to 3 minutes)'
 	@echo 'make test     check the style, run all unit tests and a node test of each kind (4 minutes)'
 	@echo 'make test-thorough   run the other tests: long plans, every node test, every example'
@@ -27,6 +28,11 @@ setup:
 
 demo: setup
 	@tools/run python -m flex_planner.cli.demo
+
+demo-library:
+	@$(PYTHON) tools/setup_environment.py --library $(SETUP_FLAGS)
+	@PYTHONPATH= .venv-library/bin/python -m flex_planner.cli plan korayem_ei50 --from 0.5,0 --to 0.5,0.5 \
+		--duration 1 --payload 1 --effort-weights 0.125,0.125 --search fast
 
 paper: setup
 	@tools/run flex-planner paper --output docs
@@ -57,5 +63,5 @@ bench: setup
 	tools/run python -m bench
 
 clean:
-	rm -rf .venv build install log output .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-library build install log output .mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

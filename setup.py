@@ -1,4 +1,5 @@
 from glob import glob
+from pathlib import Path
 
 from setuptools import find_packages, setup
 
@@ -8,12 +9,19 @@ DATA_FOLDERS = {'flex_planner.config': 'config',
 
 setup(
     name=package_name,
-    version='0.1.0',
+    version='0.2.0',
     description='Trajectory planning for flexible-link manipulators',
+    long_description=Path(__file__).with_name('README.md').read_text(encoding='utf-8'),
+    long_description_content_type='text/markdown',
     maintainer='The flex_planner maintainers',
     maintainer_email='maintainers@flexplanner.example',
     license='Apache-2.0',
     python_requires='>=3.10',
+    classifiers=[
+        'Development Status :: 4 - Beta', 'Intended Audience :: Science/Research',
+        'License :: OSI Approved :: Apache Software License', 'Operating System :: POSIX',
+        'Programming Language :: Python :: 3', 'Topic :: Scientific/Engineering',
+        'Typing :: Typed'],
     # what is read without ROS lies inside the package, too: not every installation has a share
     packages=[*find_packages(include=['flex_planner', 'flex_planner.*']), *DATA_FOLDERS],
     package_dir=DATA_FOLDERS,
@@ -23,7 +31,7 @@ setup(
                   'flex_planner.config': ['arm_template.yaml', 'arms/*.yaml', 'studies/*.yaml'],
                   'flex_planner.recording.flex_planner_interfaces': [
                       'msg/*.msg', 'srv/*.srv', 'action/*.action'],
-                  'flex_planner.reports.recording': ['page.html', 'plots.js']},
+                  'flex_planner.reports.recording': ['arm.js', 'page.html', 'plots.js']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),
@@ -45,6 +53,8 @@ setup(
     # for flex-planner map
     extras_require={'maps': ['dask>=2024.1', 'distributed>=2024.1', 'numcodecs>=0.12',
                              'xarray>=2024.10', 'zarr>=2.18,!=3.0.*'],
+                    # for progress bars
+                    'notebooks': ['tqdm>=4.60'],
                     'test': ['autograd', 'hypothesis', 'mcap-ros2-support', 'mpmath', 'pytest',
                              'pytest-timeout']},
     zip_safe=False,

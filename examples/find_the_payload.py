@@ -17,7 +17,7 @@ import sys
 
 from flex_planner import find_max_payload, load_arm, plan_path, Task
 from flex_planner.optimal_control.free_payload import payload_price
-from flex_planner.plotting import draw_max_payload, Motion
+from flex_planner.plotting import draw_max_payload, Motion, save
 
 PICTURE = Path('output') / 'find_the_payload.png'
 
@@ -47,8 +47,7 @@ def main() -> None:
     for row in zip(front.payloads, front.efforts, front.prices, strict=True):
         print('{:10.4f} {:9.4f} {:9.3f}'.format(*row))
 
-    draw_max_payload(PICTURE, found, ['shoulder', 'elbow'],
-                     Motion.of(found.plan.uniform_samples(1001)))
+    save(draw_max_payload(found, Motion.of(found.plan, ['shoulder', 'elbow'])), PICTURE)
     print(f'picture: {PICTURE}')
 
 

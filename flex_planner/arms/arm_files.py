@@ -14,6 +14,7 @@ from flex_planner.arms.arm import Arm, BeamSection, Elasticity, Joint, Link, Mot
 from flex_planner.arms.arm_fields import read_joint, read_link, read_node, read_payload
 from flex_planner.base.errors import FlexPlannerError, InvalidValueError
 from flex_planner.base.paths import expand_path, PathError, STANDARD_INPUT
+from flex_planner.base.suggestions import did_you_mean
 from flex_planner.base.text_files import say_file
 from flex_planner.base.yaml_files import read_yaml, YamlFileError, YamlSection
 
@@ -80,8 +81,9 @@ def _exists(path: Path) -> bool:
 
 
 def _no_arm(name: str, presets: Iterable[str]) -> NoReturn:
+    names = sorted(presets)
     raise ArmFileError(f'arm {name!r} is neither a file nor one of the presets '
-                       f'{sorted(presets)}')
+                       f'{", ".join(names)}{did_you_mean(name, names)}')
 
 
 def preset_files() -> dict[str, Path]:

@@ -11,6 +11,7 @@ from flex_planner.arms.beam_eigenmodes import MAX_LOAD_RATIO, TipLoad
 from flex_planner.arms.mode_shapes import FAMILIES, LinkModes, mode_shapes
 from flex_planner.arms.quantities import check_quantity
 from flex_planner.base.errors import InvalidValueError
+from flex_planner.base.suggestions import one_of
 from flex_planner.base.validation import Array, integer, number
 import numpy as np
 
@@ -111,7 +112,8 @@ class Link:
         check_quantity('flexural_rigidity', self.flexural_rigidity, 'flexural_rigidity', above=0,
                        infinite=self.modes == 0, note=' (needed for a link with modes)')
         if self.mode_family not in list(FAMILIES):
-            raise InvalidValueError('mode_family', self.mode_family, f'one of {list(FAMILIES)}')
+            raise InvalidValueError('mode_family', self.mode_family,
+                                    one_of(self.mode_family, FAMILIES))
         self._check_load()
         self._check_damping()
         self._check_sections()

@@ -136,7 +136,8 @@ def _one_of(section: YamlSection, conversions: Mapping[str, Callable[[float], fl
     given = [name for name in conversions if section.has(name)]
     if len(given) != 1:
         raise InvalidValueError(section.name(' or '.join(conversions)),
-                                ' and '.join(given) or None, 'given, exactly one of them')
+                                ' and '.join(given) or None, 'given, exactly one of them'
+                                f'{"" if given else section.misspelt(*conversions)}')
     result = conversions[given[0]](read_quantity(section, given[0]))
     if math.isnan(result):
         needs = 'section' if given[0] == 'density' else 'section or second_moment_of_area'

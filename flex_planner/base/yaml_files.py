@@ -14,9 +14,14 @@ from pathlib import Path
 from typing import Any
 
 from flex_planner.base.errors import FlexPlannerError, InvalidValueError
+from flex_planner.base.suggestions import did_you_mean, nearest_name
+from flex_planner.base.text import printable
 from flex_planner.base.text_files import read_text, say_file, TextFileError
 from flex_planner.base.validation import number
 from flex_planner.base.yaml_text import parse_yaml, YamlTextError
+
+# of names, for one in a file to be meant by one that is missing: other fields are alike, too
+_ALIKE = 0.8
 
 
 class YamlFileError(FlexPlannerError):
@@ -65,6 +70,7 @@ class YamlSection:
             raise InvalidValueError(path or 'the file', content, 'a mapping of fields')
         self.path = path
         self._left: dict[Any, Any] = dict(content)
+        self._fields: set[str] = set()  # that somebody asked for
 
     def name(self, key: str) -> str:
         """Return the path of a field."""
@@ -72,6 +78,7 @@ class YamlSection:
 
     def has(self, key: str) -> bool:
         """Return whether a field is given and not read yet."""
+        self._fields.add(key)
         return key in self._left
 
     def left(self) -> list[Any]:
@@ -80,8 +87,9 @@ class YamlSection:
 
     def take(self, key: str, default: Any = None) -> Any:
         """Return a field; without a default it must be there."""
+        self._fields.add(key)
         if key not in self._left and default is None:
-            raise InvalidValueError(self.name(key), None, 'given')
+            raise InvalidValueError(self.name(key), None, f'given{self.misspelt(key)}')
         return self._left.pop(key, default)
 
     def number(self, key: str, default: float | None = None, *, above: float = -math.inf,
@@ -99,6 +107,7 @@ class YamlSection:
 
     def flag(self, key: str, default: bool) -> bool:
         """Return a field that is true or false."""
+        self._fields.add(key)
         value = self._left.pop(key, default)
         if not isinstance(value, bool):
             raise InvalidValueError(self.name(key), value, 'true or false')
@@ -119,7 +128,14 @@ class YamlSection:
         """Refuse fields that nobody read."""
         for key in self._left:
             raise InvalidValueError(self.name(str(key)), self._left[key],
-                                    'left out: there is no such field')
+                                    'left out: there is no such field'
+                                    f'{did_you_mean(key, self._fields)}')
+
+    def misspelt(self, *keys: str) -> str:
+        """Return, in words, the unread key that a missing field may stand under, or nothing."""
+        left = [one for one in self._left if isinstance(one, str)]
+        found = [near for key in keys if (near := nearest_name(key, left, _ALIKE))]
+        return f'; or is that what {printable(found[0])} is meant to be?' if found else ''
 
     def build(self, kind: Any, **values: Any) -> Any:
         """Construct a part; its errors name the field by its path."""

@@ -118,7 +118,7 @@ def _carry_the_most(problem: MotionProblem, solver: Solver) -> MaxPayload | None
     return MaxPayload(
         task=problem.task, method=PayloadMethod.DIRECT, status=plan.status, plan=plan,
         payload=MAX_PAYLOAD, limiting_joint=int(plan.saturation.argmax()), message=(
-            f'{MAX_PAYLOAD:g} kg can be carried, certified: a task may have no more, and the '
+            f'{MAX_PAYLOAD:g} kg can be carried, certified: a task may ask for no more, and the '
             'motors are not the limit'))
 
 

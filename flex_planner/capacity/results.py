@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import Enum
 
+from flex_planner.base.html_view import html_view
 from flex_planner.base.validation import Array
 from flex_planner.capacity.bracket import restart_point
 from flex_planner.capacity.incremental import PayloadTrial
@@ -98,6 +99,17 @@ class LimitResult:
         """Return the warnings of the plan, or of the arm alone where there is none."""
         return find_arm_warnings(self.task.arm) if self.plan is None else self.plan.warnings
 
+    def _repr_html_(self) -> str:
+        """Return the result as notebooks show it, with the motion at the limit."""
+        rows = [('arm', self.task.arm.name), ('status', self.status.value), *self.limit_rows(),
+                ('', self.message), ('searched in', f'{self.planning_time:.2f} s'),
+                *(('warning', warning.sentence) for warning in self.warnings)]
+        return html_view(rows, self.plan.svg() if self.plan is not None else '')
+
+    def limit_rows(self) -> list[tuple[str, str]]:
+        """Return the bracket in words: nothing here, for no limit is known."""
+        return []
+
     @property
     def restart_point(self) -> Extremal | None:
         """Return the last motion that leaves some gap: a start for searches of its kind."""
@@ -149,6 +161,15 @@ class MaxPayload(LimitResult):
     front: PayloadFront = field(default_factory=PayloadFront)
     trials: tuple[PayloadTrial, ...] = ()
 
+    def limit_rows(self) -> list[tuple[str, str]]:
+        """Return the largest payload, what is too much, and what is proved."""
+        rows = [('largest payload', f'{self.payload:.6g} kg' if self.payload else 'none found')]
+        if np.isfinite(self.local_upper):
+            rows.append((self.upper_means, f'{self.local_upper:.6g} kg'))
+        if np.isfinite(self.proved_upper):
+            rows.append(('proved: no motion carries', f'more than {self.proved_upper:.6g} kg'))
+        return rows
+
     @property
     def upper_means(self) -> str:
         """Return what `local_upper` is, in words that it follows."""
@@ -180,6 +201,16 @@ class MinDuration(LimitResult):
     duration: float = np.inf
     local_lower: float = 0.0
     proved_lower: float = 0.0
+
+    def limit_rows(self) -> list[tuple[str, str]]:
+        """Return the shortest duration, what is too short, and what is proved."""
+        found = f'{self.duration:.6g} s' if np.isfinite(self.duration) else 'none found'
+        rows = [('shortest duration', found)]
+        if self.local_lower:
+            rows.append(('this kind of motion ends at', f'{self.local_lower:.6g} s'))
+        if self.proved_lower:
+            rows.append(('proved: no motion takes', f'less than {self.proved_lower:.6g} s'))
+        return rows
 
 
 def describe_kinds(found: LimitResult) -> str:

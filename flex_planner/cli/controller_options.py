@@ -24,24 +24,25 @@ from flex_planner.planning.sampling import MAX_PERIOD, SamplingSettings
 def add_controller(parser: argparse.ArgumentParser) -> None:
     """Add the options of the joint controller."""
     group = parser.add_argument_group(
-        'joint controller', 'that the trajectory is for, and that carries it out on the model '
-        'before it is published')
+        'joint controller', 'The controller that the trajectory is for. With it, the model '
+        'carries out every plan before it is published.')
     add = group.add_argument
     add('--controller-rate', type=number_argument, default=1000.0, metavar='HZ',
-        help='rate of its updates (default: %(default)g)')
+        help='rate of its updates [Hz] (default: %(default)g)')
     add('--effort-hold', choices=[hold.value for hold in EffortHold], default='end',
-        help='effort that it applies between two updates: end, as joint_trajectory_controller '
-        'does (default), start, middle, or linear')
+        help='effort of the trajectory that it applies from one update to the next: that at the '
+        'end of this time, as joint_trajectory_controller does (default), at its start, in its '
+        'middle, or interpolated linearly')
     add('--controller-stiffness', metavar='P,P,...', help='proportional gains [N m/rad] '
         '(default: 100 for each joint, or what suits the arm)')
     add('--controller-damping', metavar='D,D,...', help='derivative gains [N m s/rad] '
         '(default: 10 for each joint, or what suits the arm)')
     add('--controller-period', type=number_argument, metavar='S',
-        help='shift the efforts by half this time, in which they are held, so that their mean is '
-        'right (default: 1 / rate; 0: not at all)')
+        help='time for which it holds an effort; efforts are shifted by half of it, so that '
+        'their mean is right (default: 1 / rate; 0: no shift)')
     add('--start-hold', type=number_argument, default=0.0, metavar='S',
-        help='hold the arm for this time before the motion, so that the controller can lead it '
-        'to the start (default: not at all)')
+        help='time before the motion in which the arm is held, so that the controller can lead '
+        'it to the start [s] (default: 0)')
 
 
 def sampling_settings(options: argparse.Namespace, arm: Arm) -> SamplingSettings:

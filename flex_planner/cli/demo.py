@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 from pathlib import Path
 import sys
@@ -18,9 +17,10 @@ def main() -> int:
 
 def _demonstrate() -> int:
     with SIGNALS.starting():
+        from flex_planner.cli.command_parser import CommandParser
         from flex_planner.cli.options import path_argument
 
-    parser = argparse.ArgumentParser(
+    parser = CommandParser(
         description='Plan a motion over ROS 2, and let a simulated arm carry it out.')
     parser.add_argument('--output', type=path_argument, default=Path('output'), metavar='DIR',
                         help='folder for all that is written (default: %(default)s)')

@@ -47,6 +47,7 @@ from trajectory_msgs.msg import JointTrajectory
 ARM = 'korayem_ei50'
 START, GOAL, ELBOW = (0.5, 0.0), (0.5, 0.5), -1
 PAYLOAD, DURATION = 1.0, 1.0
+PATIENCE = 120.0  # [s], for the first plan, in which much is compiled, on a busy machine
 SETTLING = 1.0  # [s], that the simulator watches the arm by default
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
@@ -106,7 +107,7 @@ class DemoClient(Node):  # type: ignore[misc]
             payload_mass=PAYLOAD, effort_weights=[1 / 8, 1 / 8], publish=True)
         began = self.get_clock().now().nanoseconds
         future = self._planner.call_async(PlanPath.Request(task=task))
-        self.wait('answer', future.done, 60)
+        self.wait('answer', future.done, PATIENCE + 30)
         response = future.result()
         if response.report.error_code != PlanReport.NONE:
             raise DemoError(response.report.error_msg)
@@ -133,7 +134,7 @@ class DemoClient(Node):  # type: ignore[misc]
             tip=np.array([(tip.point.x, tip.point.y) for tip in tips]))
 
 
-def motion_from_message(trajectory: FlexibleTrajectory) -> Motion:
+def motion_from_message(trajectory: FlexibleTrajectory, arm: Arm) -> Motion:
     """Return a trajectory message as arrays."""
     joints, bending = trajectory.joint_trajectory.points, trajectory.points
 
@@ -142,7 +143,7 @@ def motion_from_message(trajectory: FlexibleTrajectory) -> Motion:
 
     times = [duration_seconds(point.time_from_start) for point in joints]
     return Motion(
-        times=np.array(times),
+        arm=arm, times=np.array(times), joint_names=trajectory.joint_trajectory.joint_names,
         coordinates=np.hstack([rows(joints, 'positions'), rows(bending, 'modal_displacements')]),
         rates=np.hstack([rows(joints, 'velocities'), rows(bending, 'modal_rates')]),
         torques=rows(joints, 'effort'),
@@ -179,7 +180,8 @@ def run(folder: Path) -> str:
         with SIGNALS.patient():  # what is begun must be known, to be ended
             stack.enter_context(NodeProcess(
                 'flex_planner.ros.planner.node',
-                {'arm': ARM, 'recording_folder': folder / 'recordings'}))
+                {'arm': ARM, 'recording_folder': folder / 'recordings',
+                 'allowed_planning_time': PATIENCE}))
             stack.enter_context(NodeProcess(
                 'flex_planner.ros.arm_simulator',
                 {'arm': ARM, 'payload_mass': PAYLOAD, 'initial_positions': start.tolist()},
@@ -194,10 +196,9 @@ def run(folder: Path) -> str:
             client.destroy_node()
 
     def draw(path: Path) -> None:
-        from flex_planner.plotting import draw_motion
+        from flex_planner.plotting import draw_motion, save
 
-        draw_motion(path, arm, list(response.trajectory.joint_trajectory.joint_names),
-                    motion_from_message(response.trajectory), execution)
+        save(draw_motion(motion_from_message(response.trajectory, arm), execution), path)
 
     with SIGNALS.patient():
         files = [*drawn('picture', folder / 'motion.png', draw),

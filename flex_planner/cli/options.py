@@ -13,10 +13,11 @@ from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.number_texts import AMBIGUOUS, NumberTextError, read_number
 from flex_planner.base.paths import expand_path, PathError
 from flex_planner.base.validation import Array, vector
+from flex_planner.cli.command_parser import CommandParser
 from flex_planner.optimal_control.task import MAX_JOINT_ANGLE
 import numpy as np
 
-Commands: TypeAlias = 'argparse._SubParsersAction[argparse.ArgumentParser]'
+Commands: TypeAlias = 'argparse._SubParsersAction[CommandParser]'
 
 # argparse takes them for options
 _NEGATIVE = re.compile(r'-[\d.].*[,eE]')

@@ -23,9 +23,6 @@ from flex_planner.reports.motion import Row
 
 if TYPE_CHECKING:
     from flex_planner.cli.recorder import RequestRecorder
-    from flex_planner.plotting import Motion
-
-_DRAWN_SAMPLES = 2001
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,10 +100,9 @@ class Outputs:
         solved = found.plan if found.plan is not None and found.plan.solved else None
 
         def draw(path: Path) -> None:
-            from flex_planner.plotting import draw_max_payload
+            from flex_planner.plotting import draw_max_payload, save
 
-            draw_max_payload(path, found, _joint_names(found.task.arm.n_joints),
-                             _fine_motion(solved) if solved else None)
+            save(draw_max_payload(found), path)
 
         if solved or found.front.payloads.size or found.trials:
             yield from drawn('picture of the search', self.folder / f'{self.stem}_max_payload.png',
@@ -117,9 +113,9 @@ class Outputs:
     def _draw_motion(self, plan: Plan, name: str) -> Iterator[Row]:
         """Draw the motion of a plan."""
         def draw(path: Path) -> None:
-            from flex_planner.plotting import draw_motion
+            from flex_planner.plotting import draw_motion, save
 
-            draw_motion(path, plan.arm, _joint_names(plan.arm.n_joints), _fine_motion(plan))
+            save(draw_motion(plan), path)
 
         yield from drawn('picture of the motion', self.folder / f'{self.stem}_{name}.png', draw)
 
@@ -127,8 +123,8 @@ class Outputs:
 def add_outputs(parser: argparse.ArgumentParser) -> None:
     """Add the options for what is written."""
     add_folder(parser)
-    parser.add_argument('--no-plot', action='store_true', help='draw nothing')
-    parser.add_argument('--no-recording', action='store_true', help='record nothing')
+    parser.add_argument('--no-plot', action='store_true', help='draw no pictures')
+    parser.add_argument('--no-recording', action='store_true', help='write no recording')
 
 
 def check_folder(folder: Path) -> None:
@@ -153,14 +149,3 @@ def _recorder(request: Request, folder: Path) -> RequestRecorder | None:
     except RecordingError as error:
         print(f'flex-planner: no recording is written: {error}', file=sys.stderr)
         return None
-
-
-def _joint_names(count: int) -> list[str]:
-    return [f'joint{i}' for i in range(1, count + 1)]
-
-
-def _fine_motion(plan: Plan) -> Motion:
-    """Return a solved plan as arrays, finer than a controller needs it."""
-    from flex_planner.plotting import Motion
-
-    return Motion.of(plan.uniform_samples(_DRAWN_SAMPLES))

@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Sequence
 
 from flex_planner.base.version import VERSION
+from flex_planner.cli.command_parser import CommandParser
 from flex_planner.cli.commands import arm, cache, compare, paper, plan, recordings
 from flex_planner.cli.commands import map as maps
 from flex_planner.cli.options import join_lists
@@ -13,7 +14,7 @@ from flex_planner.cli.options import join_lists
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Return the options of a command line; SystemExit after a message where it is wrong."""
-    parser = argparse.ArgumentParser(
+    parser = CommandParser(
         prog='flex-planner', description='Motion planning for flexible-link manipulators.')
     parser.add_argument('--version', action='version', version=VERSION)
     commands = parser.add_subparsers(required=True, metavar='COMMAND')

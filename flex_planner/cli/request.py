@@ -112,7 +112,8 @@ def add_task(parser: argparse.ArgumentParser, payload: str) -> None:
     add = parser.add_argument
     add('--from', dest='start_point', metavar='X,Y',
         help='tip at the start, where it rests as gravity bends the arm [m]')
-    add('--to', dest='goal_point', metavar='X,Y', help='tip at the goal, likewise [m]')
+    add('--to', dest='goal_point', metavar='X,Y',
+        help='tip at the goal, where it rests likewise [m]')
     add('--from-angles', dest='start_positions', metavar='DEG,DEG,...',
         help='joint angles at the start, instead of a point')
     add('--to-angles', dest='goal_positions', metavar='DEG,DEG,...',
@@ -125,19 +126,21 @@ def add_task(parser: argparse.ArgumentParser, payload: str) -> None:
     add('--elbow', type=integer_argument, default=-1, metavar='SIGN',
         help='sign of the second joint angle at the points, 1 or -1 (default: -1)')
     add('--duration', type=number_argument, required=True, metavar='S',
-        help='duration of the motion')
+        help='duration of the motion [s]')
     add('--payload', dest='payload_mass', type=number_argument, default=0.0, metavar='KG',
         help=payload)
     add('--payload-inertia', type=number_argument, default=None, metavar='KG_M2',
-        help='rotary inertia of the payload (default: as the arm file says, or 0)')
-    for name, what in (('effort', 'R: torques (default: ones)'),
-                       ('velocity', 'W_2: velocities (default: zeros)'),
-                       ('position', 'W_1: positions (default: zeros)')):
-        add(f'--{name}-weights', metavar='W,W,...', help=f'diagonal of {what}')
+        help='moment of inertia of the payload (default: that of the arm file, or 0)')
+    for name, what in (('effort', 'torques, R in the cost (default: ones)'),
+                       ('velocity', 'velocities, W_2 in the cost (default: zeros)'),
+                       ('position', 'positions, W_1 in the cost (default: zeros)')):
+        add(f'--{name}-weights', metavar='W,W,...', help=f'weights of the squared {what}')
     add('--tolerance', type=number_argument, default=1e-3, metavar='EPS',
-        help='largest allowed half squared error of the final state, eq. (17) (default: 0.001)')
+        help='largest allowed boundary error, half the squared error of the final state '
+        '(default: 0.001)')
     add('--allow-large-bending', action='store_true',
-        help='accept links that bend by more than 0.3 of their length, though beams are linear')
+        help='accept links that bend by more than 0.3 of their length, beyond what '
+        'the beam model is made for')
     add('--time-limit', type=number_argument, default=_TIME_LIMIT, metavar='S',
         help=f'give up after this time (default: %(default)g, at most {MAX_TIME_LIMIT:g})')
 
@@ -145,13 +148,11 @@ def add_task(parser: argparse.ArgumentParser, payload: str) -> None:
 def add_objectives(parser: argparse.ArgumentParser) -> None:
     """Add the options that limit a motion, by weights that are found."""
     for name, unit, what in (
-            ('joint-speeds', 'RAD/S', 'absolute joint speeds, met by weights W_2 that are '
-             'searched'),
-            ('torque-shares', 'SHARE', 'torques as shares of their limits, met by weights R that '
-             'are searched'),
-            ('modal-rates', 'M/S', 'absolute modal rates, met by weights W_2 that are searched')):
+            ('joint-speeds', 'RAD/S', 'joint speeds, kept by velocity weights'),
+            ('torque-shares', 'SHARE', 'torques by their limits, kept by effort weights'),
+            ('modal-rates', 'M/S', 'modal rates, kept by velocity weights')):
         parser.add_argument(f'--max-{name}', metavar=f'{unit},{unit},...',
-                            help=f'limits on the {what}; inf for no limit')
+                            help=f'limits of the {what} that are searched for; inf for no limit')
 
 
 @contextmanager

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from flex_planner.base.errors import InvalidValueError
+from flex_planner.base.suggestions import one_of
 from flex_planner.base.validation import Array, number, vector
 from flex_planner.control.joint_reference import Reference
 import numpy as np
@@ -50,8 +51,8 @@ class EffortHold(Enum):
         try:
             return cls(name)
         except ValueError:
-            bound = ', '.join(hold.value for hold in cls)
-            raise InvalidValueError('effort_hold', name, f'one of {bound}') from None
+            names = [hold.value for hold in cls]
+            raise InvalidValueError('effort_hold', name, one_of(name, names)) from None
 
     @property
     def delay(self) -> float:

@@ -8,6 +8,7 @@ import math
 from types import MappingProxyType
 
 from flex_planner.base.errors import InvalidValueError
+from flex_planner.base.suggestions import one_of
 from flex_planner.base.validation import Array, integer, number
 from flex_planner.base.yaml_files import YamlSection
 from flex_planner.optimal_control.task import MAX_DURATION, MAX_PAYLOAD
@@ -94,7 +95,7 @@ class Axis:
 
     def __post_init__(self) -> None:
         if self.name not in AXES:
-            raise InvalidValueError('axes', self.name, f'one of {list(AXES)}')
+            raise InvalidValueError('axes', self.name, one_of(self.name, AXES))
         object.__setattr__(self, 'values', _rising(f'axes.{self.name}', self.values))
         kind = AXES[self.name]
         # NaN is the least and the largest to numpy
@@ -163,7 +164,7 @@ def check_cells(cells: int) -> None:
 def _read_axis(section: YamlSection, name: str, cells: int) -> Axis:
     """Return an axis given as a list or as a range, after others with so many cells."""
     if name not in AXES:
-        raise InvalidValueError(section.name(str(name)), 'given', f'one of {list(AXES)}')
+        raise InvalidValueError(section.path, name, one_of(name, AXES))
     content = section.take(name)
     if not isinstance(content, Mapping):
         return Axis(name=name, values=content)

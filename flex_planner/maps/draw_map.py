@@ -22,7 +22,7 @@ from flex_planner.maps.pictures.scene import draw_arm, find_scene, frame, study_
 from flex_planner.maps.pictures.slices import draw_slices, lines_along, lines_through_points
 from flex_planner.maps.store import open_map
 from flex_planner.maps.study import Study
-from flex_planner.plotting.figures import save
+from flex_planner.plotting.figures import Picture, save
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
@@ -36,9 +36,9 @@ _SIDE = 4.6  # [in]
 _FLAT = 0.92
 
 
-def draw_map(store: Path, folder: Path) -> list[Path]:
+def draw_map(store: Path) -> dict[str, Figure]:
     """
-    Draw a map, finished or not.
+    Draw a map, finished or not; return Matplotlib figures by their names.
 
     Over the workspace the quantity is drawn as colours with contours and the arm, a diagram for
     each combination of further values; if one of them is the duration, also against it for some
@@ -49,13 +49,32 @@ def draw_map(store: Path, folder: Path) -> list[Path]:
     ----------
     store : Path
         Zarr store, as written by `flex_planner.maps.store.MapStore`.
-    folder : Path
-        For the pictures; made if there is none. Pictures of the same name are replaced.
 
     Returns
     -------
-    list of Path
-        The pictures, PNG.
+    dict of str to Picture
+        Figures by names such as ``max_payload_map``.
+
+    Raises
+    ------
+    MapStoreError
+        If there is no map, or it is damaged.
+
+    """
+    data, study = _read(store)
+    return {f'{data.key}_{name}': figure for name, figure in _figures(data, study).items()}
+
+
+def save_map(store: Path, folder: Path) -> list[Path]:
+    """
+    Write the pictures of a map as PNG, see `draw_map`, and return their paths.
+
+    Parameters
+    ----------
+    store : Path
+        Zarr store.
+    folder : Path
+        For the pictures; made if there is none. Pictures of the same name are replaced.
 
     Raises
     ------
@@ -65,12 +84,10 @@ def draw_map(store: Path, folder: Path) -> list[Path]:
         If a picture cannot be written, naming the path.
 
     """
-    data, study = _read(store)
-    paths = []
-    for name, figure in _figures(data, study).items():
-        paths.append(folder / f'{data.key}_{name}.png')
-        save(figure, paths[-1])
-    return paths
+    pictures = {folder / f'{name}.png': figure for name, figure in draw_map(store).items()}
+    for path, figure in pictures.items():
+        save(figure, path)
+    return list(pictures)
 
 
 def _read(store: Path) -> tuple[MapData, Study | None]:
@@ -145,8 +162,7 @@ def _extend(norm: Normalize, cuts: list[tuple[Array, NDArray[np.int8]]]) -> str:
 def _diagrams(count: int, side: float) -> tuple[Figure, list[Axes]]:
     """Return a figure with diagrams in rows."""
     columns, rows = grid_shape(count)
-    figure = Figure(figsize=(side * columns + 1.2, _FLAT * side * rows + 1.2),
-                    layout='constrained')
+    figure = Picture(side * columns + 1.2, _FLAT * side * rows + 1.2)
     diagrams = list(np.atleast_1d(figure.subplots(rows, columns)).ravel())
     for empty in diagrams[count:]:
         empty.set_axis_off()

@@ -34,7 +34,7 @@ TEXTS = ('message',)
 # type, what stands where nothing is written, metadata; the quantity itself comes first
 BESIDE: dict[str, tuple[Any, float | None, dict[str, str]]] = {
     'bound': (float, np.nan, {'long_name': 'bound of the true value'}),
-    'cost': (float, np.nan, {'long_name': 'cost J of eq. (6)', 'units': 'N^2 m^2 s'}),
+    'cost': (float, np.nan, {'long_name': 'cost J', 'units': 'N^2 m^2 s'}),
     'tip_error': (float, np.nan, {'long_name': 'tip error of the re-simulation', 'units': 'm'}),
     'iterations': (np.int32, -1, {'long_name': 'Newton iterations', 'units': '1'}),
     'seconds': (float, np.nan, {'long_name': 'computing time', 'units': 's'}),

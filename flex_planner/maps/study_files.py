@@ -16,6 +16,7 @@ from flex_planner.arms.arm_files import (
 )
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.paths import expand_path, PathError, STANDARD_INPUT
+from flex_planner.base.suggestions import one_of
 from flex_planner.base.validation import Array, integer, number, vector
 from flex_planner.base.yaml_files import YamlSection
 from flex_planner.control.joint_controller import Gains
@@ -62,7 +63,7 @@ def _quantity(top: YamlSection) -> Quantity:
     given = top.text('quantity')
     kinds = {quantity.key: quantity for quantity in Quantity}
     if given not in kinds:
-        raise InvalidValueError('quantity', given, f'one of {list(kinds)}')
+        raise InvalidValueError('quantity', given, one_of(given, kinds))
     return kinds[given]
 
 
@@ -126,7 +127,8 @@ def _end(top: YamlSection, name: str, axes: tuple[Axis, ...]) -> End:
     if {f'{name}_x', f'{name}_y'} <= {axis.name for axis in axes}:
         return End(name=name)
     if not top.has(name):
-        raise InvalidValueError(f'{name} or {angles}', None, 'given, exactly one of them')
+        raise InvalidValueError(f'{name} or {angles}', None,
+                                f'given, exactly one of them{top.misspelt(name, angles)}')
     point = _numbers(name, top.take(name))
     if point.size != 2:
         raise InvalidValueError(name, point.tolist(), 'a point [x, y] in m')

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
+from flex_planner.base.colours import ASIDE, COORDINATES
 from flex_planner.base.validation import Array
 from flex_planner.planning.plan import Samples
 from flex_planner.plotting.diagrams import Curve, Panel
@@ -27,9 +28,9 @@ def _joint_panel(cases: Cases, quantity: str, joint: int) -> Panel:
     curves = []
     for k, (name, samples) in enumerate(cases.items()):
         curves.append(Curve(x=samples.times, y=_values(samples, quantity)[:, joint], label=name,
-                            color=f'C{k}'))
+                            color=COORDINATES[k]))
         if quantity == 'torques':
-            curves += _bounds(samples, joint, f'C{k}', last=k == len(cases) - 1)
+            curves += _bounds(samples, joint, COORDINATES[k], last=k == len(cases) - 1)
     return Panel(title=f'{title} {joint + 1}', x_label='time [s]', y_label=label,
                  curves=tuple(curves))
 
@@ -49,14 +50,14 @@ def _bounds(samples: Samples, joint: int, color: str, *, last: bool) -> list[Cur
     curves = [Curve(x=samples.times, y=bound, color=color, style=':', width=0.9)
               for bound in bounds]
     if last:
-        curves.append(Curve(x=np.zeros(0), y=np.zeros(0), label='bounds', color='gray',
+        curves.append(Curve(x=np.zeros(0), y=np.zeros(0), label='bounds', color=ASIDE,
                             style=':', width=0.9))
     return curves
 
 
 def tip_panel(cases: Cases, title: str = 'path of the tip') -> Panel:
     """Return the paths of the tip in the plane."""
-    curves = [Curve(x=samples.tip[:, 0], y=samples.tip[:, 1], label=name, color=f'C{k}')
+    curves = [Curve(x=samples.tip[:, 0], y=samples.tip[:, 1], label=name, color=COORDINATES[k])
               for k, (name, samples) in enumerate(cases.items())]
     return Panel(title=title, x_label='x [m]', y_label='y [m]', curves=tuple(curves), equal=True)
 
@@ -71,7 +72,7 @@ def modal_panels(cases: Cases, names: Sequence[str], scale: float = 1e3) -> tupl
                 n = samples.torques.shape[1]
                 values = samples.coordinates if kind == 'displacement' else samples.rates
                 curves.append(Curve(x=samples.times, y=values[:, n + j] * scale, label=label,
-                                    color=f'C{k}'))
+                                    color=COORDINATES[k]))
             panels.append(Panel(title=f'modal {kind}, {name}', x_label='time [s]',
                                 y_label=f'{kind} [{unit}]', curves=tuple(curves)))
     return tuple(panels)

@@ -119,10 +119,11 @@ def _compute_section(key: str, reduced: bool, pictures: Path | None) -> Section:
     section = STUDIES[key](reduced=reduced)
     if pictures is not None:
         try:
+            from flex_planner.plotting.figures import save
             from flex_planner.plotting.panels import draw_picture
 
             for picture in section.pictures:
-                draw_picture(pictures, picture)
+                save(draw_picture(picture), pictures / f'{picture.name}.png')
         except Exception as error:  # the numbers are there
             _LOG.warning('section %s has no pictures: %s', key, error)
     return section

@@ -8,7 +8,9 @@ import os
 
 from flex_planner.arms.arm import Arm, BeamSection, Elasticity, Joint, Link, Motor, Node
 from flex_planner.arms.kinematics import tip_position
+from flex_planner.arms.motion_svg import motion_svg
 from flex_planner.base.errors import InvalidValueError, ValueFileError
+from flex_planner.base.html_view import html_view
 from flex_planner.base.validation import Array
 from flex_planner.base.value_files import load_value, save_value
 from flex_planner.collocation import CollocationSolution, GaussRule
@@ -35,6 +37,7 @@ from numpy.typing import ArrayLike
 
 # share of its duration by which a time may be past an end of the motion
 _ROUNDING = 1e-12
+_SHOWN = 101  # instants in small pictures
 
 
 class PlanStatus(Enum):
@@ -191,6 +194,17 @@ class Plan:
         return (f'<Plan {self.status.name}: {task.arm.name}, {task.duration:g} s, '
                 f'{task.payload_mass:g} kg{cost}>')
 
+    def _repr_html_(self) -> str:
+        """Return the plan as notebooks show it."""
+        return html_view(plan_view(self), self.svg())
+
+    def svg(self) -> str:
+        """Return a small picture of the motion as SVG; empty without a solution."""
+        if self.solution is None:
+            return ''
+        times = np.linspace(0, self.task.duration, _SHOWN, dtype=np.float64)
+        return motion_svg(self.arm, self.solution(times)[:, :self.arm.n_coordinates])
+
     def save(self, path: str | os.PathLike[str]) -> None:
         """
         Write the plan to one file, whole or not at all.
@@ -272,6 +286,21 @@ _SAVED = (Plan, PlanStatus, Certificate, Task, Arm, Link, BeamSection, Joint, El
           Node, ArmModel, MotionProblem, BoundaryConditions, Parameters, CollocationSolution,
           GaussRule, ObjectiveSearch, Objectives, Objective, WeightTrial, Margin, KindOfMotion,
           ExploredMotion, PlanWarning, WarningKind, TriedStrategy)
+
+
+def plan_view(plan: Plan) -> list[tuple[str, str]]:
+    """Return the rows of a plan in a notebook."""
+    task, proof = plan.task, plan.certificate
+    rows = [('arm', task.arm.name), ('status', plan.status.value),
+            ('motion', f'{task.duration:g} s with {task.payload_mass:g} kg')]
+    if plan.solution is None:
+        return [*rows, ('why', plan.message)]
+    return [
+        *rows, ('cost J', f'{plan.cost:.6g}'), ('strategy', plan.strategy),
+        ('planned in', f'{plan.planning_time:.2f} s'),
+        ('re-simulated tip error', f'{proof.tip_error * 1e3:.1e} mm'),
+        ('residual vibration', f'{proof.residual_vibration * 1e3:.1e} mm'),
+        *(('warning', warning.sentence) for warning in plan.warnings)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -68,5 +68,5 @@ def _find_bent_link(problem: MotionProblem,
         return None
     return PlanStatus.BENT_TOO_FAR, (
         f'link {found.link + 1} bends by {found.share:.0%} of its length at '
-        f'{time:.4g} s, and beams are linear up to {LARGEST:.0%} at most: a longer '
+        f'{time:.4g} s, and the beam model holds up to {LARGEST:.0%} at most: a longer '
         'duration bends it less, and allow_large_bending in the task accepts it')

@@ -2,41 +2,48 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Mapping
+from typing import Any
 
+from flex_planner.base.colours import ASIDE
 from flex_planner.base.validation import Array
-from flex_planner.plotting.figures import finish, plain, save, say
+from flex_planner.plotting.curves import limits_beside
+from flex_planner.plotting.diagrams import MODE_COLOURS, OPEN_LOOP
+from flex_planner.plotting.figures import finish, Picture, plain, say
 from flex_planner.simulation.comparison import Comparison
 from flex_planner.simulation.execution import ExecutionMode, ExecutionResult
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 import numpy as np
 
 _MILLI = 1e3
-_STYLES = {ExecutionMode.FLEXIBLE_OPEN: ('C0', '--'), ExecutionMode.RIGID_OPEN: ('C3', '--'),
-           ExecutionMode.FLEXIBLE: ('C0', '-'), ExecutionMode.RIGID: ('C3', '-'),
-           ExecutionMode.PD_ONLY: ('C1', '-')}
+# dashes lie upon wide pale lines of their colour, so that both are seen where they coincide
+_DASHED: Mapping[str, Any] = {'linestyle': (0, (4, 3)), 'linewidth': 1.2, 'zorder': 2.5}
+_FULL: Mapping[str, Any] = {'linestyle': '-', 'linewidth': 2.4, 'alpha': 0.6}
 # of the tip's distance from the goal: less is rounding and sampling
-_FLOOR = 1e-6  # [mm]
+_FLOOR = 1e-4  # [mm]
+_LEAST_TORQUE = 1e-3  # [N m]
 _MARGIN = 0.15
 _POINTS = 201
 
 
-def draw_comparison(path: Path, comparison: Comparison) -> None:
+def draw_comparison(comparison: Comparison) -> Picture:
     """
-    Write a picture of a comparison as PNG.
+    Draw a comparison.
 
     Parameters
     ----------
-    path : Path
-        File to write.
     comparison : Comparison
         One line per result. Above: the distance of the tip from the goal after its
         arrival, and its path there. Below: the torques.
 
+    Returns
+    -------
+    Picture
+        A Matplotlib figure.
+
     """
     n = comparison.flexible.arm.n_joints
-    figure = Figure(figsize=(14, 10), layout='constrained')
+    figure = Picture(14, 10)
     above, below = figure.subfigures(2, 1, height_ratios=[1.25, 1])
     distance, path_axes = above.subplots(1, 2, width_ratios=[1.3, 1])
     torques = np.atleast_1d(below.subplots(1, n, sharey=True))
@@ -50,21 +57,20 @@ def draw_comparison(path: Path, comparison: Comparison) -> None:
         figure.legend(handles, labels, loc='outside lower center', ncols=len(results))
     figure.suptitle(f'{plain(comparison.flexible.arm.name)}: one task, planned and carried out in '
                     f'{len(results)} modes')
-    save(figure, path)
+    return figure
 
 
 def _draw_distance(axes: Axes, comparison: Comparison) -> None:
     """Draw the distance of the tip from the goal, from the arrival on."""
     for result in comparison.results:
-        color, style = _STYLES[result.mode]
         times, tip = _after_arrival(result)
         distance = np.linalg.norm(tip - comparison.goal, axis=1) * _MILLI
-        axes.semilogy(times, np.maximum(distance, _FLOOR), style, color=color, linewidth=1.2,
-                      label=result.mode.value)
+        axes.semilogy(times, np.maximum(distance, _FLOOR), label=result.mode.value,
+                      **_style(result))
     if not comparison.results:
         say(axes, 'neither plan was solved')
-    axes.set(title='distance of the tip from the goal', xlabel='time after arrival [s]',
-             ylabel='distance [mm]')
+    axes.set(title=f'distance of the tip from the goal (below {_FLOOR:g} mm drawn there)',
+             xlabel='time after arrival [s]', ylabel='distance [mm]')
     axes.grid(alpha=0.3)
 
 
@@ -73,14 +79,13 @@ def _draw_paths(axes: Axes, comparison: Comparison) -> None:
     near = [result for result in comparison.results if result.mode is not ExecutionMode.PD_ONLY]
     reach = 0.0
     for result in comparison.results:
-        color, style = _STYLES[result.mode]
         path = (_after_arrival(result)[1] - comparison.goal) * _MILLI
-        axes.plot(*path.T, style, color=color, linewidth=1)
-        axes.plot(*path[0], 'o', color=color, markersize=5)
+        axes.plot(*path.T, **_style(result))
+        axes.plot(*path[0], 'o', color=MODE_COLOURS[result.mode], markersize=5)
         if result in near:
             reach = max(reach, float(np.abs(path).max()))
     axes.plot(0, 0, '+', color='black', markersize=14, label='goal')
-    axes.plot([], [], 'o', color='gray', markersize=5, label='on arrival')
+    axes.plot([], [], 'o', color=ASIDE, markersize=5, label='on arrival')
     if reach:
         limit = reach * (1 + _MARGIN)
         axes.set(xlim=(-limit, limit), ylim=(-limit, limit))
@@ -92,19 +97,33 @@ def _draw_torques(axes: Axes, comparison: Comparison, joint: int) -> None:
     """Draw the torques of a joint's motor, and its bounds at the speeds of the plan."""
     results = comparison.results
     for result in results:
-        color, style = _STYLES[result.mode]
         execution = result.execution
-        axes.plot(execution.times, execution.torques[:, joint], style, color=color, linewidth=1)
+        axes.plot(execution.times, execution.torques[:, joint], **_style(result))
     for arrival in sorted({result.arrival for result in results}):
-        axes.axvline(arrival, color='gray', linestyle=':', label='planned arrival')
+        axes.axvline(arrival, color=ASIDE, linestyle=':', label='planned arrival')
     if comparison.flexible.solved:
-        planned = comparison.flexible.uniform_samples(_POINTS)
-        for label, bound in (('bounds at the planned speeds', planned.lower_bounds[:, joint]),
-                             ('', planned.upper_bounds[:, joint])):
-            if np.isfinite(bound).all():
-                axes.plot(planned.times, bound, ':', color='black', linewidth=0.9,
-                          label=label or None)
+        _draw_bounds(axes, comparison, joint)
     finish(axes, f'torque of joint {joint + 1}', 'torque [N m]')
+
+
+def _draw_bounds(axes: Axes, comparison: Comparison, joint: int) -> None:
+    """Draw the bounds of a motor as far as they are near its torques."""
+    planned = comparison.flexible.uniform_samples(_POINTS)
+    bounds = np.array([planned.lower_bounds[:, joint], planned.upper_bounds[:, joint]])
+    torques = np.concatenate([one.execution.torques.ravel() for one in comparison.results]
+                             or [planned.torques.ravel()])
+    low, high = limits_beside(torques, bounds, _LEAST_TORQUE)
+    if np.isfinite(bounds).all():
+        label = 'bounds at the planned speeds'
+        if bounds.min() < low or bounds.max() > high:
+            label += f', {bounds.min():.3g} to {bounds.max():.3g} N m'
+        axes.plot(planned.times, bounds.T, ':', color='black', linewidth=0.9, label=[label, None])
+    axes.set_ylim(low, high)
+
+
+def _style(result: ExecutionResult) -> dict[str, Any]:
+    """Return how the lines of a mode of execution are drawn."""
+    return {'color': MODE_COLOURS[result.mode], **(_DASHED if result.mode in OPEN_LOOP else _FULL)}
 
 
 def _after_arrival(result: ExecutionResult) -> tuple[Array, Array]:

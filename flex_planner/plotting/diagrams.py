@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from flex_planner.base.colours import FEEDBACK, FLEXIBLE, RIGID
 from flex_planner.base.validation import Array
+from flex_planner.simulation.execution import ExecutionMode
+
+# what is planned gives the colour; without feedback the lines are dashed
+MODE_COLOURS = {
+    ExecutionMode.FLEXIBLE_OPEN: FLEXIBLE, ExecutionMode.RIGID_OPEN: RIGID,
+    ExecutionMode.FLEXIBLE: FLEXIBLE, ExecutionMode.RIGID: RIGID, ExecutionMode.PD_ONLY: FEEDBACK}
+OPEN_LOOP = (ExecutionMode.FLEXIBLE_OPEN, ExecutionMode.RIGID_OPEN)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -28,7 +36,7 @@ class Curve:
     x: Array
     y: Array
     label: str = ''
-    color: str = 'C0'
+    color: str = FLEXIBLE
     style: str = '-'
     width: float = 1.3
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
 import secrets
+from typing import Any
 import warnings
 
 from flex_planner.base.errors import InvalidValueError
@@ -15,6 +16,18 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, FigureBase
 
 _DPI = 110
+_NOTEBOOK_DPI = 80
+
+
+class Picture(Figure):
+    """A figure that notebooks show without `matplotlib.pyplot`."""
+
+    def __init__(self, width: float, height: float) -> None:
+        super().__init__(figsize=(width, height), layout='constrained')
+
+    def _repr_png_(self) -> bytes:
+        """Return the picture as PNG."""
+        return _drawn(self, 'png', _NOTEBOOK_DPI)
 
 
 def finish(axes: Axes, title: str, y_label: str, x_label: str = 'time [s]', *,
@@ -32,8 +45,11 @@ def explain_lines(figure: FigureBase, axes: Sequence[Axes], columns: int) -> Non
     for one in axes:
         for handle, label in zip(*one.get_legend_handles_labels(), strict=True):
             named.setdefault(label, handle)
-    figure.legend(named.values(), named.keys(), loc='outside lower center', ncols=columns,
-                  fontsize='small')
+        if (legend := one.get_legend()) is not None:
+            legend.remove()
+    if named:
+        figure.legend(named.values(), named.keys(), loc='outside lower center', ncols=columns,
+                      fontsize='small')
 
 
 def plain(text: str) -> str:
@@ -44,6 +60,7 @@ def plain(text: str) -> str:
 def say(axes: Axes, text: str) -> None:
     """Write a remark into a diagram that has nothing to show."""
     axes.text(0.5, 0.5, text, transform=axes.transAxes, ha='center')
+    axes.set(xticks=[], yticks=[])
 
 
 def save(figure: Figure, path: Path) -> None:
@@ -65,15 +82,21 @@ def save(figure: Figure, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     # not the whole name, which may be as long as names can be
     stage = path.with_name(f'.{secrets.token_hex(8)}.{kind}')
-    drawn = BytesIO()  # drawing takes much longer than writing
     try:
-        with warnings.catch_warnings():
-            # letters that the font lacks are drawn as boxes, which is seen
-            warnings.filterwarnings('ignore', message='Glyph .* missing from')
-            figure.savefig(drawn, dpi=_DPI, format=kind)
-        stage.write_bytes(drawn.getvalue())
+        stage.write_bytes(_drawn(figure, kind, _DPI))  # drawing takes much longer than writing
         stage.replace(path)
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(path)) from error
     finally:
         stage.unlink(missing_ok=True)
+
+
+def _drawn(figure: Figure, kind: str, dpi: float) -> bytes:
+    """Return a picture as a file of some kind."""
+    drawn = BytesIO()
+    options: dict[str, Any] = {'dpi': dpi, 'format': kind}
+    with warnings.catch_warnings():
+        # letters that the font lacks are drawn as boxes, which is seen
+        warnings.filterwarnings('ignore', message='Glyph .* missing from')
+        figure.savefig(drawn, **options)
+    return drawn.getvalue()

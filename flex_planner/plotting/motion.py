@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from typing import Any
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import link_points
+from flex_planner.base.colours import ARM, ASIDE, CARRIED_OUT, coordinate_colour, PLANNED
 from flex_planner.base.validation import Array
 from flex_planner.optimal_control.torque_limits import TorqueLimits
-from flex_planner.planning.plan import Samples
-from flex_planner.plotting.figures import finish, plain, save, say
+from flex_planner.planning.plan import Plan
+from flex_planner.plotting.curves import draw_columns, limits_beside, settle_limits
+from flex_planner.plotting.figures import explain_lines, finish, Picture, plain, say
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 import numpy as np
 
 _MILLI = 1e3
-_POSTURES = 6
+_POSTURES, _STATIONS, _SAMPLES = 6, 15, 2001
+_COLUMNS = 8
+# the least heights of diagrams: what is less is rounding, or of no consequence
+_LEAST_ANGLE, _LEAST_SPEED = 0.1, 1e-3  # [deg], [rad/s]
+_LEAST_TORQUE, _LEAST_BENDING = 1e-3, 1e-2  # [N m], [mm]
+_LEAST_DISTANCE = 1e-4  # [mm], lowest on a logarithmic axis
+# the planned curve beneath the one that was carried out
+_BENEATH: Mapping[str, Any] = {'linewidth': 4.0, 'alpha': 0.3}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -27,6 +35,8 @@ class Motion:
 
     Attributes
     ----------
+    arm : Arm
+        n joints.
     times : numpy.ndarray, shape (k,)
         [s].
     coordinates, rates : numpy.ndarray, shape (k, n_t)
@@ -35,20 +45,32 @@ class Motion:
         [N m]; the last may be what holds the arm and is not drawn.
     tip : numpy.ndarray, shape (k, 2)
         [m].
+    joint_names : sequence of str
+        For the legends; empty for numbers.
 
     """
 
+    arm: Arm
     times: Array
     coordinates: Array
     rates: Array
     torques: Array
     tip: Array
+    joint_names: Sequence[str] = ()
 
     @classmethod
-    def of(cls, samples: Samples) -> Motion:
-        """Return a sampled plan."""
-        return cls(times=samples.times, coordinates=samples.coordinates, rates=samples.rates,
-                   torques=samples.torques, tip=samples.tip)
+    def of(cls, plan: Plan, joint_names: Sequence[str] = (), count: int = _SAMPLES) -> Motion:
+        """Return the motion of a plan with a solution, at evenly spaced times."""
+        samples = plan.uniform_samples(count)
+        return cls(arm=plan.arm, times=samples.times, coordinates=samples.coordinates,
+                   rates=samples.rates, torques=samples.torques, tip=samples.tip,
+                   joint_names=joint_names)
+
+    @property
+    def names(self) -> list[str]:
+        """Return the names of the joints, as Matplotlib shows them."""
+        return list(map(plain, self.joint_names or [
+            f'joint {i}' for i in range(1, self.arm.n_joints + 1)]))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -77,108 +99,142 @@ class Execution:
     tip: Array
 
 
-def draw_motion(path: Path, arm: Arm, joint_names: Sequence[str], motion: Motion,
-                execution: Execution | None = None) -> None:
+def draw_motion(motion: Motion | Plan, execution: Execution | None = None) -> Picture:
     """
-    Write a picture of a motion as PNG.
+    Draw a motion: joints, torques within their bounds, path of the tip, bending.
 
     Parameters
     ----------
-    path : Path
-        File to write.
-    arm : Arm
-        n joints.
-    joint_names : sequence of str
-        For the legends.
-    motion : Motion
-        As planned: full lines.
+    motion : Motion or Plan
+        As planned: full lines; a plan needs a solution.
     execution : Execution, optional
-        As carried out: dashed lines.
+        As carried out: thin lines upon wide ones.
+
+    Returns
+    -------
+    Picture
+        A Matplotlib figure, for `flex_planner.plotting.save` or a notebook.
 
     """
-    figure = Figure(figsize=(15, 8.5), layout='constrained')
+    motion = motion if isinstance(motion, Motion) else Motion.of(motion)
+    figure = Picture(15, 8.8)
     axes = figure.subplots(2, 3)
-    n = arm.n_joints
-    done = execution
-    _draw_joints(axes[0, 0], 'joint positions', 'angle [deg]', joint_names, motion.times,
-                 np.degrees(motion.coordinates[:, :n]),
-                 (done.times, np.degrees(done.positions)) if done else None)
-    _draw_joints(axes[0, 1], 'joint speeds', 'speed [rad/s]', joint_names, motion.times,
-                 motion.rates[:, :n], (done.times, done.speeds) if done else None)
-    draw_torques(axes[0, 2], arm, joint_names, motion, execution)
-    draw_tip(axes[1, 0], arm, motion, execution)
-    _draw_modes(axes[1, 1], arm, motion)
-    _draw_distance(axes[1, 2], motion, execution)
-    figure.suptitle(plain(arm.name))
-    save(figure, path)
+    draw_angles(axes[0, 0], motion, execution)
+    draw_speeds(axes[0, 1], motion, execution)
+    draw_torques(axes[0, 2], motion, execution)
+    draw_tip(axes[1, 0], motion, execution)
+    draw_modes(axes[1, 1], motion)
+    draw_distance(axes[1, 2], motion, execution)
+    explain_lines(figure, axes.ravel(), _COLUMNS)
+    figure.suptitle(plain(motion.arm.name))
+    return figure
 
 
-def _draw_joints(axes: Axes, title: str, label: str, names: Sequence[str], times: Array,
-                 values: Array, done: tuple[Array, Array] | None) -> None:
-    """Draw one line per joint, and the simulated motion."""
-    for i, name in enumerate(map(plain, names)):
-        axes.plot(times, values[:, i], color=f'C{i}', label=name)
-        if done is not None:
-            axes.plot(done[0], done[1][:, i], '--', color=f'C{i}', alpha=0.6,
-                      label=f'{name}, simulated')
-    finish(axes, title, label)
+def draw_angles(axes: Axes, motion: Motion, execution: Execution | None = None) -> None:
+    """Draw the joint angles in a diagram."""
+    n = motion.arm.n_joints
+    _draw_joints(axes, motion, np.degrees(motion.coordinates[:, :n]), execution,
+                 np.degrees(execution.positions) if execution else None)
+    settle_limits(axes, _LEAST_ANGLE)
+    finish(axes, 'joint angles', 'angle [deg]')
 
 
-def draw_torques(axes: Axes, arm: Arm, joint_names: Sequence[str], motion: Motion,
-                 execution: Execution | None = None) -> None:
-    """Draw the torques between their bounds."""
-    _draw_joints(axes, 'motor torques and their bounds', 'torque [N m]', joint_names,
-                 motion.times[:-1], motion.torques[:-1],
-                 (execution.times, execution.torques) if execution else None)
-    _draw_bounds(axes, arm, motion)
+def draw_speeds(axes: Axes, motion: Motion, execution: Execution | None = None) -> None:
+    """Draw the joint speeds in a diagram."""
+    _draw_joints(axes, motion, motion.rates[:, :motion.arm.n_joints], execution,
+                 execution.speeds if execution else None)
+    settle_limits(axes, _LEAST_SPEED)
+    finish(axes, 'joint speeds', 'speed [rad/s]')
 
 
-def _draw_bounds(axes: Axes, arm: Arm, motion: Motion) -> None:
-    """Draw the bounds of the torques at the planned speeds."""
-    lower, upper = TorqueLimits.of(arm).bounds(motion.rates[:-1, :arm.n_joints])
-    for i in range(arm.n_joints):
-        if np.isfinite(upper[:, i]).all():
-            for bound in (lower, upper):
-                axes.plot(motion.times[:-1], bound[:, i], ':', color=f'C{i}', linewidth=1)
-    if np.isfinite(upper).any():
-        axes.plot([], [], ':', color='gray', label='bounds')
-    axes.legend(fontsize='small')
+def draw_torques(axes: Axes, motion: Motion, execution: Execution | None = None) -> None:
+    """Draw the torques in a diagram, with those of their bounds that are near."""
+    torques = motion.torques[:-1]
+    _draw_joints(axes, motion, torques, execution, execution.torques if execution else None)
+    n = motion.arm.n_joints
+    bounds = np.array(TorqueLimits.of(motion.arm).bounds(motion.rates[:-1, :n]))
+    shown = [torques, *([] if execution is None else [execution.torques])]
+    low, high = limits_beside(np.concatenate(shown), bounds, _LEAST_TORQUE)
+    _draw_bounds(axes, motion, bounds, (low, high))
+    axes.set_ylim(low, high)
+    axes.ticklabel_format(axis='y', useOffset=False)
+    finish(axes, 'motor torques and their bounds', 'torque [N m]')
 
 
-def draw_tip(axes: Axes, arm: Arm, motion: Motion,
-             execution: Execution | None = None) -> None:
-    """Draw the tip's path, with the arm at some instants."""
-    for k in np.linspace(0, motion.times.size - 1, _POSTURES).astype(int):
-        points = link_points(arm, motion.coordinates[k], 15).reshape(-1, 2)
-        axes.plot(*points.T, color='silver', linewidth=2 if k in (0, motion.times.size - 1) else 1)
-    axes.plot(*motion.tip.T, color='C2', label='tip')
+def _draw_joints(axes: Axes, motion: Motion, values: Array, execution: Execution | None,
+                 done: Array | None) -> None:
+    """Draw one line per joint, and what was carried out upon it."""
+    times, names = motion.times[:len(values)], motion.names
+    colours = [coordinate_colour(i) for i in range(len(names))]
+    if execution is None or done is None:
+        draw_columns(axes, times, values, names, colours)
+        return
+    for i, (name, colour) in enumerate(zip(names, colours, strict=True)):
+        axes.plot(times, values[:, i], color=colour, label=f'{name}, planned', **_BENEATH)
+    draw_columns(axes, execution.times, done, [f'{name}, simulated' for name in names], colours)
+
+
+def _draw_bounds(axes: Axes, motion: Motion, bounds: Array, shown: tuple[float, float]) -> None:
+    """Draw the bounds (2, k, n) of the torques; say how far those go that are cut off."""
+    low, high = shown
+    seen = (bounds >= low) & (bounds <= high)
+    for i, name in enumerate(motion.names):
+        if not np.isfinite(bounds[..., i]).all():
+            continue
+        for bound in bounds[..., i]:
+            axes.plot(motion.times[:-1], bound, ':', color=coordinate_colour(i), linewidth=1.2)
+        least, most = bounds[0, :, i].min(), bounds[1, :, i].max()
+        if least < low or most > high:
+            axes.plot([], [], ':', color=coordinate_colour(i),
+                      label=f'bounds of {name}: {least:.3g} to {most:.3g} N m')
+    if seen.any():
+        axes.plot([], [], ':', color=ASIDE, label='bounds of the torques')
+
+
+def draw_tip(axes: Axes, motion: Motion, execution: Execution | None = None) -> None:
+    """Draw the path of the tip in a diagram, with the arm at some instants."""
+    last = motion.times.size - 1
+    for k in np.linspace(0, last, _POSTURES).astype(int):
+        points = link_points(motion.arm, motion.coordinates[k], _STATIONS).reshape(-1, 2)
+        axes.plot(*points.T, color=ARM, linewidth=2.5 if k in (0, last) else 1)
+    beneath: Mapping[str, Any] = {'linewidth': 1.5} if execution is None else _BENEATH
+    axes.plot(*motion.tip.T, color=PLANNED, label='tip, planned', **beneath)
     if execution is not None:
-        axes.plot(*execution.tip.T, '--', color='C3', label='tip, simulated')
-    axes.plot(*motion.tip[0], 'o', color='C2', label='start')
-    axes.plot(*motion.tip[-1], 's', color='C2', label='goal')
+        axes.plot(*execution.tip.T, color=CARRIED_OUT, linewidth=1.2, label='tip, simulated')
+    axes.plot(*motion.tip[0], 'o', color=PLANNED, label='start')
+    axes.plot(*motion.tip[-1], 's', color=PLANNED, label='goal')
     axes.set_aspect('equal', adjustable='datalim')
     finish(axes, 'path of the tip', 'y [m]', 'x [m]')
 
 
-def _draw_modes(axes: Axes, arm: Arm, motion: Motion) -> None:
-    """Draw the modal displacements."""
-    for j, name in enumerate(arm.passive_names):
-        axes.plot(motion.times, motion.coordinates[:, arm.n_joints + j] * _MILLI,
-                  label=name.replace('_', ', '))
-    if not arm.n_modes:
+def draw_modes(axes: Axes, motion: Motion) -> None:
+    """Draw the modal displacements, and the twists of elastic joints, in a diagram."""
+    arm, n = motion.arm, motion.arm.n_joints
+    bending = motion.coordinates[:, n:] * _MILLI
+    if arm.n_passive:
+        draw_columns(axes, motion.times, bending,
+                     [name.replace('_', ', ') for name in arm.passive_names],
+                     [coordinate_colour(n + j) for j in range(arm.n_passive)])
+        settle_limits(axes, _LEAST_BENDING)
+    else:
         say(axes, 'rigid links')
-    finish(axes, 'modal displacements, as planned', 'displacement [mm]')
+    twists = bool(arm.elastic_joints)
+    finish(axes, 'modal displacements and twists, as planned' if twists
+           else 'modal displacements, as planned',
+           'displacement [mm, mrad]' if twists else 'displacement [mm]')
 
 
-def _draw_distance(axes: Axes, motion: Motion, execution: Execution | None) -> None:
+def draw_distance(axes: Axes, motion: Motion, execution: Execution | None = None) -> None:
     """Draw the distance of the tip from the goal; also after the arrival, if known."""
     tip = motion.tip if execution is None else execution.tip
     distance = np.linalg.norm(tip - motion.tip[-1], axis=1) * _MILLI
     if execution is None:
-        axes.plot(motion.times, distance, color='C2')
+        axes.plot(motion.times, distance, color=PLANNED, label='tip, planned')
+        settle_limits(axes, _LEAST_BENDING)
         finish(axes, 'distance of the tip from the goal, as planned', 'distance [mm]')
         return
-    axes.semilogy(execution.tip_times, np.maximum(distance, 1e-6), color='C3',
-                  label='distance to the goal')
-    axes.axvline(motion.times[-1], color='gray', linestyle=':', label='planned arrival')
-    finish(axes, 'simulated tip', 'distance [mm]')
+    axes.semilogy(execution.tip_times, np.maximum(distance, _LEAST_DISTANCE), color=CARRIED_OUT,
+                  label='tip, simulated')
+    axes.axvline(motion.times[-1], color=ASIDE, linestyle=':', label='planned arrival')
+    finish(axes, f'simulated tip from the goal (below {_LEAST_DISTANCE:g} mm drawn there)',
+           'distance [mm]')

@@ -2,34 +2,29 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
-from flex_planner.plotting.diagrams import Panel, Picture
-from flex_planner.plotting.figures import explain_lines, save
+from flex_planner.plotting import diagrams
+from flex_planner.plotting.figures import explain_lines, Picture
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 import numpy as np
 
 _WIDTH, _HEIGHT, _LEGEND = 5.2, 3.7, 0.5
 
 
-def draw_picture(folder: Path, picture: Picture) -> Path:
-    """Write a picture as NAME.png and return its path."""
+def draw_picture(picture: diagrams.Picture) -> Picture:
+    """Return a picture as a Matplotlib figure."""
     columns = min(picture.columns, len(picture.panels))
     rows = -(-len(picture.panels) // columns)
-    figure = Figure(figsize=(_WIDTH * columns, _HEIGHT * rows + _LEGEND), layout='constrained')
+    figure = Picture(_WIDTH * columns, _HEIGHT * rows + _LEGEND)
     axes = np.atleast_1d(figure.subplots(rows, columns)).ravel()
     for panel, one in zip(picture.panels, axes, strict=False):
         _draw(one, panel)
     for empty in axes[len(picture.panels):]:
         empty.set_axis_off()
     explain_lines(figure, list(axes[:len(picture.panels)]), 2 * columns)
-    path = folder / f'{picture.name}.png'
-    save(figure, path)
-    return path
+    return figure
 
 
-def _draw(axes: Axes, panel: Panel) -> None:
+def _draw(axes: Axes, panel: diagrams.Panel) -> None:
     """Draw a diagram."""
     for curve in panel.curves:
         axes.plot(curve.x, curve.y, curve.style, color=curve.color, linewidth=curve.width,

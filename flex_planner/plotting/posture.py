@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import link_points, payload_position
+from flex_planner.base.colours import ARM, COORDINATES, FLEXIBLE
 from flex_planner.base.validation import Array
 from matplotlib.axes import Axes
 import numpy as np
@@ -33,7 +34,7 @@ def draw_posture(axes: Axes, arm: Arm, rest: Array, payload_mass: float) -> None
     unbent = rest.copy()
     unbent[arm.n_joints:] = 0.0
     if rest[arm.n_joints:].any():
-        axes.plot(*link_points(arm, unbent).reshape(-1, 2).T, color='silver', linestyle='--',
+        axes.plot(*link_points(arm, unbent).reshape(-1, 2).T, color=ARM, linestyle='--',
                   label='without gravity')
     points = link_points(arm, rest, _STATIONS)
     _draw_links(axes, arm, points)
@@ -51,7 +52,7 @@ def _draw_links(axes: Axes, arm: Arm, points: Array) -> None:
     """Draw what bends thin and what does not thick."""
     along = np.linspace(0.0, 1.0, _STATIONS)
     for link, curve in zip(arm.links, points, strict=True):
-        axes.plot(*curve.T, color='C0', linewidth=2,
+        axes.plot(*curve.T, color=FLEXIBLE, linewidth=2,
                   label='flexible' if link.modes else None)
         ends = np.cumsum([0.0, *(one.share for one in link.sections)])
         stiff = [along >= 0.0] if not link.modes else [
@@ -68,9 +69,9 @@ def _draw_masses(axes: Axes, arm: Arm, points: Array, payload_mass: float,
     """Draw housings, nodes and payload with areas as their masses."""
     ends = np.vstack([np.zeros(2), points[:, -1]])
     kinds = {
-        'mass at joint or tip': ('C1', [node.mass for node in arm.nodes], ends),
-        'housing': ('C2', [joint.housing.mass for joint in arm.joints], ends[:-1]),
-        'payload': ('C3', [payload_mass], payload[None])}
+        'mass at joint or tip': (COORDINATES[4], [node.mass for node in arm.nodes], ends),
+        'housing': (COORDINATES[2], [joint.housing.mass for joint in arm.joints], ends[:-1]),
+        'payload': (COORDINATES[6], [payload_mass], payload[None])}
     largest = max(max(masses) for _, masses, _ in kinds.values())
     for name, (color, masses, places) in kinds.items():
         some = np.array(masses) > 0
@@ -86,5 +87,5 @@ def _draw_gravity(axes: Axes, arm: Arm) -> None:
     if not size:
         return
     x, y = _ARROW * arm.reach * arm.gravity / size
-    axes.annotate('', (x, y), (0.0, 0.0), arrowprops={'arrowstyle': '->', 'color': 'C4'})
-    axes.plot([], [], color='C4', label='gravity')
+    axes.annotate('', (x, y), (0.0, 0.0), arrowprops={'arrowstyle': '->', 'color': COORDINATES[3]})
+    axes.plot([], [], color=COORDINATES[3], label='gravity')

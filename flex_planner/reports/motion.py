@@ -54,7 +54,7 @@ def certificate_rows(certificate: Certificate) -> list[Row]:
     return [
         ('certificate', 'every plan is checked by independent means'),
         ('  collocation residual', f'{certificate.collocation_residual:.1e}'),
-        ('  boundary error (eq. 17)', f'{certificate.boundary_error:.1e}'),
+        ('  boundary error', f'{certificate.boundary_error:.1e}'),
         ('  Hamiltonian drift', f'{certificate.hamiltonian_drift:.1e}'),
         ('  re-simulated tip error', f'{certificate.tip_error * 1e3:.1e} mm'),
         ('  residual vibration', f'{certificate.residual_vibration * 1e3:.1e} mm')]

@@ -33,7 +33,7 @@ REMOVE = object()
 DENSITY = 'links[0].linear_density or mass or density'
 RIGIDITY = 'links[0].flexural_rigidity or youngs_modulus'
 SECTION = 'links[1].section or second_moment_of_area'
-FAMILY_NAMES = "one of ['pinned_pinned', 'clamped_free', 'clamped_mass']"
+FAMILY_NAMES = 'one of pinned_pinned, clamped_free, clamped_mass'
 MISTAKES: list[tuple[str, object, str, str]] = [
     # place in COMPLETE, value put there, field named, rest of the message
     ('name', REMOVE, 'name', 'must be given'),
@@ -82,7 +82,7 @@ MISTAKES: list[tuple[str, object, str, str]] = [
     ('links/0/modes', 2.5, 'links[0].modes', 'an integer from 0 to 8'),
     ('links/0/mode_family', 'sine', 'links[0].mode_family', FAMILY_NAMES),
     ('links/0/mode_family', ['sine'], 'links[0].mode_family', FAMILY_NAMES),
-    ('links/0/lenght', 0.5, 'links[0].lenght', 'left out: there is no such field'),
+    ('links/0/lenght', 0.5, 'links[0].lenght', 'there is no such field; did you mean length?'),
     ('joints', REMOVE, 'joints', 'must be given'),
     ('joints', [{}], 'number of joints', '2, one per link'),
     ('joints/0/motor', 8.0, 'joints[0].motor', 'a mapping of fields'),
@@ -92,7 +92,7 @@ MISTAKES: list[tuple[str, object, str, str]] = [
     ('joints/0/motor/max_speed', 0, 'joints[0].motor.max_speed', '> 0 rad/s'),
     ('joints/0/motor/power', 8.0, 'joints[0].motor.power', 'no such field'),
     ('joints/0/viscous_friction', -0.1, 'joints[0].viscous_friction', '>= 0 N m s/rad'),
-    ('joints/1/frction', 0.1, 'joints[1].frction', 'no such field'),
+    ('joints/1/frction', 0.1, 'joints[1].frction', 'no such field; did you mean friction?'),
     ('joints/1/friction', 0.1, 'joints[1].friction', 'a mapping of fields'),
     ('nodes', [{}], 'number of nodes', '0 or 3'),
     ('nodes/0/mass', -1, 'nodes[0].mass', '>= 0 kg'),

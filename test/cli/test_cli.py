@@ -187,6 +187,36 @@ def test_wrong_usage_is_told(capsys: pytest.CaptureFixture[str], arguments: list
     assert 'usage: flex-planner' in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(('arguments', 'message'), [
+    (['pln'], "'pln' must be one of arm, plan, "),
+    (['pln'], 'did you mean plan?'),
+    (['plan', 'x', '--duraton', '1'], '--duraton is no option of flex-planner plan; did you mean '
+     '--duration?'),
+    (['payload', 'x', *MOTION, '--methd=direct'], '--methd is no option of flex-planner payload; '
+     'did you mean --method?'),
+    (['payload', 'x', *MOTION, '--method', 'dierct'], "'dierct' must be one of direct, "
+     'incremental; did you mean direct?'),
+    (['arm', 'x', '--colour'], '--colour is no option of flex-planner arm\n'),
+    (['arm', 'x', 'y'], 'y is an argument too many for flex-planner arm\n')])
+def test_misspelt_option_is_told_with_what_is_meant(
+        capsys: pytest.CaptureFixture[str], arguments: list[str], message: str) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(arguments)
+    assert caught.value.code == 2
+    assert message in capsys.readouterr().err
+
+
+def test_misspelt_preset_is_told_with_what_is_meant(capsys: pytest.CaptureFixture[str]) -> None:
+    assert refused(capsys, 'desk-ram').endswith('; did you mean desk_arm?\n')
+
+
+def test_help_and_tables_name_no_equations(capsys: pytest.CaptureFixture[str]) -> None:
+    for command in ('arm', 'plan', 'payload', 'compare', 'map', 'report'):
+        with pytest.raises(SystemExit):
+            main([command, '--help'])
+    assert re.search(r'\beqs?[. ]', capsys.readouterr().out) is None
+
+
 def test_arm_comes_through_a_pipe(capsys: pytest.CaptureFixture[str],
                                   monkeypatch: pytest.MonkeyPatch) -> None:
     data = preset_files()['korayem_rigid'].read_bytes()

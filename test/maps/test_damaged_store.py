@@ -12,7 +12,7 @@ from flex_planner.base.progress import Monitor
 from flex_planner.cli import main
 from flex_planner.maps.block_solver import blocks
 from flex_planner.maps.cell_results import CellCode, CellResult
-from flex_planner.maps.draw_map import draw_map
+from flex_planner.maps.draw_map import save_map
 from flex_planner.maps.kept_motions import KeptMotion, signature
 from flex_planner.maps.map_starts import MapStarts
 from flex_planner.maps.store import MapStore, open_map
@@ -156,7 +156,7 @@ def test_blocks_in_each_other_s_place_are_not_taken(copy: Path) -> None:
 
 def test_a_damaged_map_is_drawn_as_one_that_is_not_finished(copy: Path, tmp_path: Path) -> None:
     (copy / 'max_payload/0.1').unlink()
-    assert draw_map(copy, tmp_path)
+    assert save_map(copy, tmp_path)
     assert (open_map(copy).code == CellCode.PENDING).sum() == 2
 
 

@@ -11,7 +11,7 @@ from flex_planner.arms.arm_files import find_arm_file
 from flex_planner.base.errors import FlexPlannerError
 from flex_planner.maps import draw_map as drawing
 from flex_planner.maps.cell_results import CellCode, CellResult
-from flex_planner.maps.draw_map import draw_map
+from flex_planner.maps.draw_map import save_map
 from flex_planner.maps.pictures import panels
 from flex_planner.maps.store import cells, MapStore, open_map
 from flex_planner.maps.study import load_study, Study
@@ -76,7 +76,7 @@ def figures(store: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Figure]:
     """Return the pictures of a map by their names, instead of files."""
     drawn: dict[str, Figure] = {}
     monkeypatch.setattr(drawing, 'save', lambda figure, path: drawn.update({path.stem: figure}))
-    draw_map(store, Path('nowhere'))
+    save_map(store, Path('nowhere'))
     return drawn
 
 
@@ -127,7 +127,7 @@ def test_map_is_drawn_as_suits_its_axes(tmp_path: Path, kind: str, outcome: Outc
 def test_pictures_are_png_and_not_blank(tmp_path: Path, kind: str) -> None:
     axes, fields, names = KINDS[kind]
     store = written(tmp_path, study(tmp_path, axes, **fields), every_failure)
-    paths = draw_map(store, tmp_path / 'new' / 'pictures')
+    paths = save_map(store, tmp_path / 'new' / 'pictures')
     assert {path.name for path in paths} == {f'{name}.png' for name in names}
     for path in paths:
         assert np.ptp(image.imread(path)[..., :3]) > 0.9
@@ -284,7 +284,7 @@ def test_map_whose_values_are_damaged_is_drawn_as_pending(tmp_path: Path) -> Non
     store = written(tmp_path, study(tmp_path, {'duration': [1, 2]}, **GOAL))
     for chunk in (store / 'max_payload').glob('[0-9]*'):
         chunk.write_bytes(b'damaged')
-    assert draw_map(store, tmp_path)
+    assert save_map(store, tmp_path)
     assert (open_map(store).code == CellCode.PENDING).all()
 
 
@@ -292,13 +292,13 @@ def test_map_that_is_damaged_beyond_its_blocks_is_named(tmp_path: Path) -> None:
     store = written(tmp_path, study(tmp_path, {'duration': [1, 2]}, **GOAL))
     (store / 'max_payload' / '.zarray').write_text('{')
     with pytest.raises(FlexPlannerError, match=r'map.zarr is damaged, .* max_payload'):
-        draw_map(store, tmp_path)
+        save_map(store, tmp_path)
 
 
 def test_what_is_no_map_or_no_folder_is_named(tmp_path: Path) -> None:
     with pytest.raises(FlexPlannerError, match='nothing.zarr'):
-        draw_map(tmp_path / 'nothing.zarr', tmp_path)
+        save_map(tmp_path / 'nothing.zarr', tmp_path)
     store = written(tmp_path, study(tmp_path, {'duration': [1, 2]}, **GOAL))
     (tmp_path / 'file').touch()
     with pytest.raises(OSError, match='file'):
-        draw_map(store, tmp_path / 'file')
+        save_map(store, tmp_path / 'file')

@@ -29,6 +29,7 @@ from flex_planner.paper.evidence import Claim, judge, Section, Table, Verdict
 from flex_planner.paper.run import compute_sections, STUDIES
 from flex_planner.paper.sections.slips import PrintedProblem
 from flex_planner.plotting.diagrams import Curve, Panel, Picture
+from flex_planner.plotting.figures import save
 from flex_planner.plotting.panels import draw_picture
 import numpy as np
 import pytest
@@ -221,7 +222,8 @@ def test_picture_with_any_number_of_diagrams(tmp_path: Path, count: int) -> None
     panels = tuple(Panel(title=f'p{k}', x_label='x', y_label='y', log=bool(k),
                          curves=(Curve(x=x, y=x + k + 1, label=f'c{k}'),))
                    for k in range(count))
-    path = draw_picture(tmp_path, Picture(name='n', caption='c', panels=panels))
+    path = tmp_path / 'n.png'
+    save(draw_picture(Picture(name='n', caption='c', panels=panels)), path)
     assert path == tmp_path / 'n.png'
     assert path.read_bytes().startswith(b'\x89PNG')
 

@@ -74,5 +74,5 @@ def test_a_duration_in_which_any_payload_is_carried() -> None:
     found = find_max_payload(task('korayem_rigid', START + [0.5, 0.3], 1000.0), monitor=monitor)
     assert found.status is PlanStatus.SOLVED
     assert found.payload == 1e6
-    assert 'a task may have no more' in found.message
+    assert 'a task may ask for no more' in found.message
     assert monitor.iteration < 50

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from flex_planner.arms.arm import Arm, Joint, Motor
-from flex_planner.plotting import draw_motion, Execution
+from flex_planner.plotting import draw_motion, Execution, save
 import matplotlib
 import numpy as np
-from plotting_support import motion, NAMES, pixels, TIMES
+from plotting_support import motion, pixels, TIMES
 import pytest
 
 
@@ -36,7 +36,7 @@ def half_limited_arm(rigid_arm: Arm) -> Arm:
 def test_motion_is_drawn_as_png(tmp_path: Path, request: pytest.FixtureRequest, arm: str,
                                 done: Execution | None) -> None:
     drawn: Arm = request.getfixturevalue(arm)
-    draw_motion(tmp_path / 'motion.png', drawn, NAMES, motion(drawn), done)
+    save(draw_motion(motion(drawn), done), tmp_path / 'motion.png')
     picture = pixels(tmp_path / 'motion.png')
     assert picture.shape[0] > 600
     assert picture.shape[1] > 1000
@@ -47,8 +47,8 @@ def test_folder_is_made_and_a_picture_replaced(tmp_path: Path, rigid_arm: Arm,
                                                monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / 'new' / 'motion.png'
     monkeypatch.setitem(matplotlib.rcParams, 'backend', 'svg')
-    draw_motion(path, rigid_arm, NAMES, motion(rigid_arm))
+    save(draw_motion(motion(rigid_arm)), path)
     path.write_text('old')
-    draw_motion(path, rigid_arm, NAMES, motion(rigid_arm), execution())
+    save(draw_motion(motion(rigid_arm), execution()), path)
     assert pixels(path).size
     assert matplotlib.rcParams['backend'] == 'svg'  # that of the user stays

@@ -10,9 +10,9 @@ from flex_planner.capacity.incremental import PayloadTrial
 from flex_planner.capacity.results import MaxPayload, PayloadFront, PayloadMethod
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import PlanStatus
-from flex_planner.plotting import draw_max_payload
+from flex_planner.plotting import draw_max_payload, save
 import numpy as np
-from plotting_support import motion, NAMES, pixels
+from plotting_support import motion, pixels
 import pytest
 
 
@@ -44,5 +44,5 @@ def test_search_for_the_largest_payload_is_drawn(tmp_path: Path, rigid_arm: Arm,
                                                  found: dict[str, Any]) -> None:
     path = tmp_path / 'payload.png'
     carried = motion(rigid_arm) if 'status' not in found else None
-    draw_max_payload(path, search(rigid_arm, method, **found), NAMES, carried)
+    save(draw_max_payload(search(rigid_arm, method, **found), carried), path)
     assert np.ptp(pixels(path)[..., :3]) > 0.9  # not blank

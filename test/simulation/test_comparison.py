@@ -19,7 +19,7 @@ from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.planned_torque import PlannedTorque
 from flex_planner.optimal_control.task import postures_from_points, Task
 from flex_planner.planning.plan import PlanStatus
-from flex_planner.plotting.comparison import draw_comparison
+from flex_planner.plotting import draw_comparison, save
 from flex_planner.reports.comparison import comparison_rows, comparison_table
 from flex_planner.simulation.comparison import compare, Comparison
 from flex_planner.simulation.execution import ExecutionMode
@@ -132,7 +132,7 @@ def test_plan_that_fails_leaves_its_ways_out(ei5_arm: Arm, ei5_model: ArmModel,
     assert found.flexible.status is PlanStatus.TIMEOUT
     assert comparison_table(found) == ''
     assert dict(comparison_rows(found))['planned rigid'].startswith('time limit reached')
-    draw_comparison(tmp_path / 'none.png', found)
+    save(draw_comparison(found), tmp_path / 'none.png')
 
 
 def test_simulation_can_be_canceled(ei5_arm: Arm, ei5_model: ArmModel, paper_task: Any) -> None:
@@ -176,7 +176,7 @@ def test_table_says_what_was_compared(compared: Comparison) -> None:
 
 def test_picture_is_drawn(compared: Comparison, tmp_path: Path) -> None:
     path = tmp_path / 'comparison.png'
-    draw_comparison(path, compared)
+    save(draw_comparison(compared), path)
     picture = matplotlib.image.imread(path)
     assert picture.shape[0] > 1000
     assert np.ptp(picture[..., :3]) > 0.9  # not blank

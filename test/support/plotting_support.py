@@ -19,8 +19,8 @@ def motion(arm: Arm) -> Motion:
     shape = (TIMES.size, arm.n_coordinates)
     wave = np.sin(np.outer(TIMES, np.linspace(1, 2, arm.n_coordinates)))
     assert wave.shape == shape
-    return Motion(times=TIMES, coordinates=0.1 * wave, rates=0.2 * wave, torques=wave[:, :2],
-                  tip=wave[:, :2])
+    return Motion(arm=arm, joint_names=NAMES, times=TIMES, coordinates=0.1 * wave,
+                  rates=0.2 * wave, torques=wave[:, :2], tip=wave[:, :2])
 
 
 def pixels(path: Path) -> Any:

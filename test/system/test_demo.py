@@ -36,7 +36,7 @@ def table(folder: Path, ros: None) -> dict[str, str]:
 def test_table_shows_motion_certificate_and_files(table: dict[str, str]) -> None:
     assert list(table) == [
         'arm', 'motion', 'planned in', 'warning', 'on the topic after', 'cost J', 'joint 1',
-        'joint 2', 'certificate', 'collocation residual', 'boundary error (eq. 17)',
+        'joint 2', 'certificate', 'collocation residual', 'boundary error',
         'Hamiltonian drift', 're-simulated tip error', 'residual vibration',
         'simulated arm, at rest', 'picture', 'recording', 'output folder']
     assert table['arm'] == 'Korayem 2009 two-link arm, EI = 50 N m^2'

@@ -38,10 +38,10 @@ def checkout(tmp_path):
     return tmp_path
 
 
-def run_setup(checkout, **variables):
+def run_setup(checkout, *options, **variables):
     return subprocess.run(
-        [sys.executable, 'tools/setup_environment.py'], cwd=checkout, capture_output=True,
-        text=True, env={**os.environ, **variables}, timeout=120,
+        [sys.executable, 'tools/setup_environment.py', *options], cwd=checkout, text=True,
+        capture_output=True, env={**os.environ, **variables}, timeout=120,
     )
 
 
@@ -167,6 +167,53 @@ def test_failing_pip_is_reported_and_an_unfinished_venv_replaced(checkout):
     assert 'no_such_file.whl' in done.stderr
     assert 'Traceback' not in done.stderr
     assert not (checkout / '.venv' / 'leftover').exists()
+
+
+def test_library_needs_no_compiler_and_has_a_venv_of_its_own(checkout):
+    (checkout / 'requirements' / 'runtime.txt').write_text('# nothing\n')
+    (checkout / 'requirements' / 'ros.txt').write_text('./no_such_file.whl\n')
+    done = run_setup(checkout, '--library', PATH='')
+    assert (done.returncode, done.stderr) == (0, '')
+    assert done.stdout.startswith('setup: creating .venv-library with Python 3.')
+    assert (checkout / '.venv-library' / 'bin' / 'pip').exists()
+    assert not (checkout / '.venv').exists()
+    assert run_setup(checkout, '--library').stdout == ''  # it is up to date
+
+
+def test_progress_of_pip_says_what_and_how_far(setup_environment, tmp_path, capsys):
+    progress = setup_environment.PipProgress('installing', tmp_path, 9)
+    for line in ('Collecting numpy==2.2.6 (from -r runtime.txt (line 7))',
+                 'Downloading numpy-2.2.6.whl (16.8 MB)', 'Collecting scipy',
+                 'Downloading scipy.whl.metadata (61 kB)', 'Requirement already satisfied: six'):
+        progress.hear(line)
+    assert progress.state() == '2 of about 9 packages found, 17 MB downloaded, scipy'
+    progress.hear('Installing collected packages: a, b, c')
+    for name in 'ab':
+        (tmp_path / 'lib' / 'python3.11' / 'site-packages' / f'{name}.dist-info').mkdir(
+            parents=True)
+    assert progress.state() == '2 of 3 packages installed'
+    progress.shown -= progress.SELDOM
+    progress.show()
+    progress.show()  # not again so soon
+    assert capsys.readouterr().out.splitlines() == [
+        'setup: installing', 'setup:   2 of 3 packages installed, 0 s']
+
+
+def test_progress_of_a_build_is_that_of_its_makefiles(setup_environment):
+    progress = setup_environment.BuildProgress('building')
+    assert progress.state() == ''
+    for line in ('[  7%] Building C object a.c.o', 'gcc: note', '[100%] Built target a'):
+        progress.hear(line)
+    assert progress.state() == '100%'
+
+
+def test_output_of_a_command_comes_whole_and_its_end_with_a_failure(setup_environment):
+    progress, code = setup_environment.Progress('running'), 'print("é" * 100_000); print("end")'
+    command = [sys.executable, '-X', 'utf8', '-c']
+    assert setup_environment.run([*command, code], 'Failed.', progress) == (
+        'é' * 100_000 + '\nend\n')
+    with pytest.raises(setup_environment.SetupError, match=r'Failed[.] The end .*\n    why$'):
+        setup_environment.run([*command, 'print("why"); exit(3)'], 'Failed.', progress)
 
 
 @pytest.mark.skipif(not (ROOT / '.venv').exists(), reason='needs the environment of make setup')

@@ -1,4 +1,4 @@
-"""The package as pip installs it: a wheel in an environment that has neither ROS nor sources."""
+"""The package as pip installs it: a wheel of its source distribution, without ROS or sources."""
 
 from __future__ import annotations
 
@@ -9,13 +9,18 @@ import re
 import shutil
 import subprocess
 import sys
+import tarfile
 
 from packaging.requirements import Requirement
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-SOURCES = ('flex_planner', 'flex_planner_interfaces', 'config', 'launch', 'resource', 'setup.py',
-           'setup.cfg', 'pyproject.toml', 'package.xml', 'LICENSE', 'README.md')
+SOURCES = ('bench', 'config', 'docs', 'examples', 'flex_planner', 'flex_planner_interfaces',
+           'launch', 'requirements', 'resource', 'test', 'tools', 'CHANGELOG.rst',
+           'CONTRIBUTING.md', 'LICENSE', 'MANIFEST.in', 'Makefile', 'README.md', 'package.xml',
+           'pyproject.toml', 'setup.cfg', 'setup.py')
+MAPS = ('dask', 'distributed', 'numcodecs', 'xarray', 'zarr')
+IGNORED = shutil.ignore_patterns('__pycache__', '*.pyc', 'node_modules')
 SECONDS = 200  # longest time of a step, beside other processes
 PLAN = ('plan', 'korayem_rigid', '--from', '0.5,0', '--to', '0.5,0.5', '--duration', '1',
         '--effort-weights', '0.125,0.125', '--search', 'fast', '--no-plot')
@@ -25,9 +30,12 @@ def requirements() -> set[str]:
     """Return the distributions that the package needs, and those that they need."""
     found: set[str] = set()
     left = list(metadata.requires('flex_planner') or ())
+    # for maps, too
+    left += [line for line in left if "extra == 'maps'" in line.replace('"', "'")]
     while left:
         wanted = Requirement(left.pop())
-        if wanted.name in found or (wanted.marker and not wanted.marker.evaluate({'extra': ''})):
+        extras = {'extra': ''} if wanted.name not in MAPS else {'extra': 'maps'}
+        if wanted.name in found or (wanted.marker and not wanted.marker.evaluate(extras)):
             continue
         found.add(wanted.name)
         left += metadata.requires(wanted.name) or ()
@@ -52,11 +60,15 @@ class Installation:
         self.path = folder / 'venv'
         for name in SOURCES:
             copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
-            copy(ROOT / name, folder / 'source' / name)
+            left_out = {'ignore': IGNORED} if (ROOT / name).is_dir() else {}
+            copy(ROOT / name, folder / 'source' / name, **left_out)
         pip = [sys.executable, '-m', 'pip']
-        self.call(*pip, 'wheel', '--no-deps', '--no-build-isolation', '--no-index', '-w',
-                  str(folder), str(folder / 'source'))
+        self.call(sys.executable, '-c', 'import os, runpy, sys; os.chdir("source"); sys.argv = '
+                  '["setup.py", "-q", "sdist", "-d", ".."]; runpy.run_path("setup.py")')
         shutil.rmtree(folder / 'source')
+        (self.archive,) = folder.glob('*.tar.gz')
+        self.call(*pip, 'wheel', '--no-deps', '--no-build-isolation', '--no-index', '-w',
+                  str(folder), str(self.archive))
         self.call(sys.executable, '-m', 'venv', '--without-pip', str(self.path))
         python = self.path / 'bin' / 'python'
         (wheel,) = folder.glob('*.whl')
@@ -104,6 +116,33 @@ def test_wheel_without_ros_plans_records_reports_checks_and_recovers(
     assert 'messages' in installed.flex_planner('recover', str(cut))
     again = installed.flex_planner('report', 'cut_recovered', '--output', 'cut.html')
     assert 'Solved and certified' in again
+
+
+def test_source_distribution_holds_what_is_built_of_it(installed: Installation) -> None:
+    with tarfile.open(installed.archive) as archive:
+        names = {name.partition('/')[2] for name in archive.getnames()}
+    kept = {str(path.relative_to(ROOT)) for folder in ('flex_planner', 'flex_planner_interfaces',
+                                                       'config', 'launch', 'resource')
+            for path in (ROOT / folder).rglob('*') if path.is_file()
+            and path.suffix != '.pyc' and '__pycache__' not in path.parts}
+    assert kept - names == set()
+    assert {'package.xml', 'setup.cfg', 'CHANGELOG.rst', 'LICENSE', 'Makefile'} <= names
+
+
+def test_wheel_computes_and_draws_maps(installed: Installation) -> None:
+    (installed.folder / 'study.yaml').write_text(
+        'name: small\narm: korayem_rigid\nquantity: min_effort\nduration: 1.0\n'
+        'start: [0.5, 0.0]\naxes:\n  goal_x: [0.4, 0.5]\n  goal_y: [0.4, 0.5]\n')
+    said = installed.flex_planner('map', 'study.yaml', '--workers', '1')
+    assert 'solved                   4' in said
+    assert list((installed.folder / 'output' / 'maps').glob('study/*.png'))
+
+
+def test_every_preset_and_template_is_inside(installed: Installation) -> None:
+    said = installed.call(str(installed.path / 'bin' / 'python'), '-c',
+                          'from flex_planner.arms.arm_files import *; '
+                          'print(*sorted(preset_files()), read_arm_template()[:1])')
+    assert said.split() == [*sorted(path.stem for path in ROOT.glob('config/arms/*.yaml')), '#']
 
 
 def test_what_needs_ros_says_so_in_a_sentence(installed: Installation) -> None:

@@ -25,8 +25,10 @@ from flex_planner.reports.arm import describe_arm, standard_postures
 
 def add_command(commands: Commands) -> None:
     """Add ``flex-planner arm``."""
-    parser = commands.add_parser('arm',
-                                 help='print the properties of an arm, draw it')
+    parser = commands.add_parser(
+        'arm', help='print the properties of an arm, and draw it',
+        description='Print masses, limits, natural frequencies and deflections of an arm, and '
+        'draw it with the shapes that its links bend in.')
     add_arm(parser, optional=True)
     parser.add_argument('--template', nargs='?', const='-', metavar='FILE',
                         help='write an arm file with comments to start from, into a new file or '
@@ -39,7 +41,7 @@ def add_command(commands: Commands) -> None:
     parser.add_argument('--plot', type=path_argument, metavar='PNG',
                         help='picture of the arm and its modes (default: DIR/<arm>_arm.png)')
     add_folder(parser)
-    parser.add_argument('--no-plot', action='store_true', help='draw nothing')
+    parser.add_argument('--no-plot', action='store_true', help='draw no pictures')
     parser.set_defaults(run=lambda options: _run(parser, options))
 
 
@@ -78,9 +80,9 @@ def _run(parser: argparse.ArgumentParser, options: argparse.Namespace) -> int:
         return 0
 
     def draw(path: Path) -> None:
-        from flex_planner.plotting import draw_arm
+        from flex_planner.plotting import draw_arm, save
 
-        draw_arm(path, model, postures, payload)
+        save(draw_arm(model, postures, payload), path)
 
     print()
     path = options.plot or options.output / f'{file_stem(options.arm)}_arm.png'

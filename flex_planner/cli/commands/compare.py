@@ -56,7 +56,7 @@ def add_command(commands: Commands) -> None:
     add('--settling', type=number_argument, default=1.0, metavar='S',
         help='time to watch the arm after its arrival (default: %(default)g)')
     add_folder(parser)
-    add('--no-plot', action='store_true', help='draw nothing')
+    add('--no-plot', action='store_true', help='draw no pictures')
     parser.set_defaults(run=_compare)
 
 
@@ -90,9 +90,9 @@ def _compare(options: argparse.Namespace) -> int:
 def _draw(options: argparse.Namespace, found: Comparison) -> Iterator[Row]:
     """Draw the results."""
     def draw(path: Path) -> None:
-        from flex_planner.plotting import draw_comparison
+        from flex_planner.plotting import draw_comparison, save
 
-        draw_comparison(path, found)
+        save(draw_comparison(found), path)
 
     yield from drawn('picture', options.output / f'{file_stem(options.arm)}_comparison.png', draw)
     yield 'output folder', str(options.output)

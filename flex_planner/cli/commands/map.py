@@ -44,7 +44,7 @@ def add_command(commands: Commands) -> None:
         help='compute on the Dask cluster with this scheduler, such as tcp://host:8786')
     add('--draw', action='store_true', help='draw the stored cells, compute nothing')
     add('--reset', action='store_true', help='remove the existing map, and start anew')
-    add('--no-plot', action='store_true', help='draw nothing')
+    add('--no-plot', action='store_true', help='draw no pictures')
     parser.set_defaults(run=_map)
 
 
@@ -70,10 +70,10 @@ def _place(options: argparse.Namespace) -> Path:
 
 def _draw(path: Path) -> int:
     """Draw a map in a folder beside its store."""
-    from flex_planner.maps.draw_map import draw_map
+    from flex_planner.maps.draw_map import save_map
 
     with SIGNALS.patient():
-        pictures = draw_map(path, path.with_suffix(''))
+        pictures = save_map(path, path.with_suffix(''))
     print(table([('picture', str(picture)) for picture in pictures]))
     return 0
 
@@ -103,9 +103,9 @@ def _pictures(path: Path) -> Iterator[Row]:
     pictures: list[Path] = []
 
     def draw(folder: Path) -> None:
-        from flex_planner.maps.draw_map import draw_map
+        from flex_planner.maps.draw_map import save_map
 
-        pictures.extend(draw_map(path, folder))
+        pictures.extend(save_map(path, folder))
 
     for _ in drawn('pictures', path.with_suffix(''), draw):
         yield from (('picture', str(picture)) for picture in pictures)

@@ -34,7 +34,7 @@ def add_command(commands: Commands) -> None:
     add('--reduced', action='store_true', help='leave out the parts that take long')
     add('--processes', type=integer_argument, default=os.cpu_count() or 1, metavar='N',
         help='sections computed at a time (default: one per processor, %(default)s)')
-    add('--no-plot', action='store_true', help='draw nothing')
+    add('--no-plot', action='store_true', help='draw no pictures')
     parser.set_defaults(run=_paper)
 
 

@@ -83,8 +83,8 @@ def _add_kinds(parser: argparse.ArgumentParser) -> None:
     """Add the option for how many kinds of motion are looked for."""
     parser.add_argument('--search', choices=[effort.value for effort in SearchEffort],
                         default=SearchEffort.NORMAL.value,
-                        help='how many kinds of motion are looked for: fast follows one '
-                        '(default: %(default)s)')
+                        help='effort of the search for other kinds of motion: fast follows '
+                        'the first (default: %(default)s)')
 
 
 def _plan(options: argparse.Namespace) -> int:

@@ -61,7 +61,7 @@ def _add_replay(commands: Commands) -> None:
 def _add_report(commands: Commands) -> None:
     parser = _add_command(
         commands, 'report', _report,
-        'make an HTML page of a recorded plan, check it against the model',
+        'make an HTML page of a recorded plan, and check it',
         'Make one HTML file of a recorded request: task, outcome, certificate, and plots to zoom '
         'into. It needs neither ROS nor a network.')
     parser.add_argument('--output', type=path_argument, metavar='HTML',

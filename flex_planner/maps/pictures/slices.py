@@ -14,7 +14,7 @@ from flex_planner.maps.pictures.panels import (
     scale,
     show_scale,
 )
-from flex_planner.plotting.figures import say
+from flex_planner.plotting.figures import Picture, say
 import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize, to_hex
@@ -62,8 +62,7 @@ def _create_diagrams(count: int, failed: int) -> tuple[Figure, list[tuple[Axes, 
     """Return a figure with diagrams in rows, each with a strip for so many failed lines."""
     (columns, rows), strip = grid_shape(count), 0.1 + 0.14 * failed
     heights = [_HIGH, strip] if failed else [_HIGH]
-    figure = Figure(figsize=(_WIDE * columns + 1.8, (sum(heights) + 0.5) * rows + 0.8),
-                    layout='constrained')
+    figure = Picture(_WIDE * columns + 1.8, (sum(heights) + 0.5) * rows + 0.8)
     grid = figure.subplots(rows * len(heights), columns, height_ratios=heights * rows,
                            squeeze=False)
     upper = grid[::len(heights)].ravel()

@@ -15,6 +15,7 @@ import time
 
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.progress import Monitor, StoppedError
+from flex_planner.base.suggestions import one_of
 from flex_planner.base.validation import Array, integer, number, vector
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.direct.ipopt_crew import solve_each
@@ -75,7 +76,7 @@ class DirectSettings:
 
     def __post_init__(self) -> None:
         if self.scheme not in SCHEMES:
-            raise InvalidValueError('scheme', self.scheme, f'one of {", ".join(SCHEMES)}')
+            raise InvalidValueError('scheme', self.scheme, one_of(self.scheme, SCHEMES))
         integer('degree', self.degree, at_least=1, at_most=12)
         integer('intervals', self.intervals, at_least=2, at_most=20000)
         integer('max_iterations', self.max_iterations, at_least=1, at_most=100000)

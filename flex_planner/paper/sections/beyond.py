@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from flex_planner.base.colours import COORDINATES
 from flex_planner.base.validation import Array
 from flex_planner.capacity.min_duration import payload_against_duration
 from flex_planner.optimal_control.task import Task
@@ -17,7 +18,7 @@ from flex_planner.paper.cases import (
     STIFFNESS_LIMITS,
 )
 from flex_planner.paper.evidence import Claim, judge, Section, Table
-from flex_planner.plotting.diagrams import Curve, Panel, Picture
+from flex_planner.plotting.diagrams import Curve, MODE_COLOURS, OPEN_LOOP, Panel, Picture
 from flex_planner.simulation.comparison import compare
 from flex_planner.simulation.execution import ExecutionMode, ExecutionResult
 import numpy as np
@@ -35,10 +36,10 @@ _MODES = (ExecutionMode.FLEXIBLE_OPEN, ExecutionMode.RIGID_OPEN, ExecutionMode.F
 def front(*, reduced: bool = False) -> Section:
     """Return the least effort of each payload, and the largest payload for each duration."""
     arms = {'rigid': paper_arm(math.inf), f'EI = {_SOFT:g} N m^2': paper_arm(_SOFT, 1)}
-    fronts = [_front(point_to_point(arm, 1.0), name, f'C{k}')
+    fronts = [_front(point_to_point(arm, 1.0), name, COORDINATES[k])
               for k, (name, arm) in enumerate(arms.items())]
     durations = _DURATIONS[2::4] if reduced else _DURATIONS
-    limits = [_against_duration(point_to_point(arm, 1.0), durations, name, f'C{k}')
+    limits = [_against_duration(point_to_point(arm, 1.0), durations, name, COORDINATES[k])
               for k, (name, arm) in enumerate(arms.items())]
     rows = tuple((f'{duration:.2f}', *(f'{curve.y[k]:.4f}' for curve in limits))
                  for k, duration in enumerate(limits[0].x))
@@ -137,12 +138,13 @@ def feedforward(*, reduced: bool = False) -> Section:
 
 def _distances(results: dict[ExecutionMode, ExecutionResult], goal: Array) -> Picture:
     curves = []
-    for k, (mode, one) in enumerate(results.items()):
+    for mode, one in results.items():
         execution = one.execution
         after = execution.times >= one.arrival
         distance = np.linalg.norm(execution.tip[after] - goal, axis=1) * 1e3
-        curves.append(Curve(x=execution.times[after] - one.arrival,
-                            y=np.maximum(distance, 1e-6), label=mode.value, color=f'C{k}'))
+        curves.append(Curve(x=execution.times[after] - one.arrival, label=mode.value,
+                            y=np.maximum(distance, 1e-4), color=MODE_COLOURS[mode],
+                            style='--' if mode in OPEN_LOOP else '-'))
     return Picture(name='feedforward', columns=1, caption='Distance of the tip from the goal '
                    'after its arrival', panels=(Panel(
                        title='distance of the tip from the goal', x_label='time after arrival [s]',

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from flex_planner.arms.arm_files import load_arm
+from flex_planner.base.colours import COORDINATES
 from flex_planner.base.validation import Array
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectSettings
@@ -113,12 +114,12 @@ def _picture(rigid: Swing, swings: dict[float, Swing]) -> Picture:
     for joint in range(2):
         curves = [Curve(x=rigid.times, y=rigid.states[:, joint], label='rigid', color='black')]
         curves += [Curve(x=one.times, y=one.states[:, joint], label=f'EI = {rigidity:g} N m^2',
-                         color=f'C{k}', style='--')
+                         color=COORDINATES[k], style='--')
                    for k, (rigidity, one) in enumerate(swings.items())]
         panels.append(Panel(title=f'joint {joint + 1}', x_label='time [s]',
                             y_label='angle [rad]', curves=tuple(curves)))
     for joint in range(2):
-        curves = [Curve(x=one.times, color=f'C{k}', label=f'EI = {rigidity:g} N m^2',
+        curves = [Curve(x=one.times, color=COORDINATES[k], label=f'EI = {rigidity:g} N m^2',
                         y=(one.states[:, joint] - rigid.states[:, joint]) * 1e3, style='--')
                   for k, (rigidity, one) in enumerate(swings.items())]
         panels.append(Panel(title=f'joint {joint + 1}, flexible less rigid', x_label='time [s]',

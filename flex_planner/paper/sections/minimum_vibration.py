@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from flex_planner.base.colours import ASIDE, COORDINATES
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.statics import natural_modes
 from flex_planner.optimal_control.arm_model import ArmModel
@@ -133,7 +134,7 @@ def _acceleration(samples: Samples) -> Array:
 
 
 def _acceleration_panel(cases: dict[str, Samples]) -> Panel:
-    curves = [Curve(x=samples.times[2:-2], label=label, color=f'C{k}',
+    curves = [Curve(x=samples.times[2:-2], label=label, color=COORDINATES[k],
                     y=np.linalg.norm(_fast_acceleration(samples), axis=1))
               for k, (label, samples) in enumerate(cases.items())]
     return Panel(title='acceleration of the tip above 10 Hz', x_label='time [s]',
@@ -182,8 +183,8 @@ def _spectra(cases: dict[str, Samples], plan: Plan) -> tuple[Panel, ...]:
                 shown_power = power[seen, j]
                 low, high = min(low, shown_power.min()), max(high, shown_power.max())
                 curves.append(Curve(x=frequencies[seen], y=shown_power, label=label,
-                                    color=f'C{k}'))
-            curves += [Curve(x=np.full(2, line), y=np.array([low, high]), color='gray', style=':',
+                                    color=COORDINATES[k]))
+            curves += [Curve(x=np.full(2, line), y=np.array([low, high]), color=ASIDE, style=':',
                              label='' if k else 'natural frequencies')
                        for k, line in enumerate(lines)]
             unit = 'mm^2' if kind == 'displacement' else '(mm/s)^2'

@@ -5,6 +5,7 @@ from __future__ import annotations
 from enum import Enum
 
 from flex_planner.base.errors import InvalidValueError
+from flex_planner.base.suggestions import one_of
 
 
 class SearchEffort(Enum):
@@ -28,7 +29,7 @@ class SearchEffort(Enum):
             return given
         names = [effort.value for effort in cls]
         if given not in names:
-            raise InvalidValueError('search', given, f'one of {", ".join(names)}')
+            raise InvalidValueError('search', given, one_of(given, names))
         return cls(given)
 
     @property

@@ -21,11 +21,11 @@ def _links(arm: Arm) -> ReportTable:
     """Return the links as beams or bodies."""
     columns = {
         'length [m]': [f'{link.length:g}' for link in arm.links],
-        'density [kg/m]': [f'{link.linear_density:g}' for link in arm.links],
-        'E I [N m²]': [f'{link.flexural_rigidity:g}' for link in arm.links],
+        'linear density [kg/m]': [f'{link.linear_density:g}' for link in arm.links],
+        'flexural rigidity E I [N m²]': [f'{link.flexural_rigidity:g}' for link in arm.links],
         'modes': [f'{link.modes} {link.mode_family}' if link.modes else 'rigid'
                   for link in arm.links],
-        'damping': [damping_text(link) for link in arm.links]}
+        'damping ratio': [damping_text(link) for link in arm.links]}
     columns |= _told({
         'sections': [sections_text(link) if link.sections else '' for link in arm.links],
         'centre of mass [m]': [_center(link) for link in arm.links],
@@ -41,14 +41,15 @@ def _joints(arm: Arm) -> ReportTable:
         'no-load speed [rad/s]': [f'{joint.motor.no_load_speed:g}' for joint in joints],
         'largest torque [N m]': [_cap(joint) for joint in joints],
         'largest speed [rad/s]': [f'{joint.motor.max_speed:g}' for joint in joints],
-        'angles [deg]': [_angles(joint) for joint in joints],
-        'friction [N m s/rad]': [f'{joint.viscous_friction:g}' for joint in joints]}
+        'joint limits [deg]': [_angles(joint) for joint in joints],
+        'viscous friction [N m s/rad]': [f'{joint.viscous_friction:g}' for joint in joints]}
     columns |= _told({
         'Coulomb friction [N m]': [_coulomb(joint) for joint in joints],
-        'gear': [f'{joint.motor.gear_ratio:g}' if joint.motor.gear_ratio != 1 else ''
-                 for joint in joints],
-        'rotor at the joint [kg m²]': [_number(joint.motor.reflected_inertia) for joint in joints],
-        'spring [N m/rad, N m s/rad]': [
+        'gear ratio': [f'{joint.motor.gear_ratio:g}' if joint.motor.gear_ratio != 1 else ''
+                       for joint in joints],
+        'rotor inertia at the joint [kg m²]': [
+            _number(joint.motor.reflected_inertia) for joint in joints],
+        'joint stiffness, damping [N m/rad, N m s/rad]': [
             f'{joint.elasticity.stiffness:g}, {joint.elasticity.damping:g}'
             if joint.elasticity else '' for joint in joints]})
     return _table('Joints', 'joint', columns)

@@ -58,7 +58,7 @@ def optimality_findings(model: ArmModel, motion: RecordedMotion, parameters: Par
     return [
         Finding(name='torque beyond its bounds', unit='N m', limit=size,
                 value=max(float(beyond.max()), 0.0)),
-        Finding(name='torques against eq. (14)', unit='N m', limit=size,
+        Finding(name='torques against the costates', unit='N m', limit=size,
                 value=float(np.abs(expected - efforts).max())),
         Finding(name='Hamiltonian drift', unit='', limit=limits.hamiltonian_drift,
                 value=float(np.ptp(controls.hamiltonian)) / scale)]

@@ -1,8 +1,9 @@
 """
 A report as one HTML file that needs nothing else.
 
-The plots are drawn by ``plots.js`` beside this module, which is copied into the page: a library
-like plotly would make it 4 MB larger and would be one more dependency.
+The plots are drawn by ``plots.js`` and the moving arm by ``arm.js`` beside this module, which
+are copied into the page: a library like plotly would make it 4 MB larger, and would be one more
+dependency.
 
 """
 
@@ -23,6 +24,7 @@ from flex_planner.base.text_files import write_text
 from flex_planner.base.validation import Array
 from flex_planner.base.version import VERSION
 from flex_planner.recording import shown_path
+from flex_planner.reports.recording.animation import animation
 from flex_planner.reports.recording.contents import RecordedRequest
 from flex_planner.reports.recording.findings import MotionCheck
 from flex_planner.reports.recording.frequencies import NaturalFrequencies
@@ -31,8 +33,9 @@ from flex_planner.reports.recording.report_table import ReportTable
 from flex_planner.reports.recording.tables import tables, verdict
 
 _FOLDER = Path(__file__).parent
+_SCRIPTS = ('arm.js', 'plots.js')
 _DIGITS = 9
-_PLAIN = ('key', 'title', 'x_label', 'y_label', 'group', 'log', 'equal')
+_PLAIN = ('key', 'title', 'x_label', 'y_label', 'group', 'log', 'equal', 'least')
 
 
 def report_page(request: RecordedRequest, check: MotionCheck | None = None) -> str:
@@ -46,8 +49,9 @@ def report_page(request: RecordedRequest, check: MotionCheck | None = None) -> s
         title=_escape(f'{kind}: {request.arm.name}'), kind='' if passed else 'failed',
         file=_escape(f'{shown_path(request.path.name)}, report of flex_planner {VERSION}'),
         verdict=_escape(verdict(request, check)), hidden='' if drawn else 'hidden',
-        data=_json(_content(tables(request, check, frequencies), drawn)),
-        script=(_FOLDER / 'plots.js').read_text(encoding='utf-8'))
+        data=_json(_content(tables(request, check, frequencies), drawn) | {
+            'arm': request.motion and animation(request.arm, request.motion)}),
+        script=''.join((_FOLDER / name).read_text(encoding='utf-8') for name in _SCRIPTS))
 
 
 def write_report(path: Path, request: RecordedRequest, check: MotionCheck | None = None) -> None:
@@ -82,7 +86,8 @@ def _content(shown_tables: list[ReportTable], drawn: list[Plot]) -> dict[str, An
     def line(series: Series) -> dict[str, Any]:
         """Return a line of a plot."""
         return {'name': series.name, 'x': axis(series.x), 'y': _numbers(series.y),
-                'colour': series.colour, 'dashed': series.dashed, 'dots': series.dots}
+                'colour': series.colour, 'dashed': series.dashed,
+                'dots': series.dots, 'bound': series.bound}
 
     shown = [{**{name: getattr(plot, name) for name in _PLAIN},
               'bands': None if plot.bands is None else asdict(plot.bands),

@@ -1,9 +1,9 @@
-// Draws the report from the JSON in the page: tables, then plots on canvas. No libraries.
+// Draws the report from the JSON in the page: tables, the arm, plots on canvas. No libraries.
 // Plot: drag to zoom, double-click to zoom out, hover to read, click a name to hide a line.
 'use strict';
 
-const COLOURS = ['#0b62a4', '#c8501e', '#2a8a3e', '#8e44ad', '#b8860b', '#137a7f', '#a3195b',
-  '#555555'];
+const WIDE = 1.5; // of the height of lines, that bounds may add on either side
+const DECADES = 4; // of a logarithmic axis: what is smaller is rounding, or nothing to see
 const BAND = 'rgba(60, 60, 60, 0.22)';
 const MARGIN = { left: 74, right: 14, top: 10, bottom: 42 };
 
@@ -51,10 +51,7 @@ class Plot {
   constructor(spec, axes, parent) {
     this.spec = spec;
     this.peers = [this];
-    this.series = spec.series.map((entry, i) => ({
-      ...entry, xs: axes[entry.x], shown: true,
-      colour: COLOURS[(entry.colour ?? i) % COLOURS.length],
-    }));
+    this.series = spec.series.map((entry) => ({ ...entry, xs: axes[entry.x], shown: true }));
     this.figure = element('figure', parent);
     this.figure.id = spec.key;
     element('figcaption', this.figure, spec.title);
@@ -146,12 +143,28 @@ class Plot {
 
   // Where the shown points lie: [x low, x high, y low, y high].
   extent() {
+    const shown = this.series.filter((entry) => entry.shown);
+    const lines = shown.filter((entry) => !entry.bound);
+    const found = this.reach(lines.length ? lines : shown, -Infinity, Infinity);
+    if (lines.length && lines.length < shown.length && found[2] <= found[3]) {
+      // bounds that are near are shown, too; far ones would press the lines flat
+      const height = WIDE * Math.max(Math.max(found[3], 0) - Math.min(found[2], 0),
+        this.spec.least);
+      const near = this.reach(shown, found[2] - height, found[3] + height);
+      [found[2], found[3]] = [near[2], near[3]];
+    }
+    return this.spread(found);
+  }
+
+  // The same of some lines, as far as their points lie between two heights.
+  reach(lines, lowest, highest) {
     const found = [Infinity, -Infinity, Infinity, -Infinity];
-    for (const { xs, y } of this.series.filter((entry) => entry.shown)) {
+    for (const { xs, y } of lines) {
       xs.forEach((x, i) => {
         const value = y[i];
         if (x === null || value === null || (this.spec.log && value <= 0)) return;
         if (this.zoom && (x < this.zoom[0] || x > this.zoom[1])) return;
+        if (value < lowest || value > highest) return;
         found[0] = Math.min(found[0], x);
         found[1] = Math.max(found[1], x);
         const height = this.spec.log ? Math.log10(value) : value;
@@ -159,7 +172,13 @@ class Plot {
         found[3] = Math.max(found[3], height);
       });
     }
+    return found;
+  }
+
+  // What is shown for points there: somewhat more, and no less than is worth a look.
+  spread(found) {
     if (found[0] > found[1]) return [0, 1, 0, 1];
+    if (this.spec.log) found[2] = Math.max(found[2], found[3] - DECADES);
     if (this.zoom) [found[0], found[1]] = this.zoom;
     const dotted = !this.zoom && this.series.some((entry) => entry.dots);
     for (const k of [0, 2]) {
@@ -168,6 +187,11 @@ class Plot {
         || (found[k + 1] > found[k] ? 0 : Math.abs(found[k]) * 0.05 || 1);
       found[k] -= spare;
       found[k + 1] += spare;
+    }
+    const lack = this.spec.log ? 0 : this.spec.least - (found[3] - found[2]);
+    if (lack > 0) {
+      found[2] -= lack / 2;
+      found[3] += lack / 2;
     }
     return found;
   }
@@ -334,7 +358,7 @@ class Plot {
 }
 
 function addTable(table, parent) {
-  const section = element('section', parent);
+  const section = element('section', parent, '', table.columns.length > 7 ? 'wide' : '');
   element('h2', section, table.title);
   const made = element('table', section);
   if (table.columns.length) {
@@ -358,6 +382,12 @@ function build() {
       plot.peers = plots.filter((other) => other.spec.group === plot.spec.group);
     }
     plot.draw();
+  }
+  if (content.arm) {
+    const timed = plots.filter((plot) => plot.spec.group === 'time');
+    const arm = new Arm(content.arm, document.getElementById('moving'), () => {});
+    // once it is shown: marks before it moves would say nothing
+    arm.tell = (time) => timed.length && timed[0].share('mark', { x: time });
   }
   document.body.dataset.plots = String(plots.length);
 }

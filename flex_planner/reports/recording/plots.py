@@ -6,6 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from flex_planner.base.colours import (
+    ASIDE,
+    CARRIED,
+    CARRIED_OUT,
+    coordinate_colour,
+    FLEXIBLE,
+    hides_another,
+    PLANNED,
+    REFUSED,
+)
 from flex_planner.base.validation import Array
 from flex_planner.optimal_control.torque_limits import TorqueLimits
 from flex_planner.reports.recording.contents import RecordedMotion, RecordedRequest
@@ -16,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 _TIME = 'time [s]'
+_MILLI, _TINY = 1e3, 1e-300
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -29,19 +40,22 @@ class Series:
         In the legend.
     x, y : numpy.ndarray, shape (k,)
         The points; what is not finite is a gap.
-    colour : int
-        Index; lines of one colour belong together.
+    colour : str
+        As CSS has it; lines of one colour belong together.
     dashed, dots : bool
         Drawn so instead of as a line.
+    bound : bool
+        Whether it is only there to compare others with: it may lie beyond the plot.
 
     """
 
     name: str
     x: Array
     y: Array
-    colour: int
+    colour: str
     dashed: bool = False
     dots: bool = False
+    bound: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,6 +94,8 @@ class Plot:
         Plots of one group are zoomed together; empty for none.
     log, equal : bool
         Logarithmic upwards; the same scale in both directions.
+    least : float
+        Range upwards that is shown at least, so that rounding errors look like none.
     bands : Bands or None
         What is marked.
 
@@ -93,6 +109,7 @@ class Plot:
     group: str = ''
     log: bool = False
     equal: bool = False
+    least: float = 0.0
     bands: Bands | None = None
 
 
@@ -110,20 +127,26 @@ def _motion_plots(request: RecordedRequest, motion: RecordedMotion, check: Motio
     joints, modes, t = request.joint_names, arm.passive_names, motion.times
     found = [
         _torques(request, motion),
-        _over_time('positions', 'Joint angles', 'angle [rad]', t, motion.coordinates[:, :n],
-                   joints),
-        _over_time('speeds', 'Joint speeds', 'speed [rad/s]', t, motion.rates[:, :n], joints),
+        _over_time('positions', 'Joint angles', 'angle [deg]', t,
+                   np.degrees(motion.coordinates[:, :n]), joints, least=0.1),
+        _over_time('speeds', 'Joint speeds', 'speed [rad/s]', t, motion.rates[:, :n], joints,
+                   least=1e-3),
         _tip(motion, check)]
-    if arm.n_modes:
+    if arm.n_passive:
         moving = motion.moving
-        bends, rates = motion.coordinates[:, n:], motion.rates[:, n:]
+        bends, rates = motion.coordinates[:, n:] * _MILLI, motion.rates[:, n:] * _MILLI
+        twists, milli, rate = (' and twists', ', mrad', ', mrad/s') if arm.elastic_joints else (
+            '', '', '')
         found += [
-            _over_time('modes', 'Modal displacements', 'displacement [m]', t, bends, modes),
-            _over_time('modal_rates', 'Modal rates', 'rate [m/s]', t, rates, modes),
-            _spectrum('modes_spectrum', 'Spectrum of the modal displacements', 'amplitude [m]',
-                      t[moving], bends[moving], modes, bands),
-            _spectrum('modal_rates_spectrum', 'Spectrum of the modal rates', 'amplitude [m/s]',
-                      t[moving], rates[moving], modes, bands)]
+            _over_time('modes', f'Modal displacements{twists}', f'displacement [mm{milli}]', t,
+                       bends, modes, first=n, least=1e-2),
+            _over_time('modal_rates', f'Modal rates{twists}', f'rate [mm/s{rate}]', t, rates,
+                       modes, first=n, least=1e-1),
+            _spectrum('modes_spectrum', 'Spectrum of the modal displacements',
+                      f'amplitude [mm{milli}]', t[moving], bends[moving], modes, bands, first=n),
+            _spectrum('modal_rates_spectrum', 'Spectrum of the modal rates',
+                      f'amplitude [mm/s{rate}]', t[moving], rates[moving], modes, bands,
+                      first=n)]
     names = [*joints, *modes]
     return [
         *found,
@@ -137,20 +160,29 @@ def _torques(request: RecordedRequest, motion: RecordedMotion) -> Plot:
     """Return the torques between their bounds, eq. (15)."""
     n = request.arm.n_joints
     plot = _over_time('torques', 'Torques between their bounds', 'torque [N m]', motion.times,
-                      motion.torques, request.joint_names)
+                      motion.torques, request.joint_names, least=1e-3)
     for name, values in zip(('lowest', 'highest'),
                             TorqueLimits.of(request.arm).bounds(motion.rates[:, :n]), strict=True):
         plot.series.extend(
-            Series(name=f'{joint} {name}', x=motion.times, y=values[:, i], colour=i, dashed=True)
+            Series(name=f'{joint} {name}', x=motion.times, y=values[:, i], dashed=True, bound=True,
+                   colour=coordinate_colour(i))
             for i, joint in enumerate(request.joint_names) if np.isfinite(values[:, i]).any())
     return plot
 
 
 def _over_time(key: str, title: str, unit: str, times: Array, values: Array,
-               names: Sequence[str]) -> Plot:
-    """Return columns over time."""
-    return Plot(key=key, title=title, x_label=_TIME, y_label=unit, group='time', series=[
-        Series(name=name, x=times, y=values[:, i], colour=i) for i, name in enumerate(names)])
+               names: Sequence[str], *, first: int = 0, least: float = 0.0) -> Plot:
+    """Return columns over time, of coordinates from the first one on."""
+    return Plot(key=key, title=title, x_label=_TIME, y_label=unit, group='time', least=least,
+                series=_columns(times, values, names, first))
+
+
+def _columns(x: Array, values: Array, names: Sequence[str], first: int, *,
+             log: bool = False) -> list[Series]:
+    """Return columns as lines, dashed where one lies upon another, each in its colour."""
+    heights = np.log10(np.maximum(values, _TINY)) if log else values
+    return [Series(name=name, x=x, y=values[:, i], colour=coordinate_colour(first + i),
+                   dashed=hides_another(heights, i)) for i, name in enumerate(names)]
 
 
 def _bands(frequencies: NaturalFrequencies | None) -> Bands | None:
@@ -163,24 +195,24 @@ def _bands(frequencies: NaturalFrequencies | None) -> Bands | None:
 
 
 def _spectrum(key: str, title: str, unit: str, times: Array, values: Array,
-              names: Sequence[str], bands: Bands | None) -> Plot:
+              names: Sequence[str], bands: Bands | None, *, first: int) -> Plot:
     """Return the spectra of columns."""
     frequencies, amplitudes = spectrum(times, values)
     return Plot(key=key, title=title, x_label='frequency [Hz]', y_label=unit, log=True,
-                group='frequency', bands=bands, series=[
-                    Series(name=name, x=frequencies, y=amplitudes[:, i], colour=i)
-                    for i, name in enumerate(names)])
+                group='frequency', bands=bands,
+                series=_columns(frequencies, amplitudes, names, first, log=True))
 
 
 def _tip(motion: RecordedMotion, check: MotionCheck | None) -> Plot:
     """Return the path of the tip as planned, and as re-simulated by the check."""
     path = motion.tip
-    series = [Series(name='planned', x=path[:, 0], y=path[:, 1], colour=0)]
+    series = [Series(name='planned', x=path[:, 0], y=path[:, 1], colour=PLANNED)]
     if check is not None:
-        series.append(Series(name='re-simulated', x=check.tip[:, 0], y=check.tip[:, 1], colour=1,
+        series.append(Series(name='re-simulated', x=check.tip[:, 0], y=check.tip[:, 1],
+                             colour=CARRIED_OUT,
                              dashed=True))
     series += [Series(name=name, x=path[k:k + 1, 0], y=path[k:k + 1, 1], colour=colour, dots=True)
-               for name, k, colour in (('start', 0, 2), ('goal', len(path) - 1, 6))]
+               for name, k, colour in (('start', 0, ASIDE), ('goal', len(path) - 1, CARRIED))]
     return Plot(key='tip', title='Path of the tip', x_label='x [m]', y_label='y [m]', equal=True,
                 series=series)
 
@@ -193,8 +225,9 @@ def _search_plots(search: Any) -> list[Plot]:
         for key, title, unit, values in (
                 ('front', 'Least effort for each payload', 'J [N²m²s]', search.front_efforts),
                 ('prices', 'Price of a payload', 'dJ/dm [N²m²s/kg]', search.front_prices)):
-            line = Series(name=unit, x=payloads, y=np.asarray(values), colour=0)
-            dots = Series(name='solved', x=payloads, y=np.asarray(values), colour=0, dots=True)
+            line = Series(name=unit, x=payloads, y=np.asarray(values), colour=FLEXIBLE)
+            dots = Series(name='solved', x=payloads, y=np.asarray(values), colour=FLEXIBLE,
+                          dots=True)
             found.append(Plot(key=key, title=title, x_label='payload [kg]', y_label=unit,
                               series=[line, dots], group='payload'))
     if len(search.tried_payloads):
@@ -207,8 +240,10 @@ def _trials(payloads: Array, carried: NDArray[np.bool_]) -> Plot:
     """Return the payloads in the order they were tried."""
     numbers: Array = np.arange(1, payloads.size + 1).astype(np.float64)
     return Plot(key='trials', title='Payloads tried', x_label='trial', y_label='payload [kg]',
-                series=[Series(name='tried', x=numbers, y=payloads, colour=7, dashed=True)] + [
+                series=[Series(name='tried', x=numbers, y=payloads, colour=ASIDE,
+                        dashed=True)] + [
                     Series(name=name, x=numbers[chosen], y=payloads[chosen], colour=colour,
                            dots=True)
-                    for name, chosen, colour in (('carried', carried, 2),
-                                                 ('not carried', ~carried, 1)) if chosen.any()])
+                    for name, chosen, colour in (
+                        ('carried', carried, CARRIED),
+                        ('not carried', ~carried, REFUSED)) if chosen.any()])

@@ -79,7 +79,7 @@ def _task(request: RecordedRequest) -> ReportTable:
             ('weights R', numbers(task.effort_weights)),
             ('weights W1', numbers(task.position_weights)),
             ('weights W2', numbers(task.velocity_weights)),
-            ('tolerance, eq. (17)', f'{request.tolerance:g}')]
+            ('tolerance of the boundary error', f'{request.tolerance:g}')]
     if task.allow_large_bending:
         rows.append(('large bending', 'allowed'))
     for name in ('start_velocities', 'start_modal_displacements'):

@@ -168,7 +168,7 @@ class MeasuredJoints:
         if not missing:
             return ''
         if not self._joints and not self._others:
-            return (f'nothing comes on {self._topic}; is the driver of the arm running, and '
+            return (f'no message comes on {self._topic}; is the driver of the arm running, and '
                     'joint_states_topic its topic?')
         heard = ', '.join([*self._joints, *self._others])
         return (f'no message on {self._topic} names {", ".join(missing)}; they name {heard}: '

@@ -210,7 +210,7 @@ class RequestPlanner:
             expected = isinstance(error, FlexPlannerError)
             _LOG.error('recording failed: %s', error, exc_info=not expected)
             report.execution_recording = ''
-            sentence = f'the plan was carried out, but how could not be recorded: {error}'
+            sentence = f'the plan was carried out, but its outcome could not be recorded: {error}'
             _say_not_recorded(report, sentence, sentence, state)
 
     def _place(self, message: MotionTask, state: RequestState) -> MotionTask:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
-from difflib import get_close_matches
 from typing import Any, TypeVar
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import load_arm
 from flex_planner.base.errors import FlexPlannerError, InvalidValueError
+from flex_planner.base.suggestions import nearest_name
 from flex_planner.ros.settings.fields import Description
 from rcl_interfaces.msg import (
     FloatingPointRange,
@@ -26,7 +26,6 @@ Settings = TypeVar('Settings')
 _DEFAULT_ARM = 'korayem_ei50'
 # of ROS itself: none of a node's own, and not declared before they are used
 _OF_ROS = 'qos_overrides', 'use_sim_time', 'start_type_description_service'
-_SIMILAR = 0.7  # of names, for one to be meant by another
 
 
 def declare(node: Node, settings: Settings) -> Settings:
@@ -92,8 +91,8 @@ def warn_of_unknown(node: Node, settings: type, others: Sequence[str] = ()) -> N
 
 def _with_nearest(name: str, known: Sequence[str]) -> str:
     """Return an unknown name, with the known one that is meant."""
-    nearest = get_close_matches(name, known, 1, _SIMILAR)
-    return f'{name} ({nearest[0]}?)' if nearest else name
+    nearest = nearest_name(name, known)
+    return f'{name} (did you mean {nearest}?)' if nearest else name
 
 
 def _given(node: Node) -> Mapping[str, Parameter]:

@@ -51,7 +51,7 @@ class PlannerSettings:
         -1, 'Sign of the second joint angle, +1 or -1, for requests whose elbow is 0.',
         lowest=-1, highest=1)
     tolerance: float = parameter_field(
-        1e-3, 'eps of eq. (17): largest half squared error of the final state.',
+        1e-3, 'Largest allowed boundary error, half the squared error of the final state.',
         lowest=1e-9, highest=1.0)
     allowed_planning_time: float = parameter_field(
         30.0, 'Time limit of a request that sets none [s].', lowest=1e-3, highest=3600.0)

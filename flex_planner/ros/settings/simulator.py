@@ -59,11 +59,11 @@ class SimulatorSettings:
         True, 'Whether the torques of a trajectory are applied; if not, PD alone moves the arm.',
         read_only=True)
     effort_hold: str = parameter_field(
-        EffortHold.END.value, 'Whose torque of the trajectory is applied from one update to the '
+        EffortHold.END.value, 'Which torque of the trajectory is applied from one update to the '
         'next: that of its end, as joint_trajectory_controller does; start; middle.',
         read_only=True)
     limit_torques: bool = parameter_field(
-        True, 'Whether the motors have the limits of the arm file, eq. (15).', read_only=True)
+        True, 'Whether the motors have the limits of the arm file.', read_only=True)
     control_rate: float = parameter_field(
         1000.0, 'Rate of the simulated controller [Hz].', lowest=MIN_RATE, highest=MAX_RATE,
         read_only=True)

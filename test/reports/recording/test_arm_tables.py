@@ -23,10 +23,10 @@ def template(tmp_path_factory: pytest.TempPathFactory) -> str:
 def test_joints_say_what_data_sheets_say(template: str) -> None:
     joints = cells(template, 'Joints')
     assert joints['largest torque [N m]'] == ['30', '15']  # 0.4 and 0.2 N m, 100 times 0.75
-    assert joints['rotor at the joint [kg m²]'] == ['0.15', '0.06']
-    assert joints['gear'] == ['100', '100']
+    assert joints['rotor inertia at the joint [kg m²]'] == ['0.15', '0.06']
+    assert joints['gear ratio'] == ['100', '100']
     assert joints['Coulomb friction [N m]'] == ['0.4 above 0.1 rad/s', '0.2 above 0.1 rad/s']
-    assert joints['spring [N m/rad, N m s/rad]'] == ['6000, 2', '–']
+    assert joints['joint stiffness, damping [N m/rad, N m s/rad]'] == ['6000, 2', '–']
 
 
 def test_masses_are_those_of_all_nodes_and_housings(template: str) -> None:
@@ -47,6 +47,6 @@ def test_links_say_their_sections(template: str) -> None:
 def test_what_no_joint_has_takes_no_column() -> None:
     assert list(cells('korayem_ei50', 'Joints')) == [
         'joint', 'stall torque [N m]', 'no-load speed [rad/s]', 'largest torque [N m]',
-        'largest speed [rad/s]', 'angles [deg]', 'friction [N m s/rad]']
+        'largest speed [rad/s]', 'joint limits [deg]', 'viscous friction [N m s/rad]']
     assert cells('korayem_ei50', 'Joints')['largest torque [N m]'] == ['by its line alone'] * 2
     assert len(arm_tables(load_arm('korayem_rigid'))) == 2

@@ -10,6 +10,7 @@ import subprocess
 from types import SimpleNamespace
 from typing import Any
 
+from flex_planner.arms.kinematics import link_points
 from flex_planner.base.errors import RecordingError
 from flex_planner.cli import main
 from flex_planner.reports.recording import RecordedRequest, report_page, write_report
@@ -73,9 +74,11 @@ def test_plots_show_the_recorded_numbers(request_of_plan: RecordedRequest) -> No
     motion, found = request_of_plan.motion, drawn(Page(report_page(request_of_plan)))
     assert motion is not None
     n = 2
-    for name, values in (('torques', motion.torques), ('positions', motion.coordinates[:, :n]),
-                         ('speeds', motion.rates[:, :n]), ('modes', motion.coordinates[:, n:]),
-                         ('modal_rates', motion.rates[:, n:]),
+    for name, values in (('torques', motion.torques),
+                         ('positions', np.degrees(motion.coordinates[:, :n])),
+                         ('speeds', motion.rates[:, :n]),
+                         ('modes', 1e3 * motion.coordinates[:, n:]),
+                         ('modal_rates', 1e3 * motion.rates[:, n:]),
                          ('position_costates', motion.position_costates),
                          ('velocity_costates', motion.velocity_costates)):
         plot = found[name]
@@ -86,6 +89,42 @@ def test_plots_show_the_recorded_numbers(request_of_plan: RecordedRequest) -> No
                                rtol=1e-8)
     assert found['torques'].names[2:] == [
         f'{joint} {end}' for end in ('lowest', 'highest') for joint in ('joint1', 'joint2')]
+
+
+def test_moving_arm_is_that_of_the_recording(request_of_plan: RecordedRequest) -> None:
+    motion, arm = request_of_plan.motion, request_of_plan.arm
+    assert motion is not None
+    found = Page(report_page(request_of_plan)).data['arm']
+    times = np.array(found['times'])
+    assert (times[0], times[-1]) == (motion.times[0], motion.times[-2])  # the last one holds
+    links = np.array(found['links']).reshape(times.size, arm.n_joints, -1, 2)
+    for k in (0, 77, times.size - 1):
+        posture = np.array([np.interp(times[k], motion.times, column)
+                            for column in motion.coordinates.T])
+        # to a tenth of a micrometre, and times to a microsecond
+        np.testing.assert_allclose(links[k], 1e3 * link_points(arm, posture, 13), atol=1e-2)
+    np.testing.assert_allclose(links[-1, -1, -1], 1e3 * motion.tip[-1], atol=1e-3)
+    np.testing.assert_allclose(links[:, 1:, 0], links[:, :-1, -1])  # a link begins where one ends
+    middle = links[:, 0, 6] - (links[:, 0, 0] + links[:, 0, -1]) / 2
+    assert np.abs(middle).max() > 0.05  # [mm]: the links are drawn bent
+    left, low, width, height = found['box']
+    inside = (links >= (left, low)) & (links <= (left + width, low + height))
+    assert inside.all()
+
+
+def test_page_of_a_failure_has_no_arm(failure: Path) -> None:
+    assert Page(report_page(RecordedRequest.read(failure))).data['arm'] is None
+
+
+def test_coordinates_keep_their_colours_from_plot_to_plot(
+        request_of_plan: RecordedRequest) -> None:
+    plots = {plot['key']: [line['colour'] for line in plot['series']]
+             for plot in Page(report_page(request_of_plan)).data['plots']}
+    joints, modes = plots['positions'], plots['modes']
+    assert len({*joints, *modes}) == len(joints) + len(modes)
+    assert plots['torques'] == 3 * joints  # bounds, too
+    assert plots['position_costates'] == [*joints, *modes] == plots['velocity_costates']
+    assert plots['modal_rates_spectrum'] == modes
 
 
 def test_page_tells_what_a_controller_makes_of_the_trajectory(
@@ -214,6 +253,20 @@ mouse('pointerleave', 0.5);
 result.restored = first === canvas.toDataURL() && second === other.toDataURL();
 document.querySelector('#torques button').click();
 result.hidden = first !== canvas.toDataURL();
+const slider = document.querySelector('#arm input');
+const shapes = () => [...document.querySelectorAll('#arm polyline')].slice(-2)
+  .map((line) => line.getAttribute('points'));
+const began = shapes();
+slider.value = slider.max;
+slider.dispatchEvent(new Event('input'));
+const hand = [...document.querySelectorAll('#arm circle')].at(-1);
+result.hand = `${hand.getAttribute('cx')},${hand.getAttribute('cy')}`;
+result.corners = shapes()[0].split(' ').length;
+result.moved = began[0] !== shapes()[0] && began[1] !== shapes()[1];
+result.followed = [...document.querySelectorAll('#speeds output')].every((o) => o.textContent);
+document.querySelector('#arm button').click();
+result.plays = document.querySelector('#arm button').textContent === 'Pause'
+  && Number(slider.value) === Number(slider.min);
 const marked = document.querySelector('#modes_spectrum canvas');
 const bands = marked.toDataURL();
 [...document.querySelectorAll('#modes_spectrum button')].at(-1).click();
@@ -242,13 +295,18 @@ def test_browser_draws_zooms_and_toggles(plan: Path, tmp_path: Path) -> None:
     for _ in range(3):  # on a busy machine the browser may not have drawn by the time it is asked
         seen = opened(page, '--enable-logging=stderr', '--dump-dom')
         attributes = dict(re.findall(r'data-(\w+)="([^"]*)"', seen))
-        worked = {attributes[name] for name in ('zoomed', 'restored', 'hidden', 'bands')}
+        worked = {attributes[name] for name in (
+            'zoomed', 'restored', 'hidden', 'bands', 'moved', 'followed', 'plays')}
         if worked == {'true'}:
             break
     assert attributes['plots'] == '10'
     assert worked == {'true'}
     assert all(float(value) for value in attributes['readouts'].split(','))
     assert 'Certificate when planned' in seen
+    assert request.motion is not None
+    hand = [float(value) for value in attributes['hand'].split(',')]
+    np.testing.assert_allclose(hand, 1e3 * request.motion.tip[-1], atol=1e-3)
+    assert attributes['corners'] == '26'  # of 13 points
 
 
 @in_browser
@@ -263,8 +321,9 @@ def test_script_is_sound() -> None:
     node = shutil.which('node')
     if node is None:
         pytest.skip('no node is installed')
-    script = Path(__file__).parents[3] / 'flex_planner' / 'reports' / 'recording' / 'plots.js'
-    subprocess.run([node, '--check', str(script)], check=True)
+    folder = Path(__file__).parents[3] / 'flex_planner' / 'reports' / 'recording'
+    for name in ('arm.js', 'plots.js'):
+        subprocess.run([node, '--check', str(folder / name)], check=True)
 
 
 def test_lists_of_different_lengths_are_shown_as_far_as_they_go(

@@ -60,7 +60,7 @@ def test_joints_are_found_however_they_come(joints: MeasuredJoints,
 
 
 @pytest.mark.parametrize(('messages', 'words'), [
-    ([], 'nothing comes on /joint_states'),
+    ([], 'no message comes on /joint_states'),
     ([state(a=(1,), b=(2,))], 'names joint1, joint2; they name a, b'),
     ([state(joint1=(1,), b=(2,))], 'names joint2; they name joint1, b'),
     ([state(joint1=(1,), joint2=(math.nan,))], 'the position of joint2 is nan'),

@@ -81,7 +81,7 @@ def test_arm_that_says_nothing_is_not_checked_and_cannot_be_started_from(
     assert (report.error_code, list(report.measured_positions)) == (PlanReport.NONE, [])
     report = planner.report(**CURRENT)
     assert report.error_code == PlanReport.ARM_STATE_UNKNOWN
-    assert 'nothing comes on /watched/joint_states' in report.error_msg
+    assert 'no message comes on /watched/joint_states' in report.error_msg
 
 
 def test_joint_states_of_something_else_are_told_of_once(planner: WatchedPlanner) -> None:

@@ -350,7 +350,7 @@ def test_execution_that_cannot_be_recorded_is_no_success_if_that_is_required(
     assert report.error_code == (PlanReport.RECORDING_FAILED if required else PlanReport.NONE)
     assert report.warning_kinds == ([] if required else ['NOT_RECORDED'])
     sentence = report.error_msg if required else report.warnings[0]
-    assert sentence.startswith('the plan was carried out, but how could not be recorded: ')
+    assert sentence.startswith('the plan was carried out, but its outcome could not be recorded: ')
     assert (report.execution_accepted, report.execution_recording) == (True, '')
     aborted = PlanReport(error_code=PlanReport.EXECUTION_ABORTED, error_msg='it gave up')
     worker.record_execution(task(), state, aborted)

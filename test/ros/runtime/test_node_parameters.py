@@ -55,7 +55,7 @@ def test_file_is_read_in_a_namespace_and_whole_numbers_are_floats(robot: Robot) 
 
 
 def test_misspelt_parameter_is_named_with_the_one_that_is_meant(robot: Robot) -> None:
-    assert 'there is no parameter sampling_stp (sampling_step?)' in robot.log()
+    assert 'there is no parameter sampling_stp (did you mean sampling_step?)' in robot.log()
     assert robot.log().count('there is no parameter') == 1
 
 

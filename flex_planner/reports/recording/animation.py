@@ -1,0 +1,65 @@
+"""The moving arm of a report, as data for arm.js: links as they bend, at even times."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from flex_planner.arms.arm import Arm
+from flex_planner.arms.kinematics import link_points, payload_position
+from flex_planner.base.colours import ARM, FLEXIBLE, PLANNED
+from flex_planner.base.validation import Array
+from flex_planner.reports.recording.contents import RecordedMotion
+import numpy as np
+
+_FRAMES, _STATIONS, _DIGITS = 201, 13, 4
+# of the reach, around all that is drawn
+_MARGIN = 0.06
+
+
+def animation(arm: Arm, motion: RecordedMotion) -> dict[str, Any]:
+    """
+    Return what arm.js draws of a motion.
+
+    Parameters
+    ----------
+    arm : Arm
+        n joints.
+    motion : RecordedMotion
+        From its first sample, which may hold the arm, to the arrival.
+
+    Returns
+    -------
+    dict
+        ``times`` (F,) [s]; ``links`` (F, n, 2 k), of each link the points x, y, x, y ... from its
+        joint to its end [mm]; ``payload`` (F, 2) [mm]; ``tip`` (2 m,), its recorded path [mm];
+        which links are ``flexible``; colours; ``box``, left, low, width and height [mm].
+
+    """
+    times, coordinates = _even(motion)
+    points = link_points(arm, coordinates, _STATIONS)
+    payload = payload_position(arm, coordinates)
+    everything = np.concatenate([points.reshape(-1, 2), payload, motion.tip, np.zeros((1, 2))])
+    low, high = everything.min(axis=0), everything.max(axis=0)
+    margin = _MARGIN * arm.reach
+    return {
+        'times': times.round(6).tolist(),
+        'links': [[_flat(link) for link in frame] for frame in points],
+        'payload': [_flat(place) for place in payload], 'tip': _flat(motion.tip),
+        'flexible': [bool(link.modes) for link in arm.links],
+        'loaded': bool(motion.payload_mass),
+        'colours': {'flexible': FLEXIBLE, 'rigid': '#444444', 'aside': ARM, 'tip': PLANNED},
+        'box': _flat(np.concatenate([low - margin, high - low + 2 * margin]))}
+
+
+def _even(motion: RecordedMotion) -> tuple[Array, Array]:
+    """Return even times (F,) and the coordinates (F, n_t) then, without what follows arrival."""
+    last = motion.times.size - 1
+    times = np.linspace(motion.times[0], motion.times[last - 1], _FRAMES, dtype=np.float64)
+    return times, np.stack([np.interp(times, motion.times[:last], column[:last])
+                            for column in motion.coordinates.T], axis=-1)
+
+
+def _flat(points: Array) -> list[float]:
+    """Return points in millimetres as a flat list, to a tenth of a micrometre."""
+    flat: list[float] = (points * 1e3).round(_DIGITS).ravel().tolist()
+    return flat
