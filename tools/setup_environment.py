@@ -229,7 +229,8 @@ class PipProgress(Progress):
             done = len(list(self.venv.glob('lib/python3*/site-packages/*.dist-info')))
             return f'{min(done, self.total)} of {self.total} packages installed'
         loaded = f', {self.megabytes:.0f} MB downloaded' if self.megabytes else ''
-        return f'{self.found} of about {self.expected} packages found{loaded}, {self.name}'
+        last = f', {self.name}' if self.name else ''
+        return f'{self.found} of about {self.expected} packages found{loaded}{last}'
 
 
 class BuildProgress(Progress):
