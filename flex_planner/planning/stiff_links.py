@@ -108,9 +108,10 @@ class StiffLinks:
         problem = self._problem_of(plan)
         if plan.solution is None or not plan.certified:
             return _unsolved(plan, problem)
-        solution = follow_quasi_statically(problem, plan.problem, plan.solution, self._kept)
+        solution, left_out = follow_quasi_statically(problem, plan.problem, plan.solution,
+                                                     self._kept)
         total = integrate_totals(problem, solution)
-        price = self._price(problem, solution)
+        price = self._price(problem, solution) + left_out
         if not price <= self._share * total.cost:
             return None
         lifted = replace(plan, task=problem.task, problem=problem, solution=solution,
