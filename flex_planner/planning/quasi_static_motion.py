@@ -16,8 +16,8 @@ from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.planning.ringing import Mask
 import numpy as np
 
-# corrections of the bending; a second round knows how fast it changes
-_CORRECTIONS, _ROUNDS = 3, 2
+# of the bending: the load hardly depends on it
+_CORRECTIONS = 3
 
 
 def follow_quasi_statically(problem: MotionProblem, reduced: MotionProblem,
@@ -39,8 +39,7 @@ def follow_quasi_statically(problem: MotionProblem, reduced: MotionProblem,
 
     """
     motion = _Motion(problem, reduced, found, kept)
-    for _ in range(_ROUNDS):
-        motion.bend()
+    motion.bend()
     return motion.solution(), motion.effort_left_out()
 
 
@@ -67,7 +66,14 @@ class _Motion:
         self._virtual = np.linalg.solve(mass, z[:, 3 * half:, None])[..., 0]
 
     def bend(self) -> None:
-        """Bend stiff parts as their load does, and find how fast that changes."""
+        """
+        Bend stiff parts as their load does, and find how fast that changes.
+
+        What the bending itself adds to the load by accelerating is left out, for it is smaller
+        once more by the square of the frequency; it would be wrong where a motor switches within a
+        period.
+
+        """
         model, p, stiff = self._problem.model, self._problem.parameters.physical, self._stiff
         stiffness = model.static_forces(self._q.reshape(-1, self._n), p)[1][:, stiff[:, None],
                                                                             stiff]
@@ -96,12 +102,11 @@ class _Motion:
                                    self._differentiate(stacked)[:, 1:-1], self._found.rule)
 
     def effort_left_out(self) -> float:
-        """Return by how much the torque that all parts need differs in J from that of the plan."""
+        """Return what the torque that all parts need adds to J, or spares, to first order."""
         if self._is_corrected():
             return 0.0
         weights, found = self._problem.parameters.effort_weights, self._found
-        needed = self._known.torque + self._change_of_torque()
-        rates = (weights * (needed**2 - self._known.torque**2)).sum(axis=-1) / 2
+        rates = (weights * self._known.torque * self._change_of_torque()).sum(axis=-1)
         shares = np.concatenate([[0.0], found.rule.weights, [0.0]])
         return abs(float(found.steps @ (rates.reshape(self._q.shape[:2]) @ shares)))
 

@@ -97,12 +97,24 @@ class StiffLinks:
         return CollocationSolution(solution.mesh, solution.nodes[:, kept],
                                    solution.stages[..., kept], solution.rule)
 
-    def lift(self, plan: Plan, solver: Solver) -> Plan | None:
+    def lift(self, plan: Plan, solver: Solver, most: float | None = None) -> Plan | None:
         """
         Return a plan of the arm with rigid parts as one of the arm as it is.
 
-        It is None if it cannot be certified, or if what its torque leaves ringing would cost more
-        than a negligible share of J to bring to rest.
+        Parameters
+        ----------
+        plan : Plan
+            Of the task that `task` returns.
+        solver : Solver
+            Its monitor may interrupt the certificate.
+        most : float, optional
+            What it may cost in J at most to bring the stiff parts to rest; by default a
+            negligible share.
+
+        Returns
+        -------
+        Plan or None
+            None if it costs more, or if the motion cannot be certified.
 
         """
         problem = self._problem_of(plan)
@@ -112,7 +124,7 @@ class StiffLinks:
                                                      self._kept)
         total = integrate_totals(problem, solution)
         price = self._price(problem, solution) + left_out
-        if not price <= self._share * total.cost:
+        if not price <= (self._share * total.cost if most is None else most):
             return None
         lifted = replace(plan, task=problem.task, problem=problem, solution=solution,
                          cost=total.cost, effort=total.effort, energy=total.energy)
