@@ -37,6 +37,8 @@ class FastVibrations:
         Angular frequencies, ascending [rad/s].
     vectors : numpy.ndarray, shape (n_t, m)
         Columns are displacements of all coordinates, orthonormal in the mass matrix.
+    damping : numpy.ndarray, shape (m,)
+        Twice the rates at which they decay [1/s].
     mass, stiffness : numpy.ndarray, shape (n_t, n_t)
         M and the second derivative of the potential energy.
 
@@ -46,6 +48,7 @@ class FastVibrations:
     stiff: Mask
     rates: Array
     vectors: Array
+    damping: Array
     mass: Array
     stiffness: Array
 
@@ -63,8 +66,10 @@ class FastVibrations:
         squares, shapes = eigh(stiffness[np.ix_(stiff, stiff)], own)
         vectors = np.zeros((n_t, squares.size))
         vectors[stiff], vectors[kept] = shapes, -carried @ shapes
+        friction = shapes.T @ _friction(problem, rest, np.flatnonzero(stiff)) @ shapes
         return cls(problem=problem, stiff=stiff, rates=np.sqrt(np.maximum(squares, 0.0)),
-                   vectors=vectors, mass=mass, stiffness=stiffness)
+                   vectors=vectors, damping=np.maximum(np.diag(friction), 0.0), mass=mass,
+                   stiffness=stiffness)
 
     def bends_under(self, torque: Array) -> Array:
         """Return what a torque (n,) bends the stiff coordinates by, those of (n_t,)."""
@@ -83,19 +88,34 @@ class FastVibrations:
         found: Array = self.vectors[self.stiff].T @ loads / self.rates**2
         return found
 
-    def price(self, amplitudes: Array) -> float:
+    def price(self, start: Array, goal: Array, *, damped: bool = True) -> float:
         """
-        Return what it costs in J to bring amplitudes (m,) to rest within the motion.
+        Return what it costs in J to bring to rest what jumps at start and goal leave, (m,) each.
 
         The torque of least effort does it in resonance: by b cos(w t) and b sin(w t) with the
         shares b of the joints, weighed by R. Over many periods each moves a vibration of amplitude
-        A by ``w A = T/2 b^T R^-1 b`` per unit, whose effort is ``(w A)^2 / (T b^T R^-1 b)``.
+        A by ``w A = tau / 2 b^T R^-1 b`` per unit, whose effort is ``(w A)^2 / (tau b^T R^-1 b)``;
+        tau is the duration, or how long a damped vibration remembers. Any phase between start and
+        goal is as likely as any other.
 
         """
-        weights = self.problem.parameters.effort_weights
-        shares = self.vectors[:weights.size]
-        reached = self.problem.task.duration * (shares**2 / weights[:, None]).sum(axis=0)
-        return float(((self.rates * amplitudes)**2 / reached).sum())
+        weights, duration = self.problem.parameters.effort_weights, self.problem.task.duration
+        decay = self.damping * duration * (1.0 if damped else 0.0)
+        safe = np.where(decay > 0, decay, 1.0)
+        memory = duration * np.where(decay > 0, -np.expm1(-decay) / safe, 1.0)
+        shares = (self.vectors[:weights.size]**2 / weights[:, None]).sum(axis=0)
+        squares = np.exp(-decay) * start**2 + goal**2
+        return float((self.rates**2 * squares / (memory * shares)).sum())
+
+    def share_at_most(self) -> float:
+        """
+        Return the share of J that this is at most in a motion of least effort, without damping.
+
+        It moves a joint by a cubic polynomial, so that its torque falls in a line through zero: of
+        its jumps at both ends, b^T u leaves the amplitude ``b^T u / w^2``.
+
+        """
+        return float(12 / (self.rates[0] * self.problem.task.duration)**2)
 
     def foresee(self, amplitudes: Array) -> Certificate:
         """Return the certificate of an arm that comes to the goal with amplitudes (m,)."""
@@ -111,3 +131,16 @@ class FastVibrations:
             residual_vibration=residual_vibration(problem.model, rest + miss, rest[:n_t],
                                                   problem.parameters),
             state_error=0.0, costate_error=0.0)
+
+
+def _friction(problem: MotionProblem, rest: Array, stiff: NDArray[np.intp]) -> Array:
+    """Return the forces on stiff coordinates by their rates about a state of rest, (m, m)."""
+    half = rest.size // 2
+    states = np.tile(rest, (2 * stiff.size, 1))
+    rate = 1e-3  # forces are linear in it, but for what turns them
+    rows = np.arange(stiff.size)
+    states[rows, half + stiff], states[rows + stiff.size, half + stiff] = rate, -rate
+    forces = problem.model.inverse_dynamics(states, np.zeros((2 * stiff.size, half)),
+                                            problem.parameters.physical)[:, stiff]
+    friction: Array = (forces[:stiff.size] - forces[stiff.size:]).T / (2 * rate)
+    return friction

@@ -45,6 +45,9 @@ _TOLERANCE = 1e-6
 # values of a task with an entry per coordinate
 _ENTRIES = ('position_weights', 'velocity_weights', 'start_velocities', 'goal_velocities',
             'goal_position_weights', 'goal_velocity_weights')
+# what a plan may have changed in it
+_CHANGED = ('duration', 'payload_mass', 'effort_weights', 'position_weights', 'velocity_weights',
+            'goal_positions')
 
 
 class StiffLinks:
@@ -123,8 +126,10 @@ class StiffLinks:
         solution, left_out = follow_quasi_statically(problem, plan.problem, plan.solution,
                                                      self._kept)
         total = integrate_totals(problem, solution)
-        price = self._price(problem, solution) + left_out
-        if not price <= (self._share * total.cost if most is None else most):
+        price, undamped = (self._price(problem, solution, damped) + left_out
+                           for damped in (True, False))
+        # what is left of damped vibrations dies out, though to hasten that costs more
+        if not undamped <= (self._share * total.cost if most is None else most):
             return None
         lifted = replace(plan, task=problem.task, problem=problem, solution=solution,
                          cost=total.cost, effort=total.effort, energy=total.energy)
@@ -148,17 +153,20 @@ class StiffLinks:
                           effort_weights=found.effort_weights, **weights)
         if not task.arm.bends_at_rest:  # another way round to a point
             changed = replace(changed, goal_positions=found.goal_positions)
+        if all(np.array_equal(getattr(task, name), getattr(changed, name)) for name in _CHANGED):
+            return self._problem
         return MotionProblem(self._problem.model, changed, task_parameters(changed))
 
-    def _price(self, problem: MotionProblem, solution: CollocationSolution) -> float:
+    def _price(self, problem: MotionProblem, solution: CollocationSolution,
+               damped: bool) -> float:
         """Return what it would cost in J to bring to rest what the jumps at both ends leave."""
-        n_t, price = self._kept.size, 0.0
-        for end, moving in ((problem.start, solution.nodes[0]),
-                            (problem.goal, solution.nodes[-1])):
-            rest = np.concatenate([end[:n_t], np.zeros(n_t)])
-            fast = FastVibrations.about(problem, rest, ~self._kept)
-            price += fast.price(fast.amplitudes(moving[:n_t] - end[:n_t]))
-        return price
+        n_t = self._kept.size
+        rest = np.concatenate([problem.goal[:n_t], np.zeros(n_t)])
+        fast = FastVibrations.about(problem, rest, ~self._kept)
+        left = [fast.amplitudes(moving[:n_t] - end[:n_t])
+                for end, moving in ((problem.start, solution.nodes[0]),
+                                    (problem.goal, solution.nodes[-1]))]
+        return fast.price(left[0], left[1], damped=damped)
 
     def _certify(self, plan: Plan, solution: CollocationSolution, price: float,
                  solver: Solver) -> Plan | None:
@@ -197,15 +205,15 @@ class StiffLinks:
         told = [f'{kind} by up to {float(bends[..., which].max()):.1e} {unit}'
                 for kind, unit, which in (('twists', 'rad', stiff < beyond),
                                           ('bends', 'm', stiff >= beyond)) if which.any()]
-        them = 'it follows' if self.parts.count == 1 else 'they follow'
+        its, follow = ('its', 'it follows') if self.parts.count == 1 else ('their', 'they follow')
+        share = price / plan.cost if plan.cost > 0 else 0.0
         checked = '' if factor == 1 else (
             f', with {factor:.2g} times the stiffness, beyond which no simulation follows')
-        share = price / plan.cost if plan.cost > 0 else 0.0
         return PlanWarning(kind=WarningKind.STIFF_LINKS, value=float(bends.max()), sentence=(
-            f'{self.parts}: too stiff to vibrate with the motion, which {" and ".join(told)}: '
-            f'{them} quasi-statically. A motion that brings also {"its" if self.parts.count == 1 else "their"} vibrations to rest would cost '
-            f'about {price:.1e} more ({share:.0e} of J); the certificate is that of the arm with '
-            f'them free{checked}'))
+            f'{self.parts}: too stiff to vibrate with the motion, which {" and ".join(told)}; '
+            f'{follow} quasi-statically. To bring {its} vibrations to rest as well would cost '
+            f'about {price:.1e} more, {share:.0e} of J (an estimate). The certificate is that of '
+            f'the arm with all vibrations free{checked}'))
 
 
 def _softened(problem: MotionProblem, stiff: tuple[int, ...]) -> tuple[MotionProblem, float]:

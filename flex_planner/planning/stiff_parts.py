@@ -71,10 +71,9 @@ def find_stiff_parts(problem: MotionProblem, stages: int, max_intervals: int) ->
     Return the parts that are stiff in a task.
 
     Of all parts those are left out, one by one, to which the slowest vibration belongs, until the
-    others are stiff together: their vibrations cost a negligible share of J, and a torque that
-    takes no notice of them leaves less at the goal than a certificate allows. Least effort moves
-    a joint by a cubic polynomial; its torque falls in a line through zero, and to bring to rest
-    what its jumps leave in a vibration of rate w costs at most ``12 / (w T)^2`` of J.
+    others are stiff together: to bring their vibrations to rest would cost a negligible share of
+    J, and a torque that takes no notice of them leaves less at the goal than a certificate allows.
+    Both without damping, by which what is left dies out.
 
     Parameters
     ----------
@@ -107,8 +106,7 @@ def _find_soft_vector(problem: MotionProblem, parts: StiffParts, share: float) -
     for end in (problem.start, problem.goal):
         rest = np.concatenate([end[:n_t], np.zeros(n_t)])
         fast = FastVibrations.about(problem, rest, mask)
-        if not (12 / (fast.rates[0] * problem.task.duration)**2 <= share
-                and _is_in_step(fast) and _comes_to_rest(fast)):
+        if not (fast.share_at_most() <= share and _is_in_step(fast) and _comes_to_rest(fast)):
             slowest = np.abs(fast.vectors[:, 0]) * np.sqrt(np.abs(np.diag(fast.stiffness)))
             return int(np.where(mask, slowest, -1.0).argmax())
     return None
@@ -136,7 +134,7 @@ def _comes_to_rest(fast: FastVibrations) -> bool:
     travel = np.maximum(np.abs(problem.goal - problem.start)[:n], 0.1)
     torque = np.abs(fast.mass[:n, :n]) @ (6 * travel / problem.task.duration**2)
     limits = CertificateLimits(boundary_error=problem.task.tolerance)
-    # at both ends, at any phase
+    # of both ends, at any phase
     left = np.sqrt(2) * fast.amplitudes(fast.bends_under(torque))
     return not limits.violations(fast.foresee(left))
 
