@@ -2,8 +2,8 @@
 The motion of an arm whose stiff parts follow quasi-statically, from one with these parts rigid.
 
 Each stiff coordinate is where its load, inertia included, holds it without vibration (the slow
-manifold of the dynamics). The joints move as they did, by the torque that this takes. Their path is
-the best one of the arm with rigid parts; that of the arm as it is differs by one over the
+manifold of the dynamics). The joints move as they did, by the torque that this takes. Their path
+is the best one of the arm with rigid parts; that of the arm as it is differs by one over the
 stiffness, and the effort by its square.
 
 """
@@ -148,10 +148,10 @@ class _Motion:
         shift = _fade(-(first - start) @ carried.T, self._found.times_at(self._theta))
         q, rate, acceleration = (np.array(each) for each in (self._q, self._rate,
                                                              self._acceleration))
-        for values, change in zip((q, rate, acceleration), shift, strict=True):
-            values[..., kept] += change
-        change: Array = self._forces(q, rate, acceleration)[:, :n] - self._known.torque
-        return change
+        for values, moved in zip((q, rate, acceleration), shift, strict=True):
+            values[..., kept] += moved
+        needed: Array = self._forces(q, rate, acceleration)[:, :n]
+        return needed - self._known.torque
 
     def _states(self) -> Array:
         """Return q and q' of all points, (k, 2 n_t)."""
@@ -160,8 +160,9 @@ class _Motion:
     def _forces(self, q: Array, rate: Array, acceleration: Array) -> Array:
         """Return M q'' + h of all points, (k, n_t)."""
         states = np.concatenate([q, rate], axis=-1).reshape(-1, 2 * self._n)
-        return self._problem.model.inverse_dynamics(
+        forces: Array = self._problem.model.inverse_dynamics(
             states, acceleration.reshape(-1, self._n), self._problem.parameters.physical)
+        return forces
 
     def _differentiate(self, values: Array) -> Array:
         """Return the derivatives by time of values (N, s + 2, m)."""

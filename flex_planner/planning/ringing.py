@@ -9,6 +9,7 @@ is known in closed form, without a simulation.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from flex_planner.arms.kinematics import tip_position
@@ -88,49 +89,68 @@ class FastVibrations:
         found: Array = self.vectors[self.stiff].T @ loads / self.rates**2
         return found
 
-    def price(self, start: Array, goal: Array, *, damped: bool = True) -> float:
-        """
-        Return what it costs in J to bring to rest what jumps at start and goal leave, (m,) each.
-
-        The torque of least effort does it in resonance: by b cos(w t) and b sin(w t) with the
-        shares b of the joints, weighed by R. Over many periods each moves a vibration of amplitude
-        A by ``w A = tau / 2 b^T R^-1 b`` per unit, whose effort is ``(w A)^2 / (tau b^T R^-1 b)``;
-        tau is the duration, or how long a damped vibration remembers. Any phase between start and
-        goal is as likely as any other.
-
-        """
-        weights, duration = self.problem.parameters.effort_weights, self.problem.task.duration
-        decay = self.damping * duration * (1.0 if damped else 0.0)
-        safe = np.where(decay > 0, decay, 1.0)
-        memory = duration * np.where(decay > 0, -np.expm1(-decay) / safe, 1.0)
-        shares = (self.vectors[:weights.size]**2 / weights[:, None]).sum(axis=0)
-        squares = np.exp(-decay) * start**2 + goal**2
-        return float((self.rates**2 * squares / (memory * shares)).sum())
+    @property
+    def shares(self) -> Array:
+        """Return b^T R^-1 b, b the shares of the joints in each vibration, (m,)."""
+        weights = self.problem.parameters.effort_weights
+        found: Array = (self.vectors[:weights.size]**2 / weights[:, None]).sum(axis=0)
+        return found
 
     def share_at_most(self) -> float:
         """
-        Return the share of J that this is at most in a motion of least effort, without damping.
+        Return the share of J that rest costs at most after least effort, without damping.
 
-        It moves a joint by a cubic polynomial, so that its torque falls in a line through zero: of
-        its jumps at both ends, b^T u leaves the amplitude ``b^T u / w^2``.
+        Which moves a joint by a cubic polynomial, so that its torque falls in a line through zero:
+        of its jumps at both ends, b^T u leaves the amplitude ``b^T u / w^2``.
 
         """
         return float(12 / (self.rates[0] * self.problem.task.duration)**2)
 
     def foresee(self, amplitudes: Array) -> Certificate:
-        """Return the certificate of an arm that comes to the goal with amplitudes (m,)."""
+        """Return the worst certificate of an arm that comes to the goal with amplitudes (m,)."""
         problem, n_t = self.problem, self.stiff.size
-        miss = np.concatenate([np.abs(self.vectors) @ np.abs(amplitudes),
-                               np.abs(self.vectors) @ np.abs(self.rates * amplitudes)])
-        rest = np.concatenate([problem.goal[:n_t], np.zeros(n_t)])
-        tip, asked = (tip_position(problem.model.arm, q)
-                      for q in (rest[:n_t] + miss[:n_t], rest[:n_t]))
-        return Certificate(
-            collocation_residual=0.0, boundary_error=float(miss @ miss / 2),
-            hamiltonian_drift=0.0, tip_error=float(np.linalg.norm(tip - asked)),
-            residual_vibration=residual_vibration(problem.model, rest + miss, rest[:n_t],
-                                                  problem.parameters),
-            state_error=0.0, costate_error=0.0)
+        arm, rest = problem.model.arm, np.concatenate([problem.goal[:n_t], np.zeros(n_t)])
+        asked = tip_position(arm, rest[:n_t])
+        error = away = vibration = 0.0
+        for vector, rate in zip((self.vectors * amplitudes).T, self.rates, strict=True):
+            state = rest + np.concatenate([vector, rate * vector])
+            error += float((1 + rate**2) * vector @ vector / 2)
+            away += float(np.linalg.norm(tip_position(arm, state[:n_t]) - asked))
+            vibration += residual_vibration(problem.model, state, rest[:n_t], problem.parameters)
+        return Certificate(collocation_residual=0.0, boundary_error=error, hamiltonian_drift=0.0,
+                           tip_error=away, residual_vibration=vibration, state_error=0.0,
+                           costate_error=0.0)
+
+
+def price_rest(along: Sequence[FastVibrations], start: Array, goal: Array, *,
+               damped: bool = True) -> float:
+    """
+    Return what it costs in J to bring to rest what jumps at start and goal leave.
+
+    The torque of least effort does it in resonance: by b cos(w t) and b sin(w t) with the shares b
+    of the joints, weighed by R. Over many periods each moves a vibration of amplitude A by ``w A =
+    tau / 2 b^T R^-1 b`` per unit, whose effort is ``(w A)^2 / (tau b^T R^-1 b)``; tau is the
+    duration, or how long a damped vibration remembers. What start and goal leave may add up or
+    cancel: this is the mean, the most is twice as much.
+
+    Parameters
+    ----------
+    along : sequence of FastVibrations
+        About postures at equal steps from start to goal.
+    start, goal : numpy.ndarray, shape (m,)
+        Amplitudes.
+    damped : bool
+        Whether the vibrations are damped as those of the arm are.
+
+    """
+    first, last = along[0], along[-1]
+    duration = last.problem.task.duration
+    decay = last.damping * duration * (1.0 if damped else 0.0)
+    safe = np.where(decay > 0, decay, 1.0)
+    memory = duration * np.where(decay > 0, -np.expm1(-decay) / safe, 1.0)
+    squares = np.exp(-decay) * (first.rates * start)**2 + (last.rates * goal)**2
+    shares = np.mean([one.shares for one in along], axis=0)
+    return float((squares / (memory * shares)).sum())
 
 
 def _friction(problem: MotionProblem, rest: Array, stiff: NDArray[np.intp]) -> Array:

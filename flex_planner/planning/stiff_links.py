@@ -26,7 +26,7 @@ from flex_planner.optimal_control.totals import integrate_totals
 from flex_planner.planning.certificate import CertificateLimits, certify
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.quasi_static_motion import follow_quasi_statically
-from flex_planner.planning.ringing import FastVibrations, Mask
+from flex_planner.planning.ringing import FastVibrations, Mask, price_rest
 from flex_planner.planning.stiff_parts import (
     fastest_turn,
     find_stiff_parts,
@@ -42,6 +42,8 @@ import numpy as np
 _MOST_RADIANS, _MOST_OF_JOINTS, _RADIANS = 5e4, 1e6, 1e3
 # of the integrator: what rings need not be known so exactly, and its steps are short
 _TOLERANCE = 1e-6
+# at which vibrations are looked at on the way
+_POSTURES = 9
 # values of a task with an entry per coordinate
 _ENTRIES = ('position_weights', 'velocity_weights', 'start_velocities', 'goal_velocities',
             'goal_position_weights', 'goal_velocity_weights')
@@ -126,8 +128,7 @@ class StiffLinks:
         solution, left_out = follow_quasi_statically(problem, plan.problem, plan.solution,
                                                      self._kept)
         total = integrate_totals(problem, solution)
-        price, undamped = (self._price(problem, solution, damped) + left_out
-                           for damped in (True, False))
+        price, undamped = (each + left_out for each in self._price(problem, solution))
         # what is left of damped vibrations dies out, though to hasten that costs more
         if not undamped <= (self._share * total.cost if most is None else most):
             return None
@@ -157,16 +158,17 @@ class StiffLinks:
             return self._problem
         return MotionProblem(self._problem.model, changed, task_parameters(changed))
 
-    def _price(self, problem: MotionProblem, solution: CollocationSolution,
-               damped: bool) -> float:
-        """Return what it would cost in J to bring to rest what the jumps at both ends leave."""
+    def _price(self, problem: MotionProblem, solution: CollocationSolution) -> tuple[float, float]:
+        """Return what it would cost in J to bring the stiff parts to rest, and without damping."""
         n_t = self._kept.size
-        rest = np.concatenate([problem.goal[:n_t], np.zeros(n_t)])
-        fast = FastVibrations.about(problem, rest, ~self._kept)
-        left = [fast.amplitudes(moving[:n_t] - end[:n_t])
-                for end, moving in ((problem.start, solution.nodes[0]),
-                                    (problem.goal, solution.nodes[-1]))]
-        return fast.price(left[0], left[1], damped=damped)
+        times = np.linspace(0, problem.task.duration, _POSTURES, dtype=np.float64)
+        path = solution(times)[:, :n_t]
+        path[[0, -1]] = problem.start[:n_t], problem.goal[:n_t]
+        along = [FastVibrations.about(problem, np.concatenate([q, np.zeros(n_t)]), ~self._kept)
+                 for q in path]
+        start = along[0].amplitudes(solution.nodes[0, :n_t] - path[0])
+        goal = along[-1].amplitudes(solution.nodes[-1, :n_t] - path[-1])
+        return price_rest(along, start, goal), price_rest(along, start, goal, damped=False)
 
     def _certify(self, plan: Plan, solution: CollocationSolution, price: float,
                  solver: Solver) -> Plan | None:
@@ -200,7 +202,8 @@ class StiffLinks:
         """Say what was done."""
         assert plan.solution is not None
         stiff = np.flatnonzero(~self._kept)
-        bends = np.abs(plan.solution.values_at(np.linspace(0, 1, 9))[..., stiff])
+        shares = np.linspace(0, 1, 9, dtype=np.float64)
+        bends = np.abs(plan.solution.values_at(shares)[..., stiff])
         beyond = plan.problem.model.arm.n_joints + len(plan.problem.model.arm.elastic_joints)
         told = [f'{kind} by up to {float(bends[..., which].max()):.1e} {unit}'
                 for kind, unit, which in (('twists', 'rad', stiff < beyond),
