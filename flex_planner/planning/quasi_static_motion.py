@@ -150,19 +150,19 @@ class _Motion:
                                                              self._acceleration))
         for values, moved in zip((q, rate, acceleration), shift, strict=True):
             values[..., kept] += moved
-        needed: Array = self._forces(q, rate, acceleration)[:, :n]
-        return needed - self._known.torque
+        beyond: Array = self._forces(q, rate, acceleration)[:, :n] - self._known.torque
+        return beyond
 
     def _states(self) -> Array:
         """Return q and q' of all points, (k, 2 n_t)."""
-        return np.concatenate([self._q, self._rate], axis=-1).reshape(-1, 2 * self._n)
+        states: Array = np.concatenate([self._q, self._rate], axis=-1)
+        return states.reshape(-1, 2 * self._n)
 
     def _forces(self, q: Array, rate: Array, acceleration: Array) -> Array:
         """Return M q'' + h of all points, (k, n_t)."""
         states = np.concatenate([q, rate], axis=-1).reshape(-1, 2 * self._n)
-        forces: Array = self._problem.model.inverse_dynamics(
+        return self._problem.model.inverse_dynamics(
             states, acceleration.reshape(-1, self._n), self._problem.parameters.physical)
-        return forces
 
     def _differentiate(self, values: Array) -> Array:
         """Return the derivatives by time of values (N, s + 2, m)."""
