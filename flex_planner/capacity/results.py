@@ -95,6 +95,11 @@ class LimitResult:
         return self.status is PlanStatus.SOLVED
 
     @property
+    def bracket_width(self) -> float:
+        """Return how far the value is from where its kind of motion ends; inf if unknown."""
+        return np.inf
+
+    @property
     def warnings(self) -> tuple[PlanWarning, ...]:
         """Return the warnings of the plan, or of the arm alone where there is none."""
         return find_arm_warnings(self.task.arm) if self.plan is None else self.plan.warnings
@@ -171,6 +176,11 @@ class MaxPayload(LimitResult):
         return rows
 
     @property
+    def bracket_width(self) -> float:
+        """Return the width of the bracket [kg]; inf if unknown."""
+        return self.local_upper - self.payload
+
+    @property
     def upper_means(self) -> str:
         """Return what `local_upper` is, in words that it follows."""
         if self.held:
@@ -201,6 +211,11 @@ class MinDuration(LimitResult):
     duration: float = np.inf
     local_lower: float = 0.0
     proved_lower: float = 0.0
+
+    @property
+    def bracket_width(self) -> float:
+        """Return the width of the bracket [s]."""
+        return self.duration - self.local_lower
 
     def limit_rows(self) -> list[tuple[str, str]]:
         """Return the shortest duration, what is too short, and what is proved."""

@@ -46,7 +46,7 @@ class WarningKind(Enum):
     SPEED_ABOVE_NO_LOAD = 'faster than the no-load speed'
     TIP_NEAR_BASE = 'the tip comes near the base'
     LINKS_OVERLAP = 'links overlap'
-    STIFF_LINKS = 'links so stiff that they are planned as rigid'
+    STIFF_LINKS = 'links or joints too stiff to vibrate with the motion'
     JOINT_WITHOUT_INERTIA = 'clamped link on a joint without inertia'
     MODE_FAMILY_ASSUMED = 'a link does not say how it is fixed'
     TOO_FEW_MODES = 'too few modes'
@@ -73,7 +73,7 @@ class PlanWarning:
         For people.
     value : float or None
         The figure that the sentence tells: a share [-], or a length [m] for `TIP_NEAR_BASE`,
-        `TOO_FEW_MODES` and `STIFF_LINKS`.
+        `TOO_FEW_MODES` and `STIFF_LINKS`; of elastic joints alone, the twist [rad].
     time : float or None
         When, where there is one moment [s].
 

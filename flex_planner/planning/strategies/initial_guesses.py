@@ -30,6 +30,9 @@ import numpy as np
 
 WARM_START = 'warm start'
 
+# intervals on which Newton's method takes ringing as linear, in units of those that overlook
+# nothing, and the iterations of a first look on fewer
+_FINE, _FIRST_LOOK = 6, 20
 # of a mesh that shows no ringing
 _COARSE_STAGES, _COARSE_INTERVALS = 3, (60, 40, 20)
 # of the transcription
@@ -49,11 +52,26 @@ def _straight(problem: MotionProblem, solver: Solver) -> CollocationSolution:
 
 
 def lift_rigid_motion(problem: MotionProblem, solver: Solver) -> Attempt | None:
-    """Start from the motion of the same arm made rigid, bent as its forces bend the links."""
+    """
+    Start from the motion of the same arm made rigid, bent as its forces bend the links.
+
+    What rings many times is nearly linear, but not to a mesh with a few points per cycle: where
+    such a mesh fails, a finer one is tried.
+
+    """
     motion = _solve_rigid(problem, solver)
     if motion is None or not motion.converged:
         return None if motion is None else Attempt(result=motion)
-    return Attempt(result=solver.solve(problem, lift(problem, motion.solution, solver)))
+    fewest, settings = problem.fewest_intervals(solver.settings.stages), solver.settings
+    rings = settings.intervals < fewest <= settings.max_intervals / _FINE
+    first = solver.with_settings(
+        max_iterations=min(_FIRST_LOOK, settings.max_iterations)) if rings else solver
+    result = first.solve(problem, lift(problem, motion.solution, solver))
+    if rings and result.status is SolverStatus.NEWTON_FAILED:
+        mesh = np.linspace(0, problem.task.duration, _FINE * fewest + 1, dtype=np.float64)
+        result = solver.solve(problem, bend_quasi_statically(problem, motion.solution, mesh,
+                                                             settings.rule))
+    return Attempt(result=result)
 
 
 def _solve_rigid(problem: MotionProblem, solver: Solver) -> CollocationResult | None:

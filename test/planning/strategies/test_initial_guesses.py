@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 import math
 from typing import Any
 
 from factories import PlanFactory, TaskFactory
 from flex_planner.arms.arm import Arm, Joint, Link, Motor
+from flex_planner.arms.arm_files import load_arm
 from flex_planner.base.errors import InvalidTaskError
 from flex_planner.base.progress import Monitor
 from flex_planner.collocation import (
@@ -33,6 +35,19 @@ from plan_checks import problem_of, SAME_COST, solution_of
 import pytest
 
 # From the rigid arm
+
+
+@pytest.mark.parametrize('modes', [2, 3])
+def test_what_rings_many_times_is_solved_on_a_mesh_that_shows_it(modes: int) -> None:
+    """Undamped, its torque sets the beam ringing through 650 and 1300 rad in these 45 s."""
+    arm = load_arm('space_beam')
+    task = Task(arm=replace(arm, links=(replace(arm.links[0], modes=modes),)), duration=45.0,
+                start_positions=[0.0], goal_positions=[math.pi / 6])
+    found = plan_path(task, search='fast', monitor=Monitor(time_limit=60))
+    assert found.solved
+    assert found.strategy == 'rigid motion first'
+    assert found.iterations <= 100
+    assert found.mesh_intervals <= 800
 
 
 def test_lifted_guess_is_the_rigid_motion_with_its_torque_and_links_bent_by_its_forces(
