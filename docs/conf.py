@@ -1,0 +1,58 @@
+"""Settings of Sphinx; `make docs` builds the site, and so does rosdoc2."""
+
+from __future__ import annotations
+
+from pathlib import Path
+import sys
+
+HERE = Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE), str(HERE.parent)]
+
+from flex_planner.base.version import VERSION  # noqa: E402
+from site_pages.source_links import link_sources, repository_address  # noqa: E402
+from site_pages.write import write_pages  # noqa: E402
+from sphinx.application import Sphinx  # noqa: E402
+from sphinx.config import Config  # noqa: E402
+
+project = 'flex_planner'
+author = 'The flex_planner maintainers'
+copyright = author  # noqa: A001 - Sphinx's name for it
+version = release = VERSION
+
+extensions = ['myst_parser', 'numpydoc', 'site_pages.mathml', 'sphinx.ext.autodoc',
+              'sphinx.ext.autosummary']
+exclude_patterns = ['_build', 'site_pages']
+myst_enable_extensions = ['attrs_inline', 'colon_fence', 'deflist', 'dollarmath']
+myst_heading_anchors = 4
+nitpicky = False  # types in docstrings are words
+
+html_theme = 'furo'
+html_title = f'flex_planner {VERSION}'
+html_static_path = ['static']
+html_css_files = ['site.css']
+html_show_sphinx = html_show_copyright = False
+html_math_renderer = 'mathml'
+
+templates_path = ['templates']
+autosummary_ignore_module_all = False
+autodoc_member_order = 'bysource'
+autodoc_typehints = 'none'  # the docstrings have them, in words
+numpydoc_show_class_members = False
+
+ADDRESS = repository_address(HERE.parent)
+
+
+def read_source(app: Sphinx, page: str, content: list[str]) -> None:
+    """Let links to files of the repository lead there."""
+    content[0] = link_sources(content[0], page, ADDRESS)
+
+
+def write_generated(app: Sphinx, config: Config) -> None:
+    """Write the pages that are made from the sources, before Sphinx looks for pages."""
+    write_pages(HERE / 'generated')
+
+
+def setup(app: Sphinx) -> None:
+    """Connect what is done before and while pages are read."""
+    app.connect('config-inited', write_generated)
+    app.connect('source-read', read_source)

@@ -1,0 +1,44 @@
+"""Links of pages to files outside of the documentation."""
+
+from __future__ import annotations
+
+from pathlib import Path, PurePosixPath
+import posixpath
+import re
+import xml.etree.ElementTree as ElementTree
+
+_LINK = re.compile(r'(?<!!)\[(?P<text>[^\]]*)\]\((?P<target>\.\./[^)\s]*)\)')
+
+
+def repository_address(root: Path) -> str:
+    """Return the address of the repository by package.xml; empty where it has none."""
+    for address in ElementTree.parse(root / 'package.xml').iterfind('url'):
+        if address.get('type') == 'repository':
+            return (address.text or '').strip().rstrip('/')
+    return ''
+
+
+def link_sources(text: str, page: str, address: str) -> str:
+    """
+    Return a page whose links out of the documentation lead to the repository.
+
+    Parameters
+    ----------
+    text : str
+        Markdown.
+    page : str
+        Path of the page in the documentation, such as ``tutorials/own_arm``.
+    address : str
+        Of the repository; where it is empty only the text of such links is left.
+
+    """
+    folder = PurePosixPath(page).parent
+
+    def changed(match: re.Match[str]) -> str:
+        path = posixpath.normpath(str(folder / match['target']))
+        if not path.startswith('../'):
+            return match[0]
+        place = path.removeprefix('../')
+        return f'[{match["text"]}]({address}/blob/main/{place})' if address else match['text']
+
+    return _LINK.sub(changed, text)
