@@ -44,8 +44,7 @@ def _parameter_lines(node: str, entry: Field[Any]) -> list[str]:
     default = entry.default if entry.default is not MISSING else _made(entry)
     facts = [f'{_type_name(default)}, default {code(json.dumps(default))}',
              *_range(description), *(['fixed'] if description.read_only else [])]
-    anchor = f'[]{{#{node}-{entry.name}}}'
-    return definition(f'{anchor}{code(entry.name)}',
+    return definition(f'{code(entry.name)}{{#{node}-{entry.name}}}',
                       [escape(description.text), f'*{"; ".join(facts)}*'])
 
 

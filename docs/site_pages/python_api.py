@@ -9,29 +9,32 @@ from types import ModuleType
 _HEAD = """\
 # Python
 
-What is listed here is meant to be called from outside; its names and arguments change only with a line in the
-[changelog](../changelog.rst). The ten names of the first section are imported from `flex_planner`, all others
-from their module. Units are SI and radians; arrays have the shapes that the entries give.
+The ten names of the first section are the face of the library, imported from `flex_planner`; most programs need no
+others. Those below are imported from their module. The [changelog](../changelog.rst) tells what changes. Units are SI and
+radians; arrays have the shapes that the entries give.
 """
 # what is meant for people's own programs, in the order in which they meet it
 SECTIONS = {
     'The face': ('flex_planner',),
-    'Arms': ('flex_planner.arms.arm', 'flex_planner.arms.arm_files', 'flex_planner.arms.joint',
-             'flex_planner.arms.link', 'flex_planner.arms.kinematics',
-             'flex_planner.arms.inverse_kinematics', 'flex_planner.dynamics.arm_dynamics'),
+    'Arms': ('flex_planner.arms.arm', 'flex_planner.arms.arm_files',
+             'flex_planner.arms.kinematics', 'flex_planner.arms.inverse_kinematics',
+             'flex_planner.dynamics.arm_dynamics', 'flex_planner.optimal_control.arm_model'),
     'Tasks and plans': ('flex_planner.optimal_control.task', 'flex_planner.planning.objectives',
                         'flex_planner.planning.plan', 'flex_planner.planning.plan_path',
                         'flex_planner.planning.certificate', 'flex_planner.planning.warnings',
-                        'flex_planner.planning.sampling'),
+                        'flex_planner.planning.sampling', 'flex_planner.planning.robustness'),
     'Limits': ('flex_planner.capacity.max_payload', 'flex_planner.capacity.min_duration',
-               'flex_planner.capacity.results', 'flex_planner.planning.proofs'),
+               'flex_planner.capacity.results', 'flex_planner.optimal_control.free_payload',
+               'flex_planner.planning.proofs'),
     'Simulation': ('flex_planner.simulation.comparison', 'flex_planner.simulation.execution',
                    'flex_planner.simulation.mismatch', 'flex_planner.simulation.plant'),
     'Maps': ('flex_planner.maps.study', 'flex_planner.maps.run_map', 'flex_planner.maps.store',
              'flex_planner.maps.draw_map', 'flex_planner.maps.map_starts',
              'flex_planner.maps.cell_results'),
     'Pictures and recordings': ('flex_planner.plotting', 'flex_planner.recording',
-                                'flex_planner.reports.arm', 'flex_planner.reports.comparison'),
+                                'flex_planner.reports.arm', 'flex_planner.reports.comparison',
+                                'flex_planner.reports.motion', 'flex_planner.reports.recording',
+                                'flex_planner.cli.request', 'flex_planner.cli.recorder'),
     'Boundary-value problems': ('flex_planner.collocation',),
     'Errors and progress': ('flex_planner.base.errors', 'flex_planner.base.progress'),
 }
