@@ -9,13 +9,18 @@ HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parent)]
 
 from flex_planner.base.version import VERSION  # noqa: E402
-from site_pages.source_links import link_sources, repository_address  # noqa: E402
+from site_pages.source_links import (  # noqa: E402
+    link_sources,
+    maintainer,
+    repository_address,
+    title_links,
+)
 from site_pages.write import write_pages  # noqa: E402
 from sphinx.application import Sphinx  # noqa: E402
 from sphinx.config import Config  # noqa: E402
 
 project = 'flex_planner'
-author = 'The flex_planner maintainers'
+author = maintainer(HERE.parent)
 copyright = author  # noqa: A001 - Sphinx's name for it
 version = release = VERSION
 
@@ -36,6 +41,7 @@ html_math_renderer = 'mathml'
 templates_path = ['templates']
 autosummary_ignore_module_all = False
 autodoc_member_order = 'bysource'
+autodoc_preserve_defaults = True
 autodoc_typehints = 'none'  # the docstrings have them, in words
 numpydoc_show_class_members = False
 
@@ -43,8 +49,8 @@ ADDRESS = repository_address(HERE.parent)
 
 
 def read_source(app: Sphinx, page: str, content: list[str]) -> None:
-    """Let links to files of the repository lead there."""
-    content[0] = link_sources(content[0], page, ADDRESS)
+    """Let links to files of the repository lead there, and show the titles of pages."""
+    content[0] = title_links(link_sources(content[0], page, ADDRESS))
 
 
 def write_generated(app: Sphinx, config: Config) -> None:

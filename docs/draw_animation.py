@@ -20,6 +20,7 @@ from flex_planner.plotting import backend  # noqa: F401 - loads Matplotlib witho
 from flex_planner.simulation.comparison import compare, Comparison
 from flex_planner.simulation.execution import ExecutionMode
 from matplotlib.animation import FuncAnimation, PillowWriter
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 import numpy as np
@@ -92,12 +93,13 @@ def animate(comparison: Comparison, path: Path) -> None:
     clock = figure.text(0.5, 0.02, '', ha='center', fontsize=9)
     duration = comparison.flexible.task.duration
 
-    def draw(index: int) -> None:
+    def draw(index: int) -> Sequence[Artist]:
         time = index / RATE
         for side in sides:
             side.draw(time)
         clock.set_text(f'simulated: the same arm, payload and controller; {time:.2f} s'
                        + (', arrived' if time >= duration else ''))
+        return ()
 
     frames = round((duration + SETTLING) * RATE) + 1
     FuncAnimation(figure, draw, frames=frames).save(path, writer=PillowWriter(fps=RATE))

@@ -7,13 +7,14 @@ from collections.abc import Iterator
 import textwrap
 
 from flex_planner.cli.parser import build_parser
+
 from site_pages.markdown import code, definition, escape
 
 _HEAD = """\
 # The command line
 
-Made from the program itself; `flex-planner COMMAND --help` prints the same. In a checkout, write `tools/run` in front.
-Streams, signals and exit codes are told in [terminal.md](../terminal.md).
+Made from the program itself; `flex-planner COMMAND --help` prints the same. In a checkout, write
+`tools/run` in front. Streams, signals and exit codes are told in [terminal.md](../terminal.md).
 """
 _WIDTH = 90
 
@@ -24,7 +25,7 @@ def command_line_page() -> str:
     for name, summary, parser in commands():
         lines += [f'## flex-planner {name}', '', escape(parser.description or summary), '',
                   '```text', usage(parser), '```', '']
-        for action in parser._actions:
+        for action in _shown(parser):
             lines += _option_lines(parser, action)
     return '\n'.join(lines)
 
@@ -40,18 +41,23 @@ def commands() -> Iterator[tuple[str, str, argparse.ArgumentParser]]:
 
 def usage(parser: argparse.ArgumentParser) -> str:
     """Return one line of usage, broken where it is too long."""
-    parts = [_spelling(action) for action in parser._actions if action.option_strings]
-    names = [_value(action) for action in parser._actions if not action.option_strings]
+    parts = [_spelling(action) for action in _shown(parser) if action.option_strings]
+    names = [_value(action) for action in _shown(parser) if not action.option_strings]
     text = ' '.join([parser.prog, *names, *(f'[{part}]' for part in parts)])
     kept = text.replace('] [', ']\0[').replace(' ', '\u00a0').replace('\0', ' ')
-    lines = textwrap.wrap(kept, _WIDTH, subsequent_indent='    ', break_long_words=False)
+    lines = textwrap.wrap(kept, _WIDTH, subsequent_indent='    ', break_long_words=False,
+                          break_on_hyphens=False)
     return '\n'.join(lines).replace('\u00a0', ' ')
 
 
+def _shown(parser: argparse.ArgumentParser) -> list[argparse.Action]:
+    """Return the options but for --help, which every command has."""
+    return [action for action in parser._actions if action.dest != 'help'
+            and action.help != argparse.SUPPRESS]
+
+
 def _option_lines(parser: argparse.ArgumentParser, action: argparse.Action) -> list[str]:
-    """Return the entry of an option in a definition list; none for --help."""
-    if isinstance(action, argparse._HelpAction) or action.help == argparse.SUPPRESS:
-        return []
+    """Return the entry of an option in a definition list."""
     said = (action.help or '') % {**vars(action), 'prog': parser.prog}
     required = ['*required*'] if action.option_strings and action.required else []
     return definition(code(_spelling(action)), [escape(said), *required])

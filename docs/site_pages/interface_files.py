@@ -111,7 +111,7 @@ def _entry(line: str) -> Entry:
 
 
 def paragraphs(comment: list[str]) -> Iterator[tuple[bool, str]]:
-    """Return the paragraphs of a comment; those that are indented are True, and keep their lines."""
+    """Return the paragraphs of a comment, and whether they are indented and keep their lines."""
     block: list[str] = []
     indented = False
     for line in [*comment, '']:

@@ -10,8 +10,9 @@ from site_pages.markdown import code, definition, escape
 _HEAD = """\
 # ROS interfaces
 
-Made from the files of the package `flex_planner_interfaces`; `ros2 interface show` prints the same. Which
-topics, services and actions use them is told in [the node](../ros_node.md), error codes have
+Made from the files of the package `flex_planner_interfaces`; `ros2 interface show` prints the
+same. Which topics, services and actions use them is told in [the node](../ros_node.md), error
+codes have
 [a page of their own](../error_codes.md). Units are SI and radians.
 """
 _TITLES = {'msg': 'Messages', 'srv': 'Services', 'action': 'Actions'}

@@ -10,6 +10,7 @@ from flex_planner.ros.settings.fields import Description
 from flex_planner.ros.settings.planner import PlannerSettings
 from flex_planner.ros.settings.replay import ReplaySettings
 from flex_planner.ros.settings.simulator import SimulatorSettings
+
 from site_pages.markdown import code, definition, escape
 
 NODES: dict[str, type[Any]] = {'flex_planner': PlannerSettings,
@@ -18,13 +19,14 @@ NODES: dict[str, type[Any]] = {'flex_planner': PlannerSettings,
 _HEAD = """\
 # Parameters of the nodes
 
-Made from the dataclasses that declare them. `config/planner.yaml` has all of them with their defaults, and
-`ros2 param describe` says the same of a running node. Those that are fixed can only be set when the node starts.
-Lists with one entry per joint follow the arm where they are not given: names are `joint1`, `joint2` and so on, gains
-suit the inertia of each joint ([execution.md](../execution.md)).
+Made from the dataclasses that declare them. `config/planner.yaml` has all of them with their
+defaults, and `ros2 param describe` says the same of a running node. Those that are fixed can only
+be set when the node starts. Lists with one entry per joint follow the arm where they are not
+given: names are `joint1`, `joint2` and so on, gains suit the inertia of each joint
+([execution.md](../execution.md)).
 
-The planner and the simulated arm have `arm` besides, the path of an [arm file](../arm_files.md) or the name of a
-preset. It is fixed.
+The planner and the simulated arm have `arm` besides, the path of an [arm file](../arm_files.md) or
+the name of a preset. It is fixed.
 """
 
 
@@ -44,8 +46,13 @@ def _parameter_lines(node: str, entry: Field[Any]) -> list[str]:
     default = entry.default if entry.default is not MISSING else _made(entry)
     facts = [f'{_type_name(default)}, default {code(json.dumps(default))}',
              *_range(description), *(['fixed'] if description.read_only else [])]
-    return definition(f'{code(entry.name)}{{#{node}-{entry.name}}}',
+    return definition(f'{code(entry.name)}{{#{anchor(node, entry.name)}}}',
                       [escape(description.text), f'*{"; ".join(facts)}*'])
+
+
+def anchor(node: str, name: str) -> str:
+    """Return the anchor of a parameter, in letters that HTML keeps."""
+    return f'{node}-{name}'.replace('_', '-')
 
 
 def _made(entry: Field[Any]) -> Any:

@@ -9,9 +9,10 @@ from types import ModuleType
 _HEAD = """\
 # Python
 
-The ten names of the first section are the face of the library, imported from `flex_planner`; most programs need no
-others. Those below are imported from their module. The [changelog](../changelog.rst) tells what changes. Units are SI and
-radians; arrays have the shapes that the entries give.
+The ten names of the first section are the face of the library, imported from `flex_planner`; most
+programs need no others. Those below are imported from their module. The
+[changelog](../changelog.rst) tells what changes. Units are SI and radians; arrays have the shapes
+that the entries give.
 """
 # what is meant for people's own programs, in the order in which they meet it
 SECTIONS = {
@@ -41,7 +42,7 @@ SECTIONS = {
 
 
 def public_names(module: ModuleType) -> list[str]:
-    """Return the names that a module offers: its __all__, or the functions and classes it defines."""
+    """Return the names that a module offers: its __all__, or the functions and classes in it."""
     listed = getattr(module, '__all__', None)
     names = listed if listed is not None else [
         name for name, value in vars(module).items()

@@ -8,6 +8,8 @@ import re
 import xml.etree.ElementTree as ElementTree
 
 _LINK = re.compile(r'(?<!!)\[(?P<text>[^\]]*)\]\((?P<target>\.\./[^)\s]*)\)')
+# a page that is named by its file, as it is read in a checkout
+_NAMED = re.compile(r'\[(?P<name>[\w-]+\.md)\](?=\([^)\s]*(?P=name)[)#])')
 
 
 def repository_address(root: Path) -> str:
@@ -16,6 +18,11 @@ def repository_address(root: Path) -> str:
         if address.get('type') == 'repository':
             return (address.text or '').strip().rstrip('/')
     return ''
+
+
+def maintainer(root: Path) -> str:
+    """Return who maintains the project, by package.xml."""
+    return ElementTree.parse(root / 'package.xml').findtext('maintainer', '')
 
 
 def link_sources(text: str, page: str, address: str) -> str:
@@ -42,3 +49,8 @@ def link_sources(text: str, page: str, address: str) -> str:
         return f'[{match["text"]}]({address}/blob/main/{place})' if address else match['text']
 
     return _LINK.sub(changed, text)
+
+
+def title_links(text: str) -> str:
+    """Return a page whose links show titles, which Sphinx fills in, for the names of files."""
+    return _NAMED.sub('[]', text)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from flex_planner.recording import definition_folder
+
 from site_pages.command_line import command_line_page
 from site_pages.interfaces import interfaces_page
 from site_pages.parameters import parameters_page

@@ -17,9 +17,9 @@ from site_pages.command_line import command_line_page, commands
 from site_pages.interface_files import read_interface
 from site_pages.interfaces import interfaces_page
 from site_pages.markdown import escape
-from site_pages.parameters import NODES, parameters_page
+from site_pages.parameters import anchor, NODES, parameters_page
 from site_pages.python_api import python_page, SECTIONS
-from site_pages.source_links import link_sources
+from site_pages.source_links import link_sources, title_links
 from site_pages.write import write_pages
 
 INTERFACES = ROOT / 'flex_planner_interfaces'
@@ -70,7 +70,7 @@ def test_comment_before_and_beside_an_entry_and_an_indented_one_are_kept(tmp_pat
 def test_every_parameter_is_there_with_its_default_and_range(node: str) -> None:
     shown = section(parameters_page(), node)
     for entry in fields(NODES[node]):
-        assert f'`{entry.name}`{{#{node}-{entry.name}}}\n: ' in shown
+        assert f'`{entry.name}`{{#{anchor(node, entry.name)}}}\n: ' in shown
         assert escape(entry.metadata['description'].text) in shown
     assert shown.count('; fixed') == sum(entry.metadata['description'].read_only
                                          for entry in fields(NODES[node]))
@@ -138,3 +138,8 @@ def test_links_out_of_the_documentation_lead_to_the_repository() -> None:
     assert link_sources(text, 'page', 'https://h/r') == (
         '[a](https://h/r/blob/main/x/a.py) [b](https://h/r/blob/main/b.md) ![c](../x/c.png)')
     assert link_sources(text, 'page', '') == 'a b ![c](../x/c.png)'
+
+
+def test_page_that_is_named_by_its_file_is_shown_by_its_title() -> None:
+    assert title_links('[a.md](a.md#b) [a.md](../a.md) [x](a.md) [a.md](b.md)') == (
+        '[](a.md#b) [](../a.md) [x](a.md) [a.md](b.md)')

@@ -1,4 +1,4 @@
-"""Markdown pages: their headings, links and blocks of code, and a reader who does what they say."""
+"""Markdown pages: headings, links and blocks of code, and a reader who does what they say."""
 
 from __future__ import annotations
 
