@@ -143,3 +143,7 @@ def test_links_out_of_the_documentation_lead_to_the_repository() -> None:
 def test_page_that_is_named_by_its_file_is_shown_by_its_title() -> None:
     assert title_links('[a.md](a.md#b) [a.md](../a.md) [x](a.md) [a.md](b.md)') == (
         '[](a.md#b) [](../a.md) [x](a.md) [a.md](b.md)')
+
+
+def test_people_at_a_terminal_are_spared_the_equations_of_the_paper() -> None:
+    assert not re.search(r'\beqs?\.', command_line_page() + parameters_page())
