@@ -13,6 +13,7 @@ from site_pages.source_links import (  # noqa: E402
     link_sources,
     maintainer,
     repository_address,
+    repository_root,
     title_links,
 )
 from site_pages.write import write_pages  # noqa: E402
@@ -20,13 +21,16 @@ from sphinx.application import Sphinx  # noqa: E402
 from sphinx.config import Config  # noqa: E402
 
 project = 'flex_planner'
-author = maintainer(HERE.parent)
+ROOT = repository_root(HERE)
+author = maintainer(ROOT)
 copyright = author  # noqa: A001 - Sphinx's name for it
 version = release = VERSION
 
 extensions = ['myst_parser', 'numpydoc', 'site_pages.mathml', 'sphinx.ext.autodoc',
               'sphinx.ext.autosummary']
-exclude_patterns = ['_build', 'site_pages']
+# the last five are what rosdoc2 adds to its copy, whose index would take the place of ours
+exclude_patterns = ['_build', 'site_pages', 'index.rst', 'modules.rst', 'flex_planner*.rst',
+                    'standard_docs*', '__readme_include.rst']
 myst_enable_extensions = ['attrs_inline', 'colon_fence', 'deflist', 'dollarmath']
 myst_heading_anchors = 4
 nitpicky = False  # types in docstrings are words
@@ -45,7 +49,7 @@ autodoc_preserve_defaults = True
 autodoc_typehints = 'none'  # the docstrings have them, in words
 numpydoc_show_class_members = False
 
-ADDRESS = repository_address(HERE.parent)
+ADDRESS = repository_address(ROOT)
 
 
 def read_source(app: Sphinx, page: str, content: list[str]) -> None:
@@ -55,7 +59,7 @@ def read_source(app: Sphinx, page: str, content: list[str]) -> None:
 
 def write_generated(app: Sphinx, config: Config) -> None:
     """Write the pages that are made from the sources, before Sphinx looks for pages."""
-    write_pages(HERE / 'generated')
+    write_pages(HERE / 'generated', ROOT)
 
 
 def setup(app: Sphinx) -> None:

@@ -11,7 +11,7 @@ _HEAD = """\
 
 The ten names of the first section are the face of the library, imported from `flex_planner`; most
 programs need no others. Those below are imported from their module. The
-[changelog](../changelog.rst) tells what changes. Units are SI and radians; arrays have the shapes
+[changelog](changelog.rst) tells what changes. Units are SI and radians; arrays have the shapes
 that the entries give.
 """
 # what is meant for people's own programs, in the order in which they meet it

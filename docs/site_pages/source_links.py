@@ -7,9 +7,25 @@ import posixpath
 import re
 import xml.etree.ElementTree as ElementTree
 
+import flex_planner
+
 _LINK = re.compile(r'(?<!!)\[(?P<text>[^\]]*)\]\((?P<target>\.\./[^)\s]*)\)')
 # a page that is named by its file, as it is read in a checkout
 _NAMED = re.compile(r'\[(?P<name>[\w-]+\.md)\](?=\([^)\s]*(?P=name)[)#])')
+
+
+def repository_root(documentation: Path) -> Path:
+    """
+    Return the folder of package.xml.
+
+    It is the parent of the documentation, unless that is a copy: rosdoc2 makes one. Then it is
+    where the package is imported from.
+
+    """
+    for folder in (documentation.parent, Path(flex_planner.__file__).resolve().parents[1]):
+        if (folder / 'package.xml').is_file():
+            return folder
+    raise FileNotFoundError(f'there is no package.xml beside {documentation}')
 
 
 def repository_address(root: Path) -> str:

@@ -125,10 +125,10 @@ def test_modules_that_examples_and_tutorials_import_are_public() -> None:
 
 
 def test_pages_are_written_once(tmp_path: Path) -> None:
-    write_pages(tmp_path)
+    write_pages(tmp_path, ROOT)
     times = {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
-    write_pages(tmp_path)
-    assert set(times) == {'python.md', 'interfaces.md', 'parameters.md', 'command_line.md'}
+    write_pages(tmp_path, ROOT)
+    assert {'python.md', 'interfaces.md', 'parameters.md', 'command_line.md'} < set(times)
     assert {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == times
 
 
