@@ -19,6 +19,7 @@ from site_pages.source_links import (  # noqa: E402
 from site_pages.write import write_pages  # noqa: E402
 from sphinx.application import Sphinx  # noqa: E402
 from sphinx.config import Config  # noqa: E402
+from sphinx.ext import autosummary  # noqa: E402
 
 project = 'flex_planner'
 ROOT = repository_root(HERE)
@@ -30,7 +31,7 @@ extensions = ['myst_parser', 'numpydoc', 'site_pages.mathml', 'sphinx.ext.autodo
               'sphinx.ext.autosummary']
 # the last five are what rosdoc2 adds to its copy, whose index would take the place of ours
 exclude_patterns = ['_build', 'site_pages', 'index.rst', 'modules.rst', 'flex_planner*.rst',
-                    'standard_docs*', '__readme_include.rst']
+                    'standard*', '__readme_include.rst']
 myst_enable_extensions = ['attrs_inline', 'colon_fence', 'deflist', 'dollarmath']
 myst_heading_anchors = 4
 nitpicky = False  # types in docstrings are words
@@ -44,6 +45,8 @@ html_math_renderer = 'mathml'
 
 templates_path = ['templates']
 autosummary_ignore_module_all = False
+# after which a sentence goes on
+autosummary.WELL_KNOWN_ABBREVIATIONS += ('eq.', 'eqs.', 'fig.', 'D.C.')
 autodoc_member_order = 'bysource'
 autodoc_preserve_defaults = True
 autodoc_typehints = 'none'  # the docstrings have them, in words

@@ -32,4 +32,6 @@ def test_site_is_built_without_a_warning_and_without_the_network(tmp_path: Path)
     assert [name for name, text in pages.items() if REMOTE.search(text)] == []
     assert '<math' in pages['theory.html'] and '$' not in re.sub(
         r'<(code|pre|script).*?</\1>', '', pages['theory.html'], flags=re.DOTALL)
+    # summaries are whole sentences, also with abbreviations in them
+    assert not re.search(r'\b(eqs?|fig|D\.C)\.</p>', pages['generated/python.html'])
     assert 'id="arm-simulator-modes"' in pages['generated/parameters.html']
