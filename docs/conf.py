@@ -46,7 +46,7 @@ html_math_renderer = 'mathml'
 templates_path = ['templates']
 autosummary_ignore_module_all = False
 # after which a sentence goes on
-autosummary.WELL_KNOWN_ABBREVIATIONS += ('eq.', 'eqs.', 'fig.', 'D.C.')
+autosummary.WELL_KNOWN_ABBREVIATIONS += ('eq.', 'eqs.', 'fig.', 'D.C.')  # type: ignore[assignment]
 autodoc_member_order = 'bysource'
 autodoc_preserve_defaults = True
 autodoc_typehints = 'none'  # the docstrings have them, in words
