@@ -41,6 +41,12 @@ def test_link_that_leads_nowhere_is_seen() -> None:
     assert not broken(DOCS / 'solver.md', '#warnings')
 
 
+def test_every_picture_is_shown() -> None:
+    shown = {(page.parent / target).resolve() for page in PAGES
+             for target in LINK.findall(prose(page))}
+    assert {path for path in DOCS.glob('images/**/*.*') if path not in shown} == set()
+
+
 def test_every_page_is_in_the_table_of_contents() -> None:
     index = (DOCS / 'index.md').read_text(encoding='utf-8')
     listed = set(re.findall(r'^([\w/]+)$', index, re.MULTILINE))
