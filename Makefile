@@ -1,5 +1,5 @@
 .DEFAULT_GOAL := help
-.PHONY: help setup demo demo-library paper test test-thorough lint bench clean
+.PHONY: help setup demo demo-library paper test test-thorough lint docs bench clean
 
 # The interpreter for .venv; a finished .venv stays as it is unless PYTHON is given.
 ifeq ($(origin PYTHON),undefined)
@@ -7,7 +7,7 @@ PYTHON := python3
 SETUP_FLAGS := --keep-python
 endif
 
-CODE := bench examples flex_planner launch test tools setup.py
+CODE := bench docs examples flex_planner launch test tools setup.py
 
 help:
 	@echo 'make demo     plan motions of a flexible arm through a ROS 2 node; results in output/'
@@ -17,6 +17,7 @@ help:
 	@echo 'make test-thorough   run the other tests: long plans, every node test, every example'
 	@echo 'make setup    only create .venv and build into install/'
 	@echo 'make lint     only check the style'
+	@echo 'make docs     build the documentation as a site, into docs/_build/html (1 minute)'
 	@echo 'make bench    measure, and write docs/benchmarks.md (some minutes, on an idle machine)'
 	@echo 'make clean    remove everything that these targets made'
 	@echo
@@ -54,14 +55,21 @@ endef
 lint: setup
 	tools/run ruff check
 	tools/run mypy
+	tools/run codespell
 	@mkdir -p log
 	@tools/run ament_flake8 $(CODE) >log/lint.txt || { cat log/lint.txt; exit 1; }
 	@tools/run ament_pep257 $(CODE) >log/lint.txt
+
+docs: setup
+	tools/run python -m sphinx --builder html --fail-on-warning --keep-going --quiet \
+		--jobs auto docs docs/_build/html
+	@echo 'docs/_build/html/index.html'
 
 bench: setup
 	@tools/run pip install -q -r bench/requirements.txt
 	tools/run python -m bench
 
 clean:
-	rm -rf .venv .venv-library build install log output .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-library build install log output docs/_build docs/generated \
+		.mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,11 +1,15 @@
 from glob import glob
 from pathlib import Path
+import xml.etree.ElementTree as ElementTree
 
 from setuptools import find_packages, setup
 
 package_name = 'flex_planner'
 DATA_FOLDERS = {'flex_planner.config': 'config',
                 'flex_planner.recording.flex_planner_interfaces': 'flex_planner_interfaces'}
+# the one place that says who maintains it, and where it is
+PACKAGE_XML = ElementTree.parse(Path(__file__).with_name('package.xml'))
+MAINTAINER = PACKAGE_XML.find('maintainer')
 
 setup(
     name=package_name,
@@ -13,8 +17,9 @@ setup(
     description='Trajectory planning for flexible-link manipulators',
     long_description=Path(__file__).with_name('README.md').read_text(encoding='utf-8'),
     long_description_content_type='text/markdown',
-    maintainer='The flex_planner maintainers',
-    maintainer_email='maintainers@flexplanner.example',
+    maintainer=MAINTAINER.text,
+    maintainer_email=MAINTAINER.get('email'),
+    url=PACKAGE_XML.findtext('url[@type="repository"]'),
     license='Apache-2.0',
     python_requires='>=3.10',
     classifiers=[

@@ -81,7 +81,7 @@ def check_platform(system: str, machine: str) -> None:
     if (system, machine) != ('Linux', 'x86_64'):
         raise SetupError(
             f'This machine is {system} {machine}, but ROS 2 Jazzy has wheels for Linux x86_64 '
-            'only: install ROS 2 itself and build with colcon, as README.md says.'
+            'only: install ROS 2 itself and build with colcon, as docs/installation.md says.'
         )
 
 

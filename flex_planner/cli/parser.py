@@ -14,6 +14,11 @@ from flex_planner.cli.options import join_lists
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Return the options of a command line; SystemExit after a message where it is wrong."""
+    return build_parser().parse_args(join_lists(arguments))
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """Return the parser of the command line."""
     parser = CommandParser(
         prog='flex-planner', description='Motion planning for flexible-link manipulators.')
     parser.add_argument('--version', action='version', version=VERSION)
@@ -25,4 +30,4 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     paper.add_command(commands)
     cache.add_command(commands)
     recordings.add_commands(commands)
-    return parser.parse_args(join_lists(arguments))
+    return parser

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
 import time
@@ -29,7 +28,7 @@ from flex_planner.recording import (
 )
 from flex_planner.ros.runtime.parameters import declare, warn_of_unknown
 from flex_planner.ros.runtime.running import CannotGoOnError, run_node
-from flex_planner.ros.settings.fields import parameter_field
+from flex_planner.ros.settings.replay import ReplaySettings
 import rclpy
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
@@ -39,24 +38,6 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 _DELIVERY_TIMEOUT = Duration(seconds=1)
 _SHORTEST_WAIT_NS = 1000
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ReplaySettings:
-    """Parameters of the replay; all read-only."""
-
-    recording: str = parameter_field(
-        '', 'Folder of the recording, or its .mcap file.', read_only=True)
-    rate: float = parameter_field(
-        1.0, 'Speed of the playback, 2 is twice as fast.', lowest=1e-3, highest=1e3,
-        read_only=True)
-    start: float = parameter_field(
-        0.0, 'Time to leave out at the beginning of the recording [s].', lowest=0.0, highest=1e9,
-        read_only=True)
-    delay: float = parameter_field(
-        1.0, 'Time before the first message, in which subscribers find the publishers [s].',
-        lowest=0.01, highest=60.0, read_only=True)
-    loop: bool = parameter_field(False, 'Whether to begin again at the end.', read_only=True)
 
 
 class Replay(Node):  # type: ignore[misc]

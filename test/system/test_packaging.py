@@ -65,6 +65,19 @@ def test_versions_agree():
     assert len(versions) == 1
 
 
+def test_maintainer_and_address_are_those_of_package_xml():
+    ours, interfaces = (ElementTree.parse(folder / 'package.xml') for folder in PACKAGES)
+    maintainer, address = ours.find('maintainer'), ours.findtext('url[@type="repository"]')
+    metadata_ = metadata.metadata('flex_planner')
+    assert metadata_['Maintainer'] == maintainer.text
+    assert metadata_['Maintainer-email'] == maintainer.get('email')
+    assert ElementTree.tostring(interfaces.find('maintainer')) == ElementTree.tostring(maintainer)
+    citation = yaml.safe_load((ROOT / 'CITATION.cff').read_text())
+    assert citation['authors'] == [{'name': maintainer.text}]
+    assert citation.get('repository-code') == address
+    assert citation['version'] == flex_planner.__version__
+
+
 def test_pinned_versions_satisfy_setup():
     lines = (ROOT / 'requirements' / 'runtime.txt').read_text().splitlines()
     pinned = dict(line.split('==') for line in lines if not line.startswith('#'))

@@ -98,7 +98,8 @@ def _replay(options: argparse.Namespace) -> int:
         raise RecordingError(f'{shown_path(options.recording)} cannot be replayed: its name is '
                              'not UTF-8, which ROS needs: rename it')
     try:
-        from flex_planner.ros.replay import replay, ReplaySettings
+        from flex_planner.ros.replay import replay
+        from flex_planner.ros.settings.replay import ReplaySettings
     except ImportError as error:
         print(f'flex-planner: a replay needs ROS 2: {error}', file=sys.stderr)
         return 1
