@@ -48,7 +48,7 @@ def approach_limit(parameter: FreeParameter, problem: MotionProblem, solver: Sol
     `transfer_extremal`, spares all that.
 
     """
-    barrier = first is None and parameter is PAYLOAD
+    barrier = first is None and parameter is PAYLOAD and target_gap is not no_target
     if barrier and is_cheap(problem):
         first = reach_limit(problem, solver, target_gap)
     if first is None and problem.model.arm.n_passive:
