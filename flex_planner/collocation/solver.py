@@ -66,6 +66,11 @@ class Solver:
         return self.backend(problem, guess, self.settings, self.monitor,
                             expected_error=expected_error)
 
+    @property
+    def is_own(self) -> bool:
+        """Return whether the method is that of this package."""
+        return self.backend is solve
+
     def solve_near(self, problem: BoundaryValueProblem, known: KnownSolution) -> CollocationResult:
         """
         Solve a problem from the solution of one like it, see `restart.solve_near`.
@@ -75,7 +80,7 @@ class Solver:
 
         """
         tolerance = self.settings.error_tolerance
-        if self.backend is not solve:
+        if not self.is_own:
             return self.solve(problem, known.solution, expected_error=tolerance)
         settings = replace(self.settings, error_tolerance=min(_RESTART_TOLERANCE * tolerance, 1.0))
         return solve_near(problem, known, settings, self.monitor)

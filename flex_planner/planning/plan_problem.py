@@ -153,6 +153,8 @@ def _conclude(problem: MotionProblem, strategy: str, attempt: Attempt, solver: S
         return replace(plan, status=INTERRUPTED_STATUS[result.status])
     if result.converged:
         return _certify(plan, result, solver)
+    if failed is PlanStatus.NOT_FOUND:  # it says which payload or duration was found instead
+        return plan
     return replace(plan, message=f'{plan.message}; {suggest_changes(problem)}')
 
 

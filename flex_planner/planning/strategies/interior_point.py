@@ -43,8 +43,11 @@ MakeGuess = Callable[[int], CollocationSolution]
 """From a number of intervals to a guess."""
 
 
-def pass_barrier(problem: MotionProblem, solver: Solver) -> Attempt:
-    """Start from a straight line with the motors' limits as a barrier."""
+def pass_barrier(problem: MotionProblem, solver: Solver) -> Attempt | None:
+    """Start from a straight line with the motors' limits as a barrier; None by another method."""
+    if not solver.is_own:
+        return None
+
     def guess(intervals: int) -> CollocationSolution:
         return problem.straight_line(intervals, GaussRule.of(_STAGES))
 
@@ -56,12 +59,12 @@ def pass_barrier_from_rigid(problem: MotionProblem, solver: Solver) -> Attempt |
     if not problem.task.arm.n_passive:
         return None
     try:
-        rigid = pass_barrier(rigid_problem(problem), solver).result
+        rigid = pass_barrier(rigid_problem(problem), solver)
     except InvalidTaskError:  # motors that hold the bent arm may be too weak for the straight one
         return None
-    if not rigid.converged:
-        return Attempt(result=rigid)
-    return Attempt(result=pass_barrier_from(problem, rigid.solution, solver))
+    if rigid is None or not rigid.result.converged:
+        return rigid
+    return Attempt(result=pass_barrier_from(problem, rigid.result.solution, solver))
 
 
 def pass_barrier_from(problem: MotionProblem, near: CollocationSolution,
@@ -85,7 +88,7 @@ def _pass_on_meshes(problem: MotionProblem, make_guess: MakeGuess,
         count = int(share * max(_FEWEST, problem.fewest_intervals(_STAGES)))
         guess = make_guess(min(count, solver.settings.max_intervals))
         schedule = BarrierSchedule(first=first * rate, last=_LAST * rate, tolerance=_TOLERANCE,
-                                   max_iterations=_PATIENCE)
+                                   max_iterations=min(_PATIENCE, solver.settings.max_iterations))
         met = solve_barrier(barrier, guess, barrier.guess(guess, schedule.first), schedule,
                             solver.monitor)
         if not met.converged:

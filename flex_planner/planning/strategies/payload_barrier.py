@@ -28,7 +28,7 @@ _PRICE = 1e3
 # mu at first and at last, of that price
 _FIRST, _LAST = 0.15, 3e-4
 _TOLERANCE = 0.1
-_PATIENCE = 40
+_PATIENCE = 60
 # where the motion within the limits is not found, those with these shares of the payload are tried
 _LESS = (0.99, 0.95)
 # the price, in units of all effort for the payload, that leaves a gap of this share; the gap falls
@@ -51,7 +51,7 @@ def reach_limit(problem: MotionProblem, solver: Solver, target_gap: TargetGap) -
 
     """
     most = _most_effort(problem)
-    if not np.isfinite(most) or np.isfinite(problem.goal_weights).any():
+    if not solver.is_own or not np.isfinite(most) or np.isfinite(problem.goal_weights).any():
         return None
     barrier = PayloadBarrier(problem, _PRICE * most / _moved_mass(problem))
     found = _lower_mu(barrier, solver)
@@ -67,12 +67,15 @@ def reach_limit(problem: MotionProblem, solver: Solver, target_gap: TargetGap) -
 
 def _solve_below(problem: MotionProblem, payload: float, solver: Solver) -> Extremal | None:
     """Return the motion with a little less than what was reached with the barrier."""
+    patient = solver.with_settings(max_iterations=_PATIENCE)
     for share in _LESS:
         if not PAYLOAD.improves(share * payload, PAYLOAD.value(problem)):
             break
         try:
             near = PAYLOAD.with_value(problem, share * payload)
-            result = pass_barrier(near, solver).result
+            attempt = pass_barrier(near, patient)
+            assert attempt is not None  # the method is our own
+            result = attempt.result
             price = PAYLOAD.price(near, result.solution) if result.converged else 0.0
         except FlexPlannerError:  # too heavy to hold, or the links buckle with hardly more
             continue
