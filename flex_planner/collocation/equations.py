@@ -19,7 +19,7 @@ from flex_planner.collocation.solution import CollocationSolution
 import numpy as np
 
 # Jacobian entries evaluated between two looks at the monitor: some milliseconds, some MB
-_CHUNK = 400_000
+CHUNK = 400_000
 
 
 def magnitudes(problem: BoundaryValueProblem, solution: CollocationSolution) -> Array:
@@ -86,7 +86,7 @@ def linearise(problem: BoundaryValueProblem, solution: CollocationSolution, moni
     times, values = solution.stage_times(), solution.stage_values()
     rate = np.empty_like(solution.stages)
     jacobians = np.empty((count, stages, size, size) if exact else (count, size, size))
-    chunk = max(1, _CHUNK // (stages * size**2))
+    chunk = max(1, CHUNK // (stages * size**2))
     for first in range(0, count, chunk):
         monitor.check()
         part = slice(first, first + chunk)

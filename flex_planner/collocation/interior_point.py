@@ -17,6 +17,7 @@ from typing import Protocol
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
 from flex_planner.collocation.compiled_system import factorise_system
+from flex_planner.collocation.equations import CHUNK
 from flex_planner.collocation.linear import Residual
 from flex_planner.collocation.problem import Indices, RATE_NOT_FINITE, SingularSystemError
 from flex_planner.collocation.solution import CollocationSolution
@@ -169,7 +170,7 @@ def solve_barrier(problem: BarrierProblem, guess: CollocationSolution, y: Array,
     while at.iterations < min(schedule.max_iterations, monitor.iterations_left(guess.intervals)):
         monitor.check()
         try:
-            step = _find_step(problem, at)
+            step = _find_step(problem, at, monitor)
         except SingularSystemError as error:
             return replace(at, message=str(error))
         monitor.step(step.norm, guess.intervals)
@@ -179,14 +180,12 @@ def solve_barrier(problem: BarrierProblem, guess: CollocationSolution, y: Array,
     return at
 
 
-def _find_step(problem: BarrierProblem, at: BarrierOutcome) -> _Step:
+def _find_step(problem: BarrierProblem, at: BarrierOutcome, monitor: Monitor) -> _Step:
     """Return the Newton step at an iterate."""
     solution, y = at.solution, at.y.reshape(-1, at.y.shape[-1])
     count, stages, size = solution.stages.shape
     z = solution.stage_values().reshape(-1, size)
-    rate, jacobians = problem.condense(z, y, at.mu)
-    if not (np.isfinite(rate).all() and np.isfinite(jacobians).all()):
-        raise SingularSystemError(RATE_NOT_FINITE)
+    rate, jacobians = _condense(problem, z, y, at.mu, monitor)
     (left, left_rows), (right, right_rows) = (
         problem.left(solution.nodes[0]), problem.right(solution.nodes[-1]))
     scale = np.maximum(np.abs(solution.nodes).max(axis=0), problem.scale(at.mu))
@@ -203,6 +202,20 @@ def _find_step(problem: BarrierProblem, at: BarrierOutcome) -> _Step:
     dz = nodes[:-1, None] + solution.steps[:, None, None] * (solution.rule.matrix @ rates)
     dy = problem.find_step(z, y, dz.reshape(-1, size), at.mu).reshape(at.y.shape)
     return _Step(nodes, rates, dy, norm)
+
+
+def _condense(problem: BarrierProblem, z: Array, y: Array, mu: float,
+              monitor: Monitor) -> tuple[Array, Array]:
+    """Return F and J at all stages; the monitor is asked now and then."""
+    rate, jacobians = np.empty_like(z), np.empty((len(z), problem.size, problem.size))
+    chunk = max(1, CHUNK // problem.size**2)
+    for first in range(0, len(z), chunk):
+        monitor.check()
+        part = slice(first, first + chunk)
+        rate[part], jacobians[part] = problem.condense(z[part], y[part], mu)
+    if not (np.isfinite(rate).all() and np.isfinite(jacobians).all()):
+        raise SingularSystemError(RATE_NOT_FINITE)
+    return rate, jacobians
 
 
 def _advance(problem: BarrierProblem, at: BarrierOutcome, step: _Step,

@@ -46,7 +46,10 @@ def equilibrium(dynamics: ArmDynamics, positions: Array,
         force, stiffness = dynamics.static_forces(q[None], p)
         if not dynamics.arm.n_passive:
             return q, force[0]
-        change = np.linalg.solve(stiffness[0, n:, n:], force[0, n:])
+        try:
+            change = np.linalg.solve(stiffness[0, n:, n:], force[0, n:])
+        except np.linalg.LinAlgError:  # about to buckle
+            break
         q[n:] -= change
         if np.abs(change).max() <= 1e-13 * dynamics.arm.reach:
             if np.linalg.eigvalsh(stiffness[0, n:, n:])[0] <= 0:

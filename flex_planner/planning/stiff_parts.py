@@ -86,6 +86,8 @@ def find_stiff_parts(problem: MotionProblem, stages: int, max_intervals: int) ->
         Of the solver.
 
     """
+    if not _vibrates(problem):
+        return StiffParts()
     arm, share = problem.model.arm, negligible_share(problem, stages, max_intervals)
     parts = StiffParts(links=tuple(i for i, link in enumerate(arm.links) if link.modes),
                        joints=arm.elastic_joints)
@@ -95,6 +97,14 @@ def find_stiff_parts(problem: MotionProblem, stages: int, max_intervals: int) ->
             break
         parts = _without(parts, int(np.array(list(_owners(arm)))[slowest]))
     return parts
+
+
+def _vibrates(problem: MotionProblem) -> bool:
+    """Return whether all that bends swings back: what has no frequency is not stiff."""
+    n_t = problem.model.arm.n_coordinates
+    return all(bool((natural_modes(problem.model, end[:n_t], problem.parameters,
+                                   locked=True)[0] > 0).all())
+               for end in (problem.start, problem.goal))
 
 
 def negligible_share(problem: MotionProblem, stages: int, max_intervals: int) -> float:

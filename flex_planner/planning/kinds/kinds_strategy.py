@@ -130,7 +130,8 @@ def _solve_from(problem: MotionProblem, bare: MotionProblem, kind: KindOfMotion,
     weighted = has_weights(problem)
     first = solver.coarse() if weighted else solver
     result = first.solve(bare, as_guess(bare, kind, solver))
-    if solver.is_own and not result.converged and result.status not in INTERRUPTED:
+    if (solver.is_own and problem.compiled_rate() is not None and not result.converged
+            and result.status not in INTERRUPTED):
         result = pass_barrier_from(bare, _stretch(bare, kind), first)
     if not (weighted and result.converged):
         return result

@@ -44,8 +44,14 @@ MakeGuess = Callable[[int], CollocationSolution]
 
 
 def pass_barrier(problem: MotionProblem, solver: Solver) -> Attempt | None:
-    """Start from a straight line with the motors' limits as a barrier; None by another method."""
-    if not solver.is_own:
+    """
+    Start from a straight line with the motors' limits as a barrier.
+
+    None where another method solves, or without a compiler: it takes too many points for functions
+    that are interpreted.
+
+    """
+    if not solver.is_own or problem.compiled_rate() is None:
         return None
 
     def guess(intervals: int) -> CollocationSolution:

@@ -50,8 +50,10 @@ def reach_limit(problem: MotionProblem, solver: Solver, target_gap: TargetGap) -
         See `continue_in_price`.
 
     """
+    if not solver.is_own or problem.compiled_rate() is None:
+        return None
     most = _most_effort(problem)
-    if not solver.is_own or not np.isfinite(most) or np.isfinite(problem.goal_weights).any():
+    if not np.isfinite(most) or np.isfinite(problem.goal_weights).any():
         return None
     barrier = PayloadBarrier(problem, _PRICE * most / _moved_mass(problem))
     found = _lower_mu(barrier, solver)
