@@ -236,5 +236,5 @@ def draw_distance(axes: Axes, motion: Motion, execution: Execution | None = None
     axes.semilogy(execution.tip_times, np.maximum(distance, _LEAST_DISTANCE), color=CARRIED_OUT,
                   label='tip, simulated')
     axes.axvline(motion.times[-1], color=ASIDE, linestyle=':', label='planned arrival')
-    finish(axes, f'simulated tip from the goal (below {_LEAST_DISTANCE:g} mm drawn there)',
+    finish(axes, f'simulated tip from the goal (≥ {_LEAST_DISTANCE:g} mm)',
            'distance [mm]')
