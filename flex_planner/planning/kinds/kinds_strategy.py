@@ -28,7 +28,7 @@ from flex_planner.planning.strategies.homotopies import (
     raise_weights_from,
 )
 from flex_planner.planning.strategies.initial_guesses import lift
-from flex_planner.planning.strategies.interior_point import pass_barrier_from
+from flex_planner.planning.strategies.interior_point import applies, pass_barrier_from
 from flex_planner.planning.strategies.strategy import Attempt
 
 # kinds that Newton's method is tried from
@@ -130,7 +130,7 @@ def _solve_from(problem: MotionProblem, bare: MotionProblem, kind: KindOfMotion,
     weighted = has_weights(problem)
     first = solver.coarse() if weighted else solver
     result = first.solve(bare, as_guess(bare, kind, solver))
-    if (solver.is_own and problem.compiled_rate() is not None and not result.converged
+    if (applies(bare, solver) and not result.converged
             and result.status not in INTERRUPTED):
         result = pass_barrier_from(bare, _stretch(bare, kind), first)
     if not (weighted and result.converged):

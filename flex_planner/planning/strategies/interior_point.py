@@ -43,15 +43,20 @@ MakeGuess = Callable[[int], CollocationSolution]
 """From a number of intervals to a guess."""
 
 
-def pass_barrier(problem: MotionProblem, solver: Solver) -> Attempt | None:
+def applies(problem: MotionProblem, solver: Solver) -> bool:
     """
-    Start from a straight line with the motors' limits as a barrier.
+    Return whether the method is to be tried.
 
-    None where another method solves, or without a compiler: it takes too many points for functions
+    Not where another method solves, nor without a compiler: it takes too many points for functions
     that are interpreted.
 
     """
-    if not solver.is_own or problem.compiled_rate() is None:
+    return solver.is_own and problem.compiled_rate() is not None
+
+
+def pass_barrier(problem: MotionProblem, solver: Solver) -> Attempt | None:
+    """Start from a straight line with the motors' limits as a barrier; None if not `applies`."""
+    if not applies(problem, solver):
         return None
 
     def guess(intervals: int) -> CollocationSolution:

@@ -16,7 +16,7 @@ from flex_planner.optimal_control.barrier_problem import PayloadBarrier
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.planning.strategies.extremals import Extremal, TargetGap
 from flex_planner.planning.strategies.free_parameters import PAYLOAD
-from flex_planner.planning.strategies.interior_point import pass_barrier
+from flex_planner.planning.strategies.interior_point import applies, pass_barrier
 import numpy as np
 
 # of the method, and of its mesh, in those of `fewest_intervals`
@@ -50,7 +50,7 @@ def reach_limit(problem: MotionProblem, solver: Solver, target_gap: TargetGap) -
         See `continue_in_price`.
 
     """
-    if not solver.is_own or problem.compiled_rate() is None:
+    if not applies(problem, solver):
         return None
     most = _most_effort(problem)
     if not np.isfinite(most) or np.isfinite(problem.goal_weights).any():
