@@ -14,7 +14,12 @@ from flex_planner.capacity.bracket import (
     is_near_limit,
 )
 from flex_planner.capacity.extrapolation import extrapolate_to_limit, Neighbours
-from flex_planner.collocation import CollocationSolution, Solver
+from flex_planner.collocation import (
+    CollocationResult,
+    CollocationSolution,
+    Solver,
+    SolverStatus,
+)
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.planning.kinds.clusters import KindOfMotion
 from flex_planner.planning.kinds.effort import SearchEffort
@@ -26,7 +31,7 @@ from flex_planner.planning.plan_problem import INTERRUPTED_STATUS, plan_problem
 from flex_planner.planning.strategies.catalogue import CATALOGUE, QUICK
 from flex_planner.planning.strategies.extremals import Extremal, SearchStart
 from flex_planner.planning.strategies.first_extremals import approach_limit, transfer_extremal
-from flex_planner.planning.strategies.free_parameters import FreeParameter
+from flex_planner.planning.strategies.free_parameters import FreeParameter, PAYLOAD
 from flex_planner.planning.strategies.homotopies import (
     drop_weights,
     has_weights,
@@ -180,7 +185,21 @@ class LimitSearch:
                 return extremal, plan
             if short.monitor.stop_reason():
                 break
-        return None
+        # a search that had begun met nothing yet: what it began with may do
+        begun = self._parameter is PAYLOAD and self._solver.monitor.iteration > 0
+        met = any(one.result.converged for one in self.extremals)
+        return self._certify_first(problem, short) if begun and not met else None
+
+    def _certify_first(self, problem: MotionProblem,
+                       short: Solver) -> tuple[Extremal, Plan] | None:
+        """Return the motion with the payload of the task, and its plan."""
+        plan = plan_problem(problem, short, QUICK)
+        if plan.solution is None or not plan.solved:
+            return None
+        result = replace(CollocationResult.failed(plan.solution, plan.message),
+                         status=SolverStatus.CONVERGED)
+        return Extremal(value=self._parameter.value(problem), price=0.0, result=result,
+                        problem=problem), plan
 
     @property
     def explored_best(self) -> KindOfMotion | None:
