@@ -1,8 +1,9 @@
 """
 Position and velocity of the arm: frames, bent links, tip.
 
-Points of planar arms have two coordinates, those of spatial ones three. Written with array operations and apart from :mod:`flex_planner.dynamics.build_chain`, so that
-each can check the other.
+Points of planar arms have two coordinates, those of spatial ones three. Written with array
+operations and apart from :mod:`flex_planner.dynamics.build_chain`, so that each can check the
+other.
 
 """
 
@@ -103,6 +104,35 @@ def link_deflections(arm: Arm, index: int, vectors: Array) -> Array:
     shapes = link.mode_shapes().shape(np.linspace(0, link.length, _STATIONS, dtype=np.float64))
     deflections: Array = shapes @ vectors[part.start - n:part.stop - n]
     return deflections
+
+
+def bent_distances(arm: Arm, index: int, modal: Array, stations: int) -> Array:
+    """
+    Return how far points along a link are from where they would be unbent.
+
+    Parameters
+    ----------
+    arm : Arm
+        Its links twist without moving their points.
+    index : int
+        Of the link, from 0.
+    modal : numpy.ndarray, shape (k, modes)
+        Displacements of its modes.
+    stations : int
+        Evenly spaced points, both ends included.
+
+    Returns
+    -------
+    numpy.ndarray, shape (k, stations)
+        >= 0 [m].
+
+    """
+    link = arm.links[index]
+    if isinstance(arm, SpatialArm):
+        distances: Array = np.linalg.norm(arm.links[index].displace(modal, stations), axis=-1)
+        return distances
+    places = np.linspace(0, link.length, stations, dtype=np.float64)
+    return np.abs(modal @ link.mode_shapes().shape(places).T)
 
 
 def tip_position(arm: Arm, coordinates: Array) -> Array:

@@ -91,8 +91,9 @@ class SpatialBeam:
         twists = self.twist_modes > 0
         check_quantity('torsional_rigidity', self.torsional_rigidity, 'flexural_rigidity',
                        above=0, infinite=not twists, note=' (needed for modes of twisting)')
-        check_quantity('polar_inertia', self.polar_inertia, 'inertia',
-                       **({'above': 0.0} if twists else {'at_least': 0.0}))
+        check_quantity('polar_inertia', self.polar_inertia, 'inertia', at_least=0)
+        if twists and not self.polar_inertia:
+            raise InvalidValueError('polar_inertia', 0.0, '> 0 kg m with modes of twisting')
         if self.mode_family not in CLAMPED:
             raise InvalidValueError('mode_family', self.mode_family, ' or '.join(CLAMPED))
         check_quantity('shape_twist_inertia', self.shape_twist_inertia, 'inertia', at_least=0)

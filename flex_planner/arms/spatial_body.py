@@ -61,7 +61,7 @@ class SpatialBody:
 
     @property
     def is_possible(self) -> bool:
-        """Return whether a body can have this inertia: no principal moment above the others' sum."""
+        """Return whether a body can have it: no principal moment is above the others' sum."""
         moments = np.linalg.eigvalsh(np.array(self.inertia))
         return bool(moments[2] <= (1 + 1e-6) * (moments[0] + moments[1]))
 
@@ -91,13 +91,14 @@ def spread(place: Array) -> Array:
 
 def join_bodies(*bodies: SpatialBody) -> SpatialBody:
     """Return what bodies that are fixed to the same frame are together."""
-    mass = sum(body.mass for body in bodies)
-    if len(bodies) == 1 or not mass:
-        return next((body for body in bodies if not body.is_nothing), SpatialBody())
-    wholes = [body.about(np.zeros(3), np.eye(3)) for body in bodies]
-    center = sum(body.first_moment for body in wholes) / mass
-    inertia = sum(body.inertia for body in wholes) - mass * spread(center)
-    return SpatialBody(mass=mass, center_of_mass=center, inertia=(inertia + inertia.T) / 2)
+    mass, given = sum(body.mass for body in bodies), [one for one in bodies if not one.is_nothing]
+    if len(given) < 2 or not mass:
+        return given[0] if given else SpatialBody()
+    wholes = [body.about(np.zeros(3), np.eye(3)) for body in given]
+    center: Array = np.sum([body.first_moment for body in wholes], axis=0) / mass
+    inertia = np.sum([body.inertia for body in wholes], axis=0) - mass * spread(center)
+    return SpatialBody(mass=mass, center_of_mass=as_point(center),
+                       inertia=as_matrix((inertia + inertia.T) / 2))
 
 
 def place_body(body: SpatialBody, origin: Array, axes: Array) -> SpatialBody:

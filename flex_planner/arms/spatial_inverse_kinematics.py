@@ -143,8 +143,9 @@ def _usual_rank(arm: SpatialArm) -> int:
 
 def _moves(arm: SpatialArm, positions: Array) -> Array:
     """Return the Jacobian of the unbent arm's tip, shape (3, n) [m/rad]."""
-    return tip_moves(arm, np.concatenate([positions, np.zeros(arm.n_passive)]))[
-        :3, :arm.n_joints]
+    unbent = np.concatenate([positions, np.zeros(arm.n_passive)])
+    moves: Array = tip_moves(arm, unbent)[:3, :arm.n_joints]
+    return moves
 
 
 def _relative(arm: SpatialArm, moves: Array) -> Array:
@@ -171,7 +172,7 @@ class _Target:
     def slope(self, positions: Array) -> Array:
         """Return its derivative by the joint coordinates, that of the turn for small ones."""
         moves = tip_moves(self.arm, self._unbent(positions))[:, :self.arm.n_joints]
-        scaled = moves / np.array([[self.arm.reach]] * 3 + [[1.0]] * 3)
+        scaled: Array = moves / np.array([[self.arm.reach]] * 3 + [[1.0]] * 3)
         return scaled[:3] if self._orientation is None else scaled
 
     def _unbent(self, positions: Array) -> Array:
@@ -181,12 +182,13 @@ class _Target:
 def _turn_between(wanted: Array, axes: Array) -> Array:
     """Return the rotation vector from wanted axes to others, in the axes of the base [rad]."""
     turn = axes @ wanted.T
-    vector_part = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0],
-                            turn[1, 0] - turn[0, 1]]) / 2
+    vector_part: Array = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0],
+                                   turn[1, 0] - turn[0, 1]]) / 2
     sine, cosine = float(np.linalg.norm(vector_part)), (float(np.trace(turn)) - 1) / 2
     angle = float(np.arctan2(sine, cosine))
     if sine > 1e-6:
-        return vector_part * (angle / sine)
+        scaled: Array = vector_part * (angle / sine)
+        return scaled
     if cosine > 0:
         return vector_part
     # by half a turn: about the eigenvector that stays

@@ -56,3 +56,8 @@ class SpatialJoint(Joint):
         object.__setattr__(self, 'rotation', rotation('rotation', self.rotation))
         if not isinstance(self.slides, bool):
             raise InvalidValueError('slides', self.slides, 'true or false')
+
+
+def slides(joint: Joint) -> bool:
+    """Return whether a joint of any arm is prismatic."""
+    return isinstance(joint, SpatialJoint) and joint.slides

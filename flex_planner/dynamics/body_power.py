@@ -143,7 +143,7 @@ def tip_shift(body: FlexibleBody, modes: Motion) -> Motion:
 
 
 def _deflect(linear: Array, square: Array, modes: Motion) -> Motion:
-    """Return ``A q + q^T B q / 2``, a vector that moves, for A (3, m) and symmetric B (3, m, m)."""
+    """Return ``A q + q^T B q / 2``, which moves, for A (3, m) and symmetric B (3, m, m)."""
     moved = modes.apply(lambda z: apply(linear, z))
     if not square.any():
         return moved

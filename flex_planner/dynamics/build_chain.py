@@ -156,6 +156,7 @@ def _payload(mechanism: Mechanism, mass: Any, inertia: Any) -> Inertia:
     turns = mechanism.payload_axes
     square = sum(entry**2 for entry in com)
     matrix = [[total([product((square if i == k else 0.0) - com[i] * com[k], mass),
-                      inertia if i == k and i in turns else 0.0]) for k in range(3)] for i in range(3)]
+                      inertia if i == k and i in turns else 0.0]) for k in range(3)]
+              for i in range(3)]
     x, y, z = (product(entry, mass) for entry in com)
     return Inertia(mass, (x, y, z), matrix)

@@ -27,8 +27,8 @@ def rest_at_point(dynamics: ArmDynamics, arm: Arm, point: Array, reference: Arra
     Return the arm at rest with its tip at a point, its links bent by gravity.
 
     From a reference posture the joints turn as the Jacobian there says, which for as many joints
-    as the point has coordinates leaves nothing to choose and for more keeps them near it; a joint that meets a limit stays
-    there. The branch is that of the reference posture.
+    as the point has coordinates leaves nothing to choose and for more keeps them near it; a joint
+    that meets a limit stays there. The branch is that of the reference posture.
 
     Parameters
     ----------
@@ -177,8 +177,8 @@ def _nearest(posture: _BentArm, point: Array) -> Array:
     joints = 'one joint' if n == 1 else f'{n} joints'
     if np.linalg.norm(tip - point) > _ENOUGH * posture.arm.reach:
         raise UnreachableError(
-            f'the tip of the arm, bent by gravity, rests at {_say_point(tip, 9)} m at nearest: with '
-            f'{joints} it does not come to {_say_point(point, 9)} m')
+            f'the tip of the arm, bent by gravity, rests at {_say_point(tip, 9)} m at nearest: '
+            f'with {joints} it does not come to {_say_point(point, 9)} m')
     return turned
 
 

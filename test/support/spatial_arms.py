@@ -9,7 +9,7 @@ import math
 from flex_planner.arms.joint import Elasticity, Motor
 from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.arms.spatial_beam import SpatialBeam
-from flex_planner.arms.spatial_body import SpatialBody
+from flex_planner.arms.spatial_body import as_matrix, as_point, SpatialBody, turn_rpy
 from flex_planner.arms.spatial_joint import SpatialJoint
 from flex_planner.arms.spatial_link import SpatialLink
 import numpy as np
@@ -146,11 +146,11 @@ def oblique(seed: int = 3, joints: int = 6) -> SpatialArm:
     for i in range(joints):
         root = rng.normal(size=(3, 3))
         points = root @ root.T * 0.01
-        links.append(SpatialLink(end=rng.normal(size=3) * 0.3, body=SpatialBody(
-            mass=rng.uniform(0.5, 3), center_of_mass=rng.normal(size=3) * 0.1,
-            inertia=np.trace(points) * np.eye(3) - points)))
-        made.append(SpatialJoint(axis=rng.normal(size=3), rotation=rng.uniform(-3, 3, 3),
-                                 slides=i in (2, 4)))
+        links.append(SpatialLink(end=as_point(rng.normal(size=3) * 0.3), body=SpatialBody(
+            mass=rng.uniform(0.5, 3), center_of_mass=as_point(rng.normal(size=3) * 0.1),
+            inertia=as_matrix(np.trace(points) * np.eye(3) - points))))
+        made.append(SpatialJoint(axis=as_point(rng.normal(size=3)), slides=i in (2, 4),
+                                 rotation=as_matrix(turn_rpy(*rng.uniform(-3, 3, 3)))))
     return SpatialArm(name='oblique', base=rng.normal(size=3) * 0.3, joints=tuple(made),
                       links=tuple(links), payload_com=[0.01, 0.02, 0.03])
 
