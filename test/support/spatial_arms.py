@@ -158,3 +158,19 @@ def oblique(seed: int = 3, joints: int = 6) -> SpatialArm:
 def without_friction(arm: SpatialArm) -> SpatialArm:
     return replace(arm, joints=tuple(replace(joint, viscous_friction=0.0)
                                      for joint in arm.joints))
+
+
+def yaw_pitch(*, foreshortening: bool = False) -> SpatialArm:
+    """Return a light arm of two joints whose second link bends in two planes."""
+    beam = SpatialBeam(linear_density=0.6, flexural_rigidity=(60.0, 90.0), modes=(1, 1),
+                       mode_family='clamped_mass', shape_mass=0.5, damping_ratio=0.0,
+                       foreshortening=foreshortening)
+    return SpatialArm(
+        name='yaw and pitch', payload_com=[0, 0, 0],
+        joints=(SpatialJoint(viscous_friction=0.1, motor=motor(20, 6.0, 0.03)),
+                SpatialJoint(axis=(0, 1, 0), viscous_friction=0.1, motor=motor(25, 6.0, 0.03))),
+        links=(SpatialLink(end=(0.05, 0, 0.3), body=SpatialBody(
+                   mass=2.0, center_of_mass=(0, 0, 0.15), inertia=(0.02, 0.02, 0.005))),
+               SpatialLink(end=(0.7, 0, 0), beam=beam, body=SpatialBody(inertia=(0.001,) * 3),
+                           tip_body=SpatialBody(mass=0.3, center_of_mass=(0.02, 0, 0),
+                                                inertia=(0.0004,) * 3))))
