@@ -15,6 +15,7 @@ import math
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import jacobian, tip_position
+from flex_planner.arms.planar_only import require_planar
 from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.arms.spatial_inverse_kinematics import (
     check_spatial_singularity,
@@ -43,7 +44,8 @@ _WEIGHTS = (1e-1, 1e-2, 1e-4, 0.0)
 
 
 def workspace(arm: Arm) -> tuple[float, float]:
-    """Return the smallest and largest distance of the tip from the base [m], limits aside."""
+    """Return the smallest and largest distance of a planar arm's tip from its base [m]."""
+    require_planar(arm, 'rings that a tip reaches')
     lengths = [link.length for link in arm.links]
     return max(0.0, 2 * max(lengths) - sum(lengths)), sum(lengths)
 

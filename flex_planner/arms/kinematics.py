@@ -10,6 +10,7 @@ other.
 from __future__ import annotations
 
 from flex_planner.arms.arm import Arm
+from flex_planner.arms.planar_only import require_planar
 from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.arms.spatial_kinematics import spatial_link_points, tip_frame, tip_moves
 from flex_planner.base.validation import Array
@@ -29,7 +30,13 @@ def frame_angles(arm: Arm, coordinates: Array) -> Array:
     coordinates : numpy.ndarray, shape (..., n_t)
         q.
 
+    Raises
+    ------
+    PlanarOnlyError
+        If the arm is a spatial one.
+
     """
+    require_planar(arm, 'angles in the plane')
     n, turning = arm.n_joints, list(arm.elastic_joints)
     turns = np.array(coordinates[..., :n])
     turns[..., turning] += coordinates[..., n:n + len(turning)]
