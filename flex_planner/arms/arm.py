@@ -99,6 +99,11 @@ class Arm:
         check_quantity('payload_inertia', self.payload_inertia, 'inertia', at_least=0)
 
     @property
+    def dimension(self) -> int:
+        """Return the number of coordinates of a point: 2, those of the plane."""
+        return 2
+
+    @property
     def n_joints(self) -> int:
         """Return the number of joints, n."""
         return len(self.links)

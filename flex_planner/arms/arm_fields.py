@@ -82,6 +82,15 @@ def _stepped(section: YamlSection, bends: bool) -> dict[str, Any]:
 
 def read_joint(section: YamlSection) -> Joint:
     """Return a joint with its motor."""
+    values = read_joint_values(section)
+    if section.has('housing'):
+        values['housing'] = read_node(section.section('housing'))
+    joint: Joint = section.build(Joint, **values)
+    return joint
+
+
+def read_joint_values(section: YamlSection) -> dict[str, Any]:
+    """Return the fields of a joint of any kind: motor, friction, elasticity, limits."""
     values: dict[str, Any] = {**_friction(section)}
     if section.has('motor'):
         values['motor'] = _motor(section.section('motor'))
@@ -89,11 +98,8 @@ def read_joint(section: YamlSection) -> Joint:
         part = section.section('elasticity')
         values['elasticity'] = part.build(Elasticity, stiffness=part.take('stiffness'),
                                           damping=part.take('damping', 0.0))
-    if section.has('housing'):
-        values['housing'] = read_node(section.section('housing'))
-    joint: Joint = section.build(Joint, lower_limit=section.take('lower_limit', -math.inf),
-                                 upper_limit=section.take('upper_limit', math.inf), **values)
-    return joint
+    return {**values, 'lower_limit': section.take('lower_limit', -math.inf),
+            'upper_limit': section.take('upper_limit', math.inf)}
 
 
 def _friction(section: YamlSection) -> dict[str, Any]:

@@ -1,4 +1,9 @@
-"""Arm files: YAML in physical quantities, read strictly; the presets lie in ``config/arms``."""
+"""
+Arm files: YAML in physical quantities, read strictly; the presets lie in ``config/arms``.
+
+They describe planar arms; spatial ones where they say ``kind: spatial`` or name a URDF file.
+
+"""
 
 from __future__ import annotations
 
@@ -12,6 +17,9 @@ from typing import Any, NoReturn
 
 from flex_planner.arms.arm import Arm, BeamSection, Elasticity, Joint, Link, Motor, Node
 from flex_planner.arms.arm_fields import read_joint, read_link, read_node, read_payload
+from flex_planner.arms.planar_only import require_planar
+from flex_planner.arms.spatial_files import is_spatial, read_spatial_arm
+from flex_planner.arms.urdf import UrdfError
 from flex_planner.base.errors import FlexPlannerError, InvalidValueError
 from flex_planner.base.paths import expand_path, PathError, STANDARD_INPUT
 from flex_planner.base.suggestions import did_you_mean
@@ -126,14 +134,16 @@ def load_arm(name: str | os.PathLike[str]) -> Arm:
     """
     path = find_arm_file(os.fspath(name))
     try:
-        return arm_from_mapping(read_yaml(path)[1])
+        return arm_from_mapping(read_yaml(path)[1], folder=path.parent)
     except YamlFileError as error:
         raise ArmFileError(str(error)) from None
+    except UrdfError as error:
+        raise ArmFileError(f'{say_file(path)}: urdf: {error}') from None
     except InvalidValueError as error:
         raise ArmFileError(f'{say_file(path)}: {error}') from error
 
 
-def arm_from_mapping(content: object, path: str = '') -> Arm:
+def arm_from_mapping(content: object, path: str = '', folder: Path = Path()) -> Arm:
     """
     Return the arm described by the content of an arm file.
 
@@ -143,14 +153,20 @@ def arm_from_mapping(content: object, path: str = '') -> Arm:
         As YAML has it.
     path : str
         Where it stands in another file, for messages.
+    folder : pathlib.Path
+        In which the path of a URDF file begins.
 
     Raises
     ------
     InvalidValueError
         Naming the field by its path in the file, e.g. ``links[1].length``.
+    UrdfError
+        If a URDF file that it names is missing or wrong.
 
     """
     top = YamlSection(path, content)
+    if is_spatial(top):
+        return read_spatial_arm(top, folder)
     arm: Arm = top.build(
         Arm, name=top.text('name'), source=top.text('source', ''),
         links=tuple(read_link(section) for section in top.sections('links')),
@@ -168,7 +184,13 @@ def plain_arm(arm: Arm) -> dict[str, Any]:
     They are the fields of `Arm` and its parts in SI units, which keep an arm in the metadata of
     recordings and maps; an arm file may say the same in other quantities.
 
+    Raises
+    ------
+    PlanarOnlyError
+        If the arm is a spatial one.
+
     """
+    require_planar(arm, 'recordings and maps')
     return {**asdict(arm), 'gravity': arm.gravity.tolist(),
             'payload_com': arm.payload_com.tolist()}
 

@@ -3,7 +3,8 @@ Joint angles that put the tip at a point, and condition (I) of the paper.
 
 The arm is taken unbent, as at rest in a horizontal plane; where gravity bends it,
 `flex_planner.dynamics.rest_at_point` goes on from here. Closed form for one and two links; for
-more the posture nearest to a given one, found numerically within the joint limits.
+more the posture nearest to a given one, found numerically within the joint limits. For spatial
+arms see `spatial_inverse_kinematics`.
 
 """
 
@@ -14,6 +15,13 @@ import math
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import jacobian, tip_position
+from flex_planner.arms.planar_only import require_planar
+from flex_planner.arms.spatial_arm import SpatialArm
+from flex_planner.arms.spatial_inverse_kinematics import (
+    check_spatial_singularity,
+    spatial_inverse_kinematics,
+    spatial_posture_near_point,
+)
 from flex_planner.base.errors import (
     InvalidValueError,
     SingularError,
@@ -36,7 +44,8 @@ _WEIGHTS = (1e-1, 1e-2, 1e-4, 0.0)
 
 
 def workspace(arm: Arm) -> tuple[float, float]:
-    """Return the smallest and largest distance of the tip from the base [m], limits aside."""
+    """Return the smallest and largest distance of a planar arm's tip from its base [m]."""
+    require_planar(arm, 'rings that a tip reaches')
     lengths = [link.length for link in arm.links]
     return max(0.0, 2 * max(lengths) - sum(lengths)), sum(lengths)
 
@@ -63,7 +72,7 @@ def check_singularity(arm: Arm, positions: ArrayLike, moves: Array | None = None
         n joints.
     positions : array_like, shape (n,)
         Joint angles [rad].
-    moves : numpy.ndarray, shape (2, n), optional
+    moves : numpy.ndarray, shape (2 or 3, n), optional
         The Jacobian; that of the unbent arm if it is not given [m/rad].
 
     Raises
@@ -72,9 +81,12 @@ def check_singularity(arm: Arm, positions: ArrayLike, moves: Array | None = None
         With the reason in words.
 
     """
+    angles = np.asarray(positions, dtype=float)
+    if isinstance(arm, SpatialArm):
+        check_spatial_singularity(arm, angles, moves)
+        return
     if arm.n_joints < 2:
         return
-    angles = np.asarray(positions, dtype=float)
     J = jacobian(arm, angles) if moves is None else moves
     # for two joints this is |det J|
     measure = float(np.sqrt(max(np.linalg.det(J @ J.T), 0.0)))
@@ -96,11 +108,11 @@ def inverse_kinematics(arm: Arm, point: ArrayLike, elbow: int,
     ----------
     arm : Arm
         n joints.
-    point : array_like, shape (2,)
+    point : array_like, shape (2,), or (3,) for a spatial arm
         In the base frame [m].
     elbow : int
         Sign of the second joint angle, +1 or -1; with more than two links the side to which
-        the arm bends if `near` is not given. No effect on a single link.
+        the arm bends if `near` is not given. No effect on a single link, nor on a spatial arm.
     near : numpy.ndarray, shape (n,), optional
         Posture to stay close to: full turns of the first joint, and with more than two links
         the choice among the solutions [rad].
@@ -122,6 +134,8 @@ def inverse_kinematics(arm: Arm, point: ArrayLike, elbow: int,
     """
     if elbow not in (-1, 1):
         raise InvalidValueError('elbow', elbow, '+1 or -1')
+    if isinstance(arm, SpatialArm):
+        return spatial_inverse_kinematics(arm, point, near)
     target = np.asarray(point, dtype=float)
     _check_workspace(arm, target)
     if arm.n_joints == 1:
@@ -161,6 +175,8 @@ def posture_near_point(arm: Arm, point: ArrayLike, elbow: int,
         See `inverse_kinematics`.
 
     """
+    if isinstance(arm, SpatialArm):
+        return spatial_posture_near_point(arm, point, near)
     if not arm.bends_at_rest:
         return inverse_kinematics(arm, point, elbow, near)
     inside = _move_inside(arm, np.asarray(point, dtype=float))

@@ -1,14 +1,18 @@
 """
 Position and velocity of the arm: frames, bent links, tip.
 
-Written with array operations and apart from :mod:`flex_planner.dynamics.build_chain`, so that
-each can check the other.
+Points of planar arms have two coordinates, those of spatial ones three. Written with array
+operations and apart from :mod:`flex_planner.dynamics.build_chain`, so that each can check the
+other.
 
 """
 
 from __future__ import annotations
 
 from flex_planner.arms.arm import Arm
+from flex_planner.arms.planar_only import require_planar
+from flex_planner.arms.spatial_arm import SpatialArm
+from flex_planner.arms.spatial_kinematics import spatial_link_points, tip_frame, tip_moves
 from flex_planner.base.validation import Array
 import numpy as np
 
@@ -22,11 +26,17 @@ def frame_angles(arm: Arm, coordinates: Array) -> Array:
     Parameters
     ----------
     arm : Arm
-        n joints, n_t coordinates.
+        A planar one of n joints, n_t coordinates.
     coordinates : numpy.ndarray, shape (..., n_t)
         q.
 
+    Raises
+    ------
+    PlanarOnlyError
+        If the arm is a spatial one.
+
     """
+    require_planar(arm, 'angles in the plane')
     n, turning = arm.n_joints, list(arm.elastic_joints)
     turns = np.array(coordinates[..., :n])
     turns[..., turning] += coordinates[..., n:n + len(turning)]
@@ -51,10 +61,12 @@ def link_points(arm: Arm, coordinates: Array, stations: int = 2) -> Array:
 
     Returns
     -------
-    numpy.ndarray, shape (..., n, stations, 2)
+    numpy.ndarray, shape (..., n, stations, 2 or 3)
         In the base frame [m]; a link ends where the next begins.
 
     """
+    if isinstance(arm, SpatialArm):
+        return spatial_link_points(arm, coordinates, stations)
     angles = frame_angles(arm, coordinates)
     base = np.zeros((*coordinates.shape[:-1], 2))
     points = []
@@ -84,21 +96,65 @@ def link_deflections(arm: Arm, index: int, vectors: Array) -> Array:
     vectors : numpy.ndarray, shape (n_f, m)
         Columns are displacements of those coordinates.
 
+    Returns
+    -------
+    numpy.ndarray, shape (41, m)
+        Distances, without a sign, of a spatial arm.
+
     """
+    if isinstance(arm, SpatialArm):
+        part = arm.modal_slices[index]
+        modal = vectors[part.start - arm.n_joints:part.stop - arm.n_joints].T
+        distances: Array = np.linalg.norm(arm.links[index].displace(modal, _STATIONS), axis=-1).T
+        return distances
     link, part, n = arm.links[index], arm.modal_slices[index], arm.n_joints
     shapes = link.mode_shapes().shape(np.linspace(0, link.length, _STATIONS, dtype=np.float64))
     deflections: Array = shapes @ vectors[part.start - n:part.stop - n]
     return deflections
 
 
+def bent_distances(arm: Arm, index: int, modal: Array, stations: int) -> Array:
+    """
+    Return how far points along a link are from where they would be unbent.
+
+    Parameters
+    ----------
+    arm : Arm
+        Its links twist without moving their points.
+    index : int
+        Of the link, from 0.
+    modal : numpy.ndarray, shape (k, modes)
+        Displacements of its modes.
+    stations : int
+        Evenly spaced points, both ends included.
+
+    Returns
+    -------
+    numpy.ndarray, shape (k, stations)
+        >= 0 [m].
+
+    """
+    link = arm.links[index]
+    if isinstance(arm, SpatialArm):
+        distances: Array = np.linalg.norm(arm.links[index].displace(modal, stations), axis=-1)
+        return distances
+    places = np.linspace(0, link.length, stations, dtype=np.float64)
+    return np.abs(modal @ link.mode_shapes().shape(places).T)
+
+
 def tip_position(arm: Arm, coordinates: Array) -> Array:
-    """Return the position of the tip, shape (..., 2) [m], eq. (18)."""
+    """Return the position of the tip, shape (..., 2 or 3) [m], eq. (18)."""
+    if isinstance(arm, SpatialArm):
+        return tip_frame(arm, coordinates)[0]
     position: Array = link_points(arm, coordinates)[..., -1, -1, :]
     return position
 
 
 def payload_position(arm: Arm, coordinates: Array) -> Array:
-    """Return the position of the payload's centre of mass, shape (..., 2) [m]."""
+    """Return the position of the payload's centre of mass, shape (..., 2 or 3) [m]."""
+    if isinstance(arm, SpatialArm):
+        place, axes = tip_frame(arm, coordinates)
+        return place + axes @ arm.payload_com
     tip = tip_position(arm, coordinates)
     if not arm.payload_com.any():
         return tip
@@ -109,7 +165,11 @@ def payload_position(arm: Arm, coordinates: Array) -> Array:
 
 
 def payload_velocity(arm: Arm, coordinates: Array, rates: Array) -> Array:
-    """Return the velocity of the payload's centre of mass, shape (..., 2) [m/s]."""
+    """Return the velocity of the payload's centre of mass, shape (..., 2 or 3) [m/s]."""
+    if isinstance(arm, SpatialArm):
+        moves = (tip_moves(arm, coordinates) @ rates[..., None])[..., 0]
+        lever = tip_frame(arm, coordinates)[1] @ arm.payload_com
+        return moves[..., :3] + np.cross(moves[..., 3:], lever)
     velocity = tip_velocity(arm, coordinates, rates)
     if not arm.payload_com.any():
         return velocity
@@ -129,7 +189,7 @@ def _tip_frame(arm: Arm, coordinates: Array) -> tuple[Array, Array, Array]:
 
 def jacobian(arm: Arm, positions: Array) -> Array:
     """
-    Return the Jacobian of the tip of the unbent arm, shape (2, n) [m/rad].
+    Return the Jacobian of the tip of the unbent arm, shape (2 or 3, n) [m/rad].
 
     Parameters
     ----------
@@ -139,6 +199,9 @@ def jacobian(arm: Arm, positions: Array) -> Array:
         Joint angles [rad].
 
     """
+    if isinstance(arm, SpatialArm):
+        unbent = np.concatenate([positions, np.zeros(arm.n_passive)])
+        return tip_moves(arm, unbent)[:3, :arm.n_joints]
     angles = np.cumsum(positions)
     lengths = np.array([link.length for link in arm.links])
     parts = lengths * np.stack([-np.sin(angles), np.cos(angles)])  # (2, n)
@@ -146,7 +209,9 @@ def jacobian(arm: Arm, positions: Array) -> Array:
 
 
 def tip_jacobian(arm: Arm, coordinates: Array) -> Array:
-    """Return the Jacobian of the tip of the bent arm at q (n_t,), shape (2, n_t) [m/rad, m/m]."""
+    """Return the Jacobian of the bent arm's tip at q (n_t,), (2 or 3, n_t) [m/rad, m/m]."""
+    if isinstance(arm, SpatialArm):
+        return tip_moves(arm, coordinates)[:3]
     n_t = arm.n_coordinates
     return tip_velocity(arm, np.broadcast_to(coordinates, (n_t, n_t)), np.eye(n_t)).T
 
@@ -164,10 +229,13 @@ def tip_velocity(arm: Arm, coordinates: Array, rates: Array) -> Array:
 
     Returns
     -------
-    numpy.ndarray, shape (..., 2)
+    numpy.ndarray, shape (..., 2 or 3)
         [m/s].
 
     """
+    if isinstance(arm, SpatialArm):
+        spatial: Array = (tip_moves(arm, coordinates)[..., :3, :] @ rates[..., None])[..., 0]
+        return spatial
     angles, turning = frame_angles(arm, coordinates), frame_angles(arm, rates)
     velocity = np.zeros((*coordinates.shape[:-1], 2))
     for i, (link, modal) in enumerate(zip(arm.links, arm.modal_slices, strict=True)):

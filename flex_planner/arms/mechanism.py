@@ -45,8 +45,10 @@ class FlexibleBody:
     """
     A link that bends, by integrals over it: m modes with coordinates q.
 
-    A point of it that lies at r_0 in the frame of the link comes to ``r = r_0 + Phi q``. Integrals
-    are over its mass; where more than one entry of space belongs to a mode, the mode comes first.
+    A point of it that lies at r_0 in the frame of the link comes to ``r = r_0 + Phi q``, and
+    shortened by bending to ``r + q^T Phi_2 q / 2``; pieces of a twisted link turn besides.
+    Integrals are over its mass; where more than one entry of space belongs to a mode, the mode
+    comes first, but where it is said otherwise.
 
     Attributes
     ----------
@@ -57,9 +59,10 @@ class FlexibleBody:
     displacement : numpy.ndarray, shape (3, m)
         Integral of Phi.
     inertia_slope, inertia_bend : numpy.ndarray, shapes (m, 3, 3) and (m, m, 3, 3)
-        Integrals of ``(r . Phi_j) 1 - Phi_j r^T`` for r = r_0 and for r = Phi_k, k second.
+        Integrals of ``(r . Phi_j) 1 - Phi_j r^T`` for r = r_0 and for r = Phi_k, k second; of
+        r_0 and Phi_2 together for what bending shortens.
     moment : numpy.ndarray, shape (3, m)
-        Integral of ``r_0 x Phi_j``.
+        Integral of ``r_0 x Phi_j``, and `spin`.
     cross_moment : numpy.ndarray, shape (m, m, 3)
         Integral of ``Phi_k x Phi_j``, k first.
     gram : numpy.ndarray, shape (m, m)
@@ -72,6 +75,10 @@ class FlexibleBody:
         Where its end is unbent [m].
     tip_displacement, tip_turn : numpy.ndarray, shape (3, m)
         What modes displace and turn it by.
+    spin : numpy.ndarray, shape (3, m)
+        Polar inertia times the turn of pieces by a mode.
+    shortening, tip_shortening : numpy.ndarray, shape (3, m, m)
+        Integral of Phi_2, and Phi_2 at the tip; space comes first.
 
     """
 
@@ -89,6 +96,9 @@ class FlexibleBody:
     tip: Array
     tip_displacement: Array
     tip_turn: Array
+    spin: Array = field(default_factory=lambda: np.zeros((3, 0)))
+    shortening: Array = field(default_factory=lambda: np.zeros((3, 0, 0)))
+    tip_shortening: Array = field(default_factory=lambda: np.zeros((3, 0, 0)))
 
     @property
     def count(self) -> int:
@@ -106,7 +116,13 @@ class MechanismLink:
     position, rotation : numpy.ndarray, shapes (3,) and (3, 3)
         Of the joint's frame in the frame of the tip before [m]; columns of the rotation are axes.
     axis : int
-        About which of its axes, 0 to 2, the joint turns.
+        About which of its axes, 0 to 2, the joint turns, or along which it slides.
+    sign : float
+        1, or -1 where it does so the other way round.
+    slides : bool
+        Whether the joint is prismatic.
+    turned : numpy.ndarray, shape (3, 3)
+        Axes of the link's frame in that of the joint.
     base, end : RigidBody
         Fixed to the frames of the link and of its tip.
     beam : FlexibleBody
@@ -126,6 +142,9 @@ class MechanismLink:
     position: Array = field(default_factory=lambda: np.zeros(3))
     rotation: Array = field(default_factory=lambda: np.eye(3))
     axis: int = Z
+    sign: float = 1.0
+    slides: bool = False
+    turned: Array = field(default_factory=lambda: np.eye(3))
     tip_order: tuple[int, ...] = (Y, X, Z)
     rotor: float = 0.0
     elasticity: Elasticity | None = None
@@ -148,6 +167,10 @@ class Mechanism:
         Joints with Coulomb friction, whose sizes are free parameters.
     payload_com : numpy.ndarray, shape (3,)
         Centre of mass of the payload in the frame of the tip [m].
+    payload_axes : tuple of int
+        Axes about which the payload has its rotary inertia.
+    tip_rotation : numpy.ndarray, shape (3, 3)
+        Axes of the tool in the frame of the tip.
 
     """
 
@@ -156,6 +179,8 @@ class Mechanism:
     gravity: Array
     coulomb: tuple[int, ...] = ()
     payload_com: Array = field(default_factory=lambda: np.zeros(3))
+    payload_axes: tuple[int, ...] = (Z,)
+    tip_rotation: Array = field(default_factory=lambda: np.eye(3))
 
     @property
     def elastic(self) -> tuple[int, ...]:

@@ -34,8 +34,8 @@ class LinkModes:
     ----------
     shape : callable
         Stations ``(k,)`` [m] to deflections ``(k, n_modes)`` [m/m].
-    curvature : callable
-        Stations ``(k,)`` [m] to second derivatives ``(k, n_modes)`` [1/m^2].
+    slope, curvature : callable
+        Stations ``(k,)`` [m] to first and second derivatives ``(k, n_modes)``, [1/m], [1/m^2].
     area : numpy.ndarray, shape (n_modes,)
         Integral of phi [m].
     moment : numpy.ndarray, shape (n_modes,)
@@ -51,6 +51,7 @@ class LinkModes:
     """
 
     shape: Callable[[Array], Array]
+    slope: Callable[[Array], Array]
     curvature: Callable[[Array], Array]
     area: Array
     moment: Array
@@ -87,6 +88,7 @@ def pinned_pinned(length: float, count: int, load: TipLoad | None = None) -> Lin
     sign = np.where(order % 2, -1.0, 1.0)  # cos(j pi)
     return LinkModes(
         shape=lambda x: np.sin(np.multiply.outer(x, wave)),
+        slope=lambda x: np.cos(np.multiply.outer(x, wave)) * wave,
         curvature=lambda x: -np.sin(np.multiply.outer(x, wave)) * wave**2,
         area=(1 - sign) / wave,
         moment=-sign * length / wave,
@@ -151,7 +153,8 @@ def clamped_mass(length: float, count: int, load: TipLoad | None = None) -> Link
     phi, bend, rule = evaluate(stations, 0), evaluate(stations, 2), weights * length
     tip = np.array([length])
     return LinkModes(
-        shape=lambda x: evaluate(x, 0), curvature=lambda x: evaluate(x, 2),
+        shape=lambda x: evaluate(x, 0), slope=lambda x: evaluate(x, 1),
+        curvature=lambda x: evaluate(x, 2),
         area=rule @ phi, moment=rule @ (stations[:, None] * phi),
         gram=_clean((phi.T * rule) @ phi), stiffness=_clean((bend.T * rule) @ bend),
         tip_deflection=evaluate(tip, 0)[0], tip_slope=evaluate(tip, 1)[0])
@@ -220,6 +223,7 @@ def _stepped(family: str, length: float, count: int, load: TipLoad,
     slope = np.zeros(count) if pinned else modes(np.ones(1), 1)[0] / length
     return LinkModes(
         shape=lambda x: modes(np.asarray(x) / length),
+        slope=lambda x: modes(np.asarray(x) / length, 1) / length,
         curvature=lambda x: modes(np.asarray(x) / length, 2) / length**2,
         area=length * found.area * factors, moment=length**2 * found.moment * factors,
         gram=length * _clean(gram * pairs), stiffness=np.diag(factors**2) / length**3,

@@ -8,7 +8,9 @@ from pathlib import Path
 import re
 from typing import TypeAlias
 
+from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import preset_files
+from flex_planner.arms.spatial_joint import slides
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.number_texts import AMBIGUOUS, NumberTextError, read_number
 from flex_planner.base.paths import expand_path, PathError
@@ -94,6 +96,12 @@ def _entry(option: str, part: str, text: str) -> float:
         if AMBIGUOUS.fullmatch(part):
             raise InvalidValueError(option, part, str(error)) from None
         raise InvalidValueError(option, text, 'numbers separated by commas') from None
+
+
+def positions(option: str, text: str, arm: Arm) -> Array:
+    """Return joint positions: angles [rad] from degrees, ways [m] of joints that slide."""
+    turned = angles(option, text, arm.n_joints)
+    return np.where(list(map(slides, arm.joints)), np.degrees(turned), turned)
 
 
 def angles(option: str, text: str, count: int) -> Array:

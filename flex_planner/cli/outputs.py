@@ -11,6 +11,7 @@ import sys
 import tempfile
 from typing import TYPE_CHECKING
 
+from flex_planner.arms.planar_only import PlanarOnlyError, require_planar
 from flex_planner.base.errors import FlexPlannerError, InvalidValueError, RecordingError
 from flex_planner.base.paths import file_stem
 from flex_planner.capacity.results import MaxPayload
@@ -141,11 +142,12 @@ def check_folder(folder: Path) -> None:
 
 
 def _recorder(request: Request, folder: Path) -> RequestRecorder | None:
-    """Return the recorder, or None, with a message, where message definitions are missing."""
+    """Return the recorder; None, with a message, for spatial arms and without definitions."""
     try:
         from flex_planner.cli.recorder import RequestRecorder
 
+        require_planar(request.task.arm, 'recordings')
         return RequestRecorder(request, folder / 'recordings')
-    except RecordingError as error:
+    except (PlanarOnlyError, RecordingError) as error:
         print(f'flex-planner: no recording is written: {error}', file=sys.stderr)
         return None

@@ -10,6 +10,7 @@ from typing import Any
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import load_arm
+from flex_planner.arms.spatial_joint import slides
 from flex_planner.base.errors import (
     InvalidTaskError,
     InvalidValueError,
@@ -20,7 +21,13 @@ from flex_planner.base.sentences import say_reason
 from flex_planner.base.validation import Array, number
 from flex_planner.capacity.results import MaxPayload
 from flex_planner.cli.controller_options import sampling_settings
-from flex_planner.cli.options import add_arm, angles, integer_argument, number_argument, numbers
+from flex_planner.cli.options import (
+    add_arm,
+    integer_argument,
+    number_argument,
+    numbers,
+    positions,
+)
 from flex_planner.optimal_control.ends_at_points import ends_at_points
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.objectives import Objectives
@@ -111,7 +118,8 @@ def add_task(parser: argparse.ArgumentParser, payload: str) -> None:
     add_arm(parser)
     add = parser.add_argument
     add('--from', dest='start_point', metavar='X,Y',
-        help='tip at the start, where it rests as gravity bends the arm [m]')
+        help='tip at the start, where it rests as gravity bends the arm [m]; X,Y,Z of a spatial '
+        'arm')
     add('--to', dest='goal_point', metavar='X,Y',
         help='tip at the goal, where it rests likewise [m]')
     add('--from-angles', dest='start_positions', metavar='DEG,DEG,...',
@@ -187,9 +195,9 @@ def _ends(options: argparse.Namespace, arm: Arm) -> dict[str, Any]:
         raise InvalidTaskError('start and goal must be given by --from and --to, by --from-angles '
                                f'and --to-angles, or by --from-angles and --to, but the command '
                                f'has {found}')
-    fields: dict[str, Any] = {name: angles(_ANGLES[name], getattr(options, name), arm.n_joints)
+    fields: dict[str, Any] = {name: positions(_ANGLES[name], getattr(options, name), arm)
                               for name in given if name in _ANGLES}
-    points = {name: numbers(_POINTS[name], getattr(options, name), 2, 'm')
+    points = {name: numbers(_POINTS[name], getattr(options, name), arm.dimension, 'm')
               for name in given if name in _POINTS}
     return fields | ends_at_points(arm, points.get('start_point'), points.get('goal_point'),
                                    options.elbow, fields.get('start_positions'))
@@ -206,8 +214,10 @@ def _start(options: argparse.Namespace, arm: Arm) -> dict[str, Any]:
 def _say_end(task: Task, name: str) -> str:
     """Return start or goal in words."""
     point: Array = getattr(task, f'{name}_point')
+    units = np.array([1.0 if slides(joint) else np.degrees(1.0) for joint in task.arm.joints])
     values, unit = (point, 'm') if point.size else (
-        np.degrees(getattr(task, f'{name}_positions')), 'deg')
+        units * getattr(task, f'{name}_positions'),
+        'deg, m' if any(map(slides, task.arm.joints)) else 'deg')
     return f'({", ".join(f"{value:.6g}" for value in values)}) {unit}'
 
 

@@ -107,7 +107,7 @@ def flexible_power(body: FlexibleBody, carried: Inertia, frame: MovingFrame, mod
     unbent = Inertia.of(body) + carried
     if not body.count:
         return unbent.power(frame)
-    moments = modes.apply(lambda z: apply(body.displacement, z))
+    moments = _deflect(body.displacement, body.shortening, modes)
     slopes = _inertia_slopes(body, q)
     bent = Inertia(unbent.mass, add(unbent.moment, moments.value),
                    _bent_inertia(unbent.matrix, body, q))
@@ -115,6 +115,8 @@ def flexible_power(body: FlexibleBody, carried: Inertia, frame: MovingFrame, mod
     couple = _modal_moments(body, q)
     force = add(cross(turning, scale(2.0, moments.rate)), moments.acceleration)
     torque = add(scale(2.0, apply(_weighted(slopes, rates), turning)), apply(couple, seconds))
+    if body.spin.any():
+        torque = add(torque, cross(turning, apply(body.spin, rates)))
     swirl = _swirl(body, rates, virtual)
     return total([
         bent.power(frame), dot(frame.virtual_velocity, force), dot(frame.virtual_turning, torque),
@@ -127,16 +129,37 @@ def flexible_potential(body: FlexibleBody, carried: Inertia, posture: Posture, q
                        rigidity: Any) -> Any:
     """Return the potential energy of a flexible body, bending included [J]."""
     unbent = Inertia.of(body) + carried
-    bent = Inertia(unbent.mass, add(unbent.moment, apply(body.displacement, q)), unbent.matrix)
+    moments = add(apply(body.displacement, q), scale(0.5, _quadratic(body.shortening, q, q)))
+    bent = Inertia(unbent.mass, add(unbent.moment, moments), unbent.matrix)
     bending = product(0.5, dot(q, _rows(body.stiffness, q)))
     return total([bent.potential(posture), product(rigidity, bending)])
 
 
 def tip_shift(body: FlexibleBody, modes: Motion) -> Motion:
     """Return where the tip of a body is in its frame."""
-    moved = modes.apply(lambda z: apply(body.tip_displacement, z))
+    moved = _deflect(body.tip_displacement, body.tip_shortening, modes)
     x, y, z = body.tip.tolist()
     return replace(moved, value=add((x, y, z), moved.value))
+
+
+def _deflect(linear: Array, square: Array, modes: Motion) -> Motion:
+    """Return ``A q + q^T B q / 2``, which moves, for A (3, m) and symmetric B (3, m, m)."""
+    moved = modes.apply(lambda z: apply(linear, z))
+    if not square.any():
+        return moved
+    q, rates = modes.value, modes.rate
+    return Motion(
+        add(moved.value, scale(0.5, _quadratic(square, q, q))),
+        add(moved.rate, _quadratic(square, q, rates)),
+        add(moved.acceleration, _quadratic(square, q, modes.acceleration),
+            _quadratic(square, rates, rates)),
+        add(moved.virtual, _quadratic(square, q, modes.virtual)))
+
+
+def _quadratic(square: Array, left: list[Any], right: list[Any]) -> Vector:
+    """Return ``left^T B right`` for B (3, m, m)."""
+    x, y, z = (dot(left, _rows(matrix, right)) if matrix.any() else 0.0 for matrix in square)
+    return x, y, z
 
 
 def _inertia_slopes(body: FlexibleBody, q: list[Any]) -> list[list[list[Any]]]:

@@ -14,7 +14,8 @@ from typing import Any
 
 import casadi as ca
 from flex_planner.arms.arm import Arm
-from flex_planner.arms.mechanism import FlexibleBody, Mechanism, MechanismLink, Z
+from flex_planner.arms.mechanism import FlexibleBody, Mechanism, MechanismLink
+from flex_planner.arms.mechanism_of_arm import mechanism_of
 from flex_planner.dynamics.body_power import (
     flexible_potential,
     flexible_power,
@@ -23,7 +24,7 @@ from flex_planner.dynamics.body_power import (
 )
 from flex_planner.dynamics.chain import Chain
 from flex_planner.dynamics.joint_power import JointPowers, link_angle
-from flex_planner.dynamics.moving_frame import MovingFrame, Posture
+from flex_planner.dynamics.moving_frame import along, MovingFrame, Posture
 from flex_planner.dynamics.vectors import Motion, product, total
 import numpy as np
 
@@ -38,7 +39,7 @@ def build_chain(arm: Arm) -> Chain:
         Its flexural rigidities are left symbolic, all else enters as constants.
 
     """
-    return chain_of(Mechanism.of(arm))
+    return chain_of(mechanism_of(arm))
 
 
 def chain_of(mechanism: Mechanism) -> Chain:
@@ -49,8 +50,7 @@ def chain_of(mechanism: Mechanism) -> Chain:
     mass, inertia = ca.SX.sym('m_p'), ca.SX.sym('J_p')
     rigidity, coulomb, fading = (ca.SX.sym(name, n) for name in ('EI', 'tau_c', 'v_s'))
     motion = Motion(q, rates, a, y).apply(ca.vertsplit)
-    chain = _Chain(mechanism, motion, _payload(mechanism.payload_com.tolist(), mass, inertia),
-                   ca.vertsplit(rigidity))
+    chain = _Chain(mechanism, motion, _payload(mechanism, mass, inertia), ca.vertsplit(rigidity))
     joints = JointPowers(mechanism, motion, ca.vertsplit(coulomb), ca.vertsplit(fading))
     return Chain(coordinates=q, rates=rates, accelerations=a, virtual_rates=y, payload_mass=mass,
                  payload_inertia=inertia, rigidity=rigidity, coulomb_friction=coulomb,
@@ -87,8 +87,8 @@ class _Chain:
         pending: list[tuple[int, Motion]] = []
         for i, link in enumerate(self.mechanism.links):
             frame, pending = _to_joint(frame, pending, link)
-            pending = _merge(pending, link.axis, link_angle(self.mechanism, self.motion, i))
-            frame, pending = _settle(frame, pending), []
+            frame = _move_joint(frame, pending, link, link_angle(self.mechanism, self.motion, i))
+            pending = []
             modes = self.motion.take(slice(at, at + link.beam.count))
             at += link.beam.count
             yield frame, link.beam, Inertia.of(link.base), modes, self.rigidity[i]
@@ -115,6 +115,17 @@ def _to_joint(frame: Any, pending: list[tuple[int, Motion]],
     return (frame.rotate(link.rotation) if turned else frame), pending
 
 
+def _move_joint(frame: Any, pending: list[tuple[int, Motion]], link: MechanismLink,
+                angle: Motion) -> Any:
+    """Return the frame of a link, moved by its joint."""
+    moved = angle if link.sign > 0 else angle.apply(lambda part: -part)
+    if link.slides:
+        frame = _settle(frame, pending).shift(moved.apply(lambda part: along(link.axis, part)))
+    else:
+        frame = _settle(frame, _merge(pending, link.axis, moved))
+    return frame if np.array_equal(link.turned, np.eye(3)) else frame.rotate(link.turned)
+
+
 def _merge(pending: list[tuple[int, Motion]], axis: int,
            angle: Motion) -> list[tuple[int, Motion]]:
     """Return turns with one more: two about the same axis are one."""
@@ -139,10 +150,13 @@ def _for_body(frame: Any, pending: list[tuple[int, Motion]], body: Inertia) -> A
     return frame.spin(axis, angle) if body.spins_about(axis) else frame.turn(axis, angle)
 
 
-def _payload(com: Sequence[float], mass: Any, inertia: Any) -> Inertia:
-    """Return a payload about the tip: a mass at a point, with a rotary inertia in the plane."""
+def _payload(mechanism: Mechanism, mass: Any, inertia: Any) -> Inertia:
+    """Return a payload about the tip: a mass at a point, with a rotary inertia."""
+    com: Sequence[float] = mechanism.payload_com.tolist()
+    turns = mechanism.payload_axes
     square = sum(entry**2 for entry in com)
     matrix = [[total([product((square if i == k else 0.0) - com[i] * com[k], mass),
-                      inertia if i == k == Z else 0.0]) for k in range(3)] for i in range(3)]
+                      inertia if i == k and i in turns else 0.0]) for k in range(3)]
+              for i in range(3)]
     x, y, z = (product(entry, mass) for entry in com)
     return Inertia(mass, (x, y, z), matrix)

@@ -18,6 +18,7 @@ _EXACT, _ENOUGH = 1e-12, 1e-9
 # of the way from where the tip rests in the first posture to the point
 _SHORTEST_STEP = 1 / 64
 _SLOW = 0.5
+_FLAT = 1e-12
 
 
 def rest_at_point(dynamics: ArmDynamics, arm: Arm, point: Array, reference: Array,
@@ -25,9 +26,9 @@ def rest_at_point(dynamics: ArmDynamics, arm: Arm, point: Array, reference: Arra
     """
     Return the arm at rest with its tip at a point, its links bent by gravity.
 
-    From a reference posture the joints turn as the Jacobian there says, which for two joints
-    leaves nothing to choose and for more keeps them near it; a joint that meets a limit stays
-    there. The branch is that of the reference posture.
+    From a reference posture the joints turn as the Jacobian there says, which for as many joints
+    as the point has coordinates leaves nothing to choose and for more keeps them near it; a joint
+    that meets a limit stays there. The branch is that of the reference posture.
 
     Parameters
     ----------
@@ -35,7 +36,7 @@ def rest_at_point(dynamics: ArmDynamics, arm: Arm, point: Array, reference: Arra
         n joints, n_t coordinates.
     arm : Arm
         Whose joint limits hold.
-    point : numpy.ndarray, shape (2,)
+    point : numpy.ndarray, shape (2,), or (3,) for a spatial arm
         In the base frame [m].
     reference : numpy.ndarray, shape (n,)
         Joint angles of the unbent arm, see `posture_near_point` [rad].
@@ -60,7 +61,7 @@ def rest_at_point(dynamics: ArmDynamics, arm: Arm, point: Array, reference: Arra
 
     """
     posture = _BentArm(dynamics, arm, reference, parameters)
-    turned = _approach(posture, point) if arm.n_joints > 1 else _nearest(posture, point)
+    turned = (_approach if arm.n_joints >= arm.dimension else _nearest)(posture, point)
     coordinates, torque, moves = posture.at(turned)
     angles = coordinates[:arm.n_joints]
     _check_limits(arm, angles)
@@ -78,15 +79,15 @@ def _check_limits(arm: Arm, angles: Array) -> None:
 
 
 class _BentArm:
-    """The arm at rest, as a function of two numbers that say how far the joints have turned."""
+    """The arm at rest, as a function of numbers, one per coordinate of a point, that turn it."""
 
     def __init__(self, dynamics: ArmDynamics, arm: Arm, reference: Array,
                  parameters: PhysicalParameters) -> None:
         self.arm, self._dynamics, self._parameters = arm, dynamics, parameters
         self._reference, (self._lower, self._upper) = reference, arm.angle_limits()
         unbent = jacobian(arm, reference)
-        self.side, self._directions = _side(unbent), unbent.T / arm.reach  # (n, 2)
-        self._keeps_limits = arm.n_joints > 2  # others have no joint to spare
+        self.side, self._directions = _side(unbent), unbent.T / arm.reach  # (n, d)
+        self._keeps_limits = arm.n_joints > arm.dimension  # others have no joint to spare
 
     def at(self, turned: Array) -> tuple[Array, Array, Array]:
         """Return coordinates, holding torque, and how the tip at rest follows the joints."""
@@ -100,7 +101,7 @@ class _BentArm:
         return q, torque, moves[:, :n] - moves[:, n:] @ sagging
 
     def tip(self, turned: Array) -> tuple[Array, Array, Array]:
-        """Return the tip at rest (2,), its derivative (2, 2), and that by the joints (2, n)."""
+        """Return the tip at rest (d,), its derivative (d, d), and that by the joints (d, n)."""
         q, _, moves = self.at(turned)
         directions = self._directions
         if self._keeps_limits:
@@ -117,7 +118,7 @@ class _BentArm:
 
 def _approach(posture: _BentArm, point: Array) -> Array:
     """Bring the tip from where it rests in the reference posture to a point, in steps."""
-    turned: Array = np.zeros(2)
+    turned: Array = np.zeros(point.size)
     way, step = 0.0, 1.0
     first = posture.tip(turned)[0]
     while way < 1:
@@ -128,7 +129,7 @@ def _approach(posture: _BentArm, point: Array) -> Array:
             if step < _SHORTEST_STEP:
                 raise UnreachableError(
                     'no posture was found in which the arm, bent by gravity, rests with its tip '
-                    f'at ({point[0]:.6g}, {point[1]:.6g}) m')
+                    f'at {_say_point(point, 6)} m')
         else:
             turned, way = found, there
     return turned
@@ -154,22 +155,33 @@ def _newton(posture: _BentArm, start: Array, point: Array) -> Array | None:
 
 
 def _side(moves: Array) -> float:
-    """Return the branch: the sign of the determinant for two joints; others have none."""
-    return float(np.sign(np.linalg.det(moves))) if moves.shape[1] == 2 else 0.0
+    """Return the branch: the sign of the determinant of a square; others have none."""
+    rows, columns = moves.shape
+    if rows != columns:
+        return 0.0
+    side = float(np.linalg.det(moves))
+    # of an arm in space whose tip moves in a plane only rounding is left
+    return float(np.sign(side)) if abs(side) > _FLAT * np.linalg.norm(moves)**rows else 0.0
 
 
 def _nearest(posture: _BentArm, point: Array) -> Array:
     """Turn the only joint until the tip passes a point, which lies on its curve or is refused."""
-    turned = np.zeros(2)
+    turned = np.zeros(point.size)
     for _ in range(_MAX_ITERATIONS):
         tip, slope, _ = posture.tip(turned)
         change = np.linalg.lstsq(slope, point - tip, rcond=None)[0]
         turned = turned + change
         if np.abs(change).max() <= _EXACT:
             break
-    tip = posture.tip(turned)[0]
+    tip, n = posture.tip(turned)[0], posture.arm.n_joints
+    joints = 'one joint' if n == 1 else f'{n} joints'
     if np.linalg.norm(tip - point) > _ENOUGH * posture.arm.reach:
         raise UnreachableError(
-            f'the tip of the arm, bent by gravity, rests at ({tip[0]:.9g}, {tip[1]:.9g}) m at '
-            f'nearest: with one joint it does not come to ({point[0]:.9g}, {point[1]:.9g}) m')
+            f'the tip of the arm, bent by gravity, rests at {_say_point(tip, 9)} m at nearest: '
+            f'with {joints} it does not come to {_say_point(point, 9)} m')
     return turned
+
+
+def _say_point(point: Array, digits: int) -> str:
+    """Return a point in parentheses."""
+    return f'({", ".join(f"{entry:.{digits}g}" for entry in point)})'

@@ -16,6 +16,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from flex_planner.arms.arm import Arm
+from flex_planner.arms.planar_only import require_planar
 from flex_planner.base.validation import Array
 import numpy as np
 
@@ -51,7 +52,8 @@ class RigidInertia:
 
     @classmethod
     def of(cls, arm: Arm, payload_mass: float, payload_inertia: float) -> RigidInertia:
-        """Return that of an arm, taken as rigid, with a payload [kg], [kg m^2]."""
+        """Return that of a planar arm, taken as rigid, with a payload [kg], [kg m^2]."""
+        require_planar(arm, 'bounds of the inertia')
         n = arm.n_joints
         points, rotary = np.zeros((n, n), dtype=complex), np.zeros(n)
         for i, link in enumerate(arm.links):

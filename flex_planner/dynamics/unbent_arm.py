@@ -10,6 +10,7 @@ Neither gravity nor damping is in it.
 from __future__ import annotations
 
 from flex_planner.arms.arm import Arm, Link
+from flex_planner.arms.planar_only import require_planar
 from flex_planner.base.validation import Array
 import numpy as np
 
@@ -33,7 +34,13 @@ def mass_matrix(arm: Arm, positions: Array, payload_mass: float,
     numpy.ndarray, shape (n_t, n_t)
         M of eq. (3) at zero modal displacements.
 
+    Raises
+    ------
+    PlanarOnlyError
+        If the arm is a spatial one.
+
     """
+    require_planar(arm, 'estimates of straight arms')
     n_t = arm.n_coordinates
     mass: Array = np.zeros((n_t, n_t))
     base: Array = np.zeros((2, n_t))  # rows over rates: velocity where the link begins

@@ -11,6 +11,7 @@ import os
 from pathlib import Path
 
 from flex_planner.arms.arm import Arm, Joint
+from flex_planner.arms.planar_only import require_planar
 from flex_planner.base.errors import (
     FlexPlannerError,
     InvalidValueError,
@@ -94,6 +95,7 @@ class Study:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, 'name', printable(self.name, LONGEST_NAME))
+        require_planar(self.arm, 'maps')
         check_motors(self.quantity, self.arm)
         check_axes(self.quantity, self.arm, self.axes)
         for end in self.motion.ends:

@@ -25,7 +25,7 @@ def ends_at_points(arm: Arm, start: ArrayLike | None, goal: ArrayLike | None,
     ----------
     arm : Arm
         n joints.
-    start, goal : array_like, shape (2,), or None
+    start, goal : array_like, shape (2,) or, of a spatial arm, (3,); or None
         Tip positions in the base frame [m]; None where joint angles are given instead.
     elbow : int
         See :func:`flex_planner.arms.inverse_kinematics.inverse_kinematics`, +1 or -1.
@@ -57,7 +57,8 @@ def _end(arm: Arm, name: str, point: ArrayLike, elbow: int,
          near: Array | None) -> dict[str, Any]:
     """Return the fields of one end at a point; errors say which."""
     field = f'{name}_point'
-    checked = vector(field, point, 2, at_least=-MAX_COORDINATE, at_most=MAX_COORDINATE, unit='m')
+    checked = vector(field, point, arm.dimension, at_least=-MAX_COORDINATE,
+                     at_most=MAX_COORDINATE, unit='m')
     try:
         return {field: checked, f'{name}_positions': posture_near_point(arm, checked, elbow, near)}
     except (UnreachableError, SingularError) as error:

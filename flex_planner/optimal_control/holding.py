@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import frame_angles
+from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.base.errors import NoEquilibriumError, SingularError, UnreachableError
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.statics import equilibrium
@@ -86,9 +87,12 @@ def knows_holding(arm: Arm) -> bool:
 
     It is if only the last link moves the payload by its own bending: the load of a link with
     pinned modes does not bend it, and the links before a clamped one do not feel its slope. It is
-    not where a payload off the tip turns with that slope, nor where joints give way.
+    not where a payload off the tip turns with that slope, nor where joints give way; of spatial
+    arms nothing of the kind is known.
 
     """
+    if isinstance(arm, SpatialArm):
+        return False
     turned = arm.payload_com.any() and arm.links[-1].mode_shapes().tip_slope.any()
     return not (turned or arm.elastic_joints
                 or any(_carries(arm, i) for i in range(arm.n_joints - 1)))

@@ -36,9 +36,9 @@ class Task:
     arm : Arm
         n joints, n_t coordinates.
     start_positions, goal_positions : array_like, shape (n,)
-        Joint angles, within +-100 rad. Where a point is given they only say from which posture
-        that of the bent arm is found, see `posture_near_point`.
-    start_point, goal_point : array_like, shape (2,)
+        Joint angles, within +-100 rad; ways of joints that slide [m]. Where a point is given they
+        only say from which posture that of the bent arm is found, see `posture_near_point`.
+    start_point, goal_point : array_like, shape (2,), or (3,) of a spatial arm
         Where the tip of the arm is at rest, bent by gravity with its payload, in the base frame
         [m], within +-1e6; empty where joint angles are given. `MotionProblem` finds the posture.
     duration : float
@@ -122,7 +122,7 @@ class Task:
         ----------
         arm : Arm
             n joints.
-        start, goal : array_like, shape (2,)
+        start, goal : array_like, shape (2,), or (3,) of a spatial arm
             Tip positions of the arm at rest, bent by gravity, in the base frame [m].
         duration : float
             As of `Task`.
@@ -169,8 +169,8 @@ class Task:
             self._set(name, vector(name, getattr(self, name), n, at_least=-MAX_JOINT_ANGLE,
                                    at_most=MAX_JOINT_ANGLE, unit='rad'))
             point = name.replace('positions', 'point')
-            self._set(point, vector(point, getattr(self, point), (0, 2), at_least=-MAX_COORDINATE,
-                                    at_most=MAX_COORDINATE, unit='m'))
+            self._set(point, vector(point, getattr(self, point), (0, self.arm.dimension),
+                                    at_least=-MAX_COORDINATE, at_most=MAX_COORDINATE, unit='m'))
             if not (getattr(self, point).size and self.arm.bends_at_rest):
                 check_angle_limits(self.arm, name, getattr(self, name))
         number('duration', self.duration, above=0, at_most=MAX_DURATION, unit='s')

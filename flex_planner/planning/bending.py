@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from flex_planner.arms.arm import Arm
+from flex_planner.arms.kinematics import bent_distances
 from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationSolution
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.sampled_motion import sample_motion
-import numpy as np
 
 # shares of a link's length. The model keeps the links' lengths and their small slopes: at a tenth
 # the slope of a cantilever's tip is 0.15 rad and the tip 0.6 % nearer than it is taken to be, at
@@ -65,8 +65,7 @@ def find_largest_bending(arm: Arm, coordinates: Array) -> Bending:
     for i, (link, modal) in enumerate(zip(arm.links, arm.modal_slices, strict=True)):
         if not link.modes:
             continue
-        stations = np.linspace(0, link.length, _STATIONS, dtype=np.float64)
-        deflection = np.abs(coordinates[:, modal] @ link.mode_shapes().shape(stations).T)
+        deflection = bent_distances(arm, i, coordinates[:, modal], _STATIONS)
         moment = int(deflection.max(axis=1).argmax())
         share = float(deflection[moment].max() / link.length)
         if share > found.share:

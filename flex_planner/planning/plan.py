@@ -9,6 +9,11 @@ import os
 from flex_planner.arms.arm import Arm, BeamSection, Elasticity, Joint, Link, Motor, Node
 from flex_planner.arms.kinematics import tip_position
 from flex_planner.arms.motion_svg import motion_svg
+from flex_planner.arms.spatial_arm import SpatialArm
+from flex_planner.arms.spatial_beam import SpatialBeam
+from flex_planner.arms.spatial_body import SpatialBody
+from flex_planner.arms.spatial_joint import SpatialJoint
+from flex_planner.arms.spatial_link import SpatialLink
 from flex_planner.base.errors import InvalidValueError, ValueFileError
 from flex_planner.base.html_view import html_view
 from flex_planner.base.validation import Array
@@ -74,7 +79,7 @@ class Samples:
         psi_1 and psi_2.
     hamiltonian : numpy.ndarray, shape (k,)
         H of eq. (8).
-    tip : numpy.ndarray, shape (k, 2)
+    tip : numpy.ndarray, shape (k, 2), or (k, 3) of a spatial arm
         Tip of the bent arm [m].
 
     """
@@ -199,8 +204,8 @@ class Plan:
         return html_view(plan_view(self), self.svg())
 
     def svg(self) -> str:
-        """Return a small picture of the motion as SVG; empty without a solution."""
-        if self.solution is None:
+        """Return a small picture of the motion as SVG; empty without one, and of spatial arms."""
+        if self.solution is None or isinstance(self.arm, SpatialArm):
             return ''
         times = np.linspace(0, self.task.duration, _SHOWN, dtype=np.float64)
         return motion_svg(self.arm, self.solution(times)[:, :self.arm.n_coordinates])
@@ -283,8 +288,9 @@ class Plan:
 
 # what a file of a plan may hold
 _SAVED = (Plan, PlanStatus, Certificate, Task, Arm, Link, BeamSection, Joint, Elasticity, Motor,
-          Node, ArmModel, MotionProblem, BoundaryConditions, Parameters, CollocationSolution,
-          GaussRule, ObjectiveSearch, Objectives, Objective, WeightTrial, Margin, KindOfMotion,
+          Node, SpatialArm, SpatialLink, SpatialBeam, SpatialBody, SpatialJoint, ArmModel,
+          MotionProblem, BoundaryConditions, Parameters, CollocationSolution, GaussRule,
+          ObjectiveSearch, Objectives, Objective, WeightTrial, Margin, KindOfMotion,
           ExploredMotion, PlanWarning, WarningKind, TriedStrategy)
 
 

@@ -15,6 +15,7 @@ from enum import Enum
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import link_points
+from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationSolution
 from flex_planner.optimal_control.motion_problem import MotionProblem
@@ -155,7 +156,7 @@ class _Motion:
     coordinates: Array  # (k, n_t)
     speeds: Array  # (k, n)
     torques: Array  # (k, n)
-    points: Array  # (k, n, 2, 2), both ends of each link
+    points: Array  # (k, n, 2, 2 or 3), both ends of each link
 
     @classmethod
     def of(cls, problem: MotionProblem, solution: CollocationSolution) -> _Motion:
@@ -239,6 +240,8 @@ def _tip_near_base(motion: _Motion) -> PlanWarning | None:
 
 def _links_overlap(motion: _Motion) -> PlanWarning | None:
     """Warn of links that are where others are; whether they hit depends on their planes."""
+    if isinstance(motion.arm, SpatialArm):
+        return None  # lines in space hardly ever cross: thickness would have to be known
     found = find_overlap(motion.points, motion.coordinates[:, :motion.arm.n_joints])
     if found is None:
         return None
@@ -250,7 +253,8 @@ def _links_overlap(motion: _Motion) -> PlanWarning | None:
 
 def _too_few_modes(motion: _Motion) -> PlanWarning | None:
     """Warn of vibrations that the modes of the plan do not have, see `estimate_left_out`."""
-    if not motion.problem.task.ends_at_rest or not motion.problem.model.arm.n_passive:
+    if (not motion.problem.task.ends_at_rest or not motion.problem.model.arm.n_passive
+            or isinstance(motion.arm, SpatialArm)):  # the estimate is that of planar arms
         return None
     left, limit = estimate_left_out(motion.problem.task, motion.times, motion.weights,
                                     motion.torques), CertificateLimits().residual_vibration

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import link_points
+from flex_planner.arms.planar_only import require_planar
 from flex_planner.base.colours import ARM, coordinate_colour, FLEXIBLE
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.statics import equilibrium, natural_modes
@@ -45,8 +46,14 @@ def draw_arm(model: ArmModel, postures: Sequence[Array], payload_mass: float = 0
     Picture
         A Matplotlib figure.
 
+    Raises
+    ------
+    PlanarOnlyError
+        If the arm is a spatial one.
+
     """
     arm = model.arm
+    require_planar(arm, 'pictures of arms')
     parameters = Parameters.of(arm, payload_mass=payload_mass)
     flexible = [i for i, link in enumerate(arm.links) if link.modes]
     shown = min(arm.n_passive, _NATURAL_MODES)

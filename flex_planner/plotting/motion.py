@@ -8,12 +8,15 @@ from typing import Any
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import link_points
+from flex_planner.arms.planar_only import require_planar
+from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.base.colours import ARM, ASIDE, CARRIED_OUT, coordinate_colour, PLANNED
 from flex_planner.base.validation import Array
 from flex_planner.optimal_control.torque_limits import TorqueLimits
 from flex_planner.planning.plan import Plan
 from flex_planner.plotting.curves import draw_columns, limits_beside, settle_limits
 from flex_planner.plotting.figures import explain_lines, finish, Picture, plain, say
+from flex_planner.plotting.spatial_motion import draw_path_in_space, label, position_scale
 from matplotlib.axes import Axes
 import numpy as np
 
@@ -43,7 +46,7 @@ class Motion:
         Joints [rad], then modes [m], and their rates.
     torques : numpy.ndarray, shape (k, n)
         [N m]; the last may be what holds the arm and is not drawn.
-    tip : numpy.ndarray, shape (k, 2)
+    tip : numpy.ndarray, shape (k, 2), or (k, 3) of a spatial arm
         [m].
     joint_names : sequence of str
         For the legends; empty for numbers.
@@ -122,7 +125,12 @@ def draw_motion(motion: Motion | Plan, execution: Execution | None = None) -> Pi
     draw_angles(axes[0, 0], motion, execution)
     draw_speeds(axes[0, 1], motion, execution)
     draw_torques(axes[0, 2], motion, execution)
-    draw_tip(axes[1, 0], motion, execution)
+    if isinstance(motion.arm, SpatialArm):
+        axes[1, 0].remove()
+        axes[1, 0] = figure.add_subplot(2, 3, 4, projection='3d')
+        draw_path_in_space(axes[1, 0], motion.arm, motion.coordinates, motion.tip)
+    else:
+        draw_tip(axes[1, 0], motion, execution)
     draw_modes(axes[1, 1], motion)
     draw_distance(axes[1, 2], motion, execution)
     explain_lines(figure, axes.ravel(), _COLUMNS)
@@ -133,10 +141,11 @@ def draw_motion(motion: Motion | Plan, execution: Execution | None = None) -> Pi
 def draw_angles(axes: Axes, motion: Motion, execution: Execution | None = None) -> None:
     """Draw the joint angles in a diagram."""
     n = motion.arm.n_joints
-    _draw_joints(axes, motion, np.degrees(motion.coordinates[:, :n]), execution,
-                 np.degrees(execution.positions) if execution else None)
+    scale = position_scale(motion.arm)
+    _draw_joints(axes, motion, scale * motion.coordinates[:, :n], execution,
+                 scale * execution.positions if execution else None)
     settle_limits(axes, _LEAST_ANGLE)
-    finish(axes, 'joint angles', 'angle [deg]')
+    finish(axes, 'joint angles', label(motion.arm, 'angle [deg]', 'way [mm]'))
 
 
 def draw_speeds(axes: Axes, motion: Motion, execution: Execution | None = None) -> None:
@@ -144,7 +153,7 @@ def draw_speeds(axes: Axes, motion: Motion, execution: Execution | None = None) 
     _draw_joints(axes, motion, motion.rates[:, :motion.arm.n_joints], execution,
                  execution.speeds if execution else None)
     settle_limits(axes, _LEAST_SPEED)
-    finish(axes, 'joint speeds', 'speed [rad/s]')
+    finish(axes, 'joint speeds', label(motion.arm, 'speed [rad/s]', '[m/s]'))
 
 
 def draw_torques(axes: Axes, motion: Motion, execution: Execution | None = None) -> None:
@@ -158,7 +167,8 @@ def draw_torques(axes: Axes, motion: Motion, execution: Execution | None = None)
     _draw_bounds(axes, motion, bounds, (low, high))
     axes.set_ylim(low, high)
     axes.ticklabel_format(axis='y', useOffset=False)
-    finish(axes, 'motor torques and their bounds', 'torque [N m]')
+    finish(axes, 'motor torques and their bounds',
+           label(motion.arm, 'torque [N m]', 'force [N]'))
 
 
 def _draw_joints(axes: Axes, motion: Motion, values: Array, execution: Execution | None,
@@ -192,7 +202,16 @@ def _draw_bounds(axes: Axes, motion: Motion, bounds: Array, shown: tuple[float, 
 
 
 def draw_tip(axes: Axes, motion: Motion, execution: Execution | None = None) -> None:
-    """Draw the path of the tip in a diagram, with the arm at some instants."""
+    """
+    Draw the path of the tip in a diagram, with the arm at some instants.
+
+    Raises
+    ------
+    PlanarOnlyError
+        If the arm is a spatial one; see `draw_path_in_space`.
+
+    """
+    require_planar(motion.arm, 'diagrams of the plane')
     last = motion.times.size - 1
     for k in np.linspace(0, last, _POSTURES).astype(int):
         points = link_points(motion.arm, motion.coordinates[k], _STATIONS).reshape(-1, 2)
@@ -218,7 +237,7 @@ def draw_modes(axes: Axes, motion: Motion) -> None:
         settle_limits(axes, _LEAST_BENDING)
     else:
         say(axes, 'rigid links')
-    twists = bool(arm.elastic_joints)
+    twists = any('twist' in name for name in arm.passive_names)
     finish(axes, 'modal displacements and twists, as planned' if twists
            else 'modal displacements, as planned',
            'displacement [mm, mrad]' if twists else 'displacement [mm]')

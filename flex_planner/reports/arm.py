@@ -8,6 +8,8 @@ import math
 from flex_planner.arms.arm import Arm, Joint, Link, Motor
 from flex_planner.arms.inverse_kinematics import workspace
 from flex_planner.arms.kinematics import tip_position
+from flex_planner.arms.spatial_arm import SpatialArm
+from flex_planner.arms.spatial_joint import slides
 from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.statics import equilibrium, natural_modes
@@ -19,6 +21,15 @@ from flex_planner.optimal_control.task import Task
 from flex_planner.planning.bending import find_largest_bending
 from flex_planner.planning.warnings import find_arm_warnings
 from flex_planner.reports.mode_relevance import describe_relevance
+from flex_planner.reports.spatial_arm import (
+    describe_place,
+    describe_spatial_links,
+    JointUnits,
+    say_posture,
+    SLIDING,
+    spatial_postures,
+    TURNING,
+)
 import numpy as np
 
 _MOST_FREQUENCIES = 8
@@ -41,9 +52,7 @@ def describe_arm(model: ArmModel, postures: Sequence[Array], payload_mass: float
     """
     arm = model.arm
     parameters = Parameters.of(arm, payload_mass=payload_mass)
-    lines = [arm.name, *_source_lines(arm.source), '', *_overview(arm, payload_mass), '']
-    lines += [f'link {i}: {_describe_link(link)}' for i, link in enumerate(arm.links, 1)]
-    lines += [f'joint {i}: {_describe_joint(joint)}' for i, joint in enumerate(arm.joints, 1)]
+    lines = [arm.name, *_source_lines(arm.source), '', *_parts(arm, payload_mass)]
     lines += [f'warning: {one.sentence}' for one in find_arm_warnings(arm)]
     for posture in postures:
         lines += ['', *_describe_posture(model, posture, parameters)]
@@ -54,6 +63,8 @@ def describe_arm(model: ArmModel, postures: Sequence[Array], payload_mass: float
 
 def standard_postures(arm: Arm) -> list[Array]:
     """Return the arm stretched, across gravity if it has weight, then its further joints bent."""
+    if isinstance(arm, SpatialArm):
+        return spatial_postures(arm)
     first = math.atan2(arm.gravity[1], arm.gravity[0]) if arm.gravity.any() else 0.0
     stretched, bent = np.zeros(arm.n_joints), np.full(arm.n_joints, math.pi / 2)
     stretched[0] = bent[0] = first
@@ -61,6 +72,18 @@ def standard_postures(arm: Arm) -> list[Array]:
     level[0] = first + math.pi / 2
     across = [level] if arm.gravity.any() else []
     return [stretched, *across, *([bent] if arm.n_joints > 1 else [])]
+
+
+def _parts(arm: Arm, payload_mass: float) -> list[str]:
+    """Return the arm as a whole, its links and its joints."""
+    if isinstance(arm, SpatialArm):
+        return [*describe_spatial_links(arm, payload_mass),
+                *(f'joint {i}: {describe_place(joint)}{_describe_joint(joint)}'
+                  for i, joint in enumerate(arm.joints, 1)),
+                *(f'note: {note}' for note in arm.notes)]
+    return [*_overview(arm, payload_mass), '',
+            *(f'link {i}: {_describe_link(link)}' for i, link in enumerate(arm.links, 1)),
+            *(f'joint {i}: {_describe_joint(joint)}' for i, joint in enumerate(arm.joints, 1))]
 
 
 def _source_lines(source: str) -> list[str]:
@@ -118,47 +141,48 @@ def sections_text(link: Link) -> str:
 
 def _describe_joint(joint: Joint) -> str:
     """Return a joint's motor, gear, friction and limits in one line."""
-    parts = [_torque_limits(joint.motor)]
+    units = SLIDING if slides(joint) else TURNING
+    parts = [_torque_limits(joint.motor, units)]
     if math.isfinite(joint.motor.max_speed):
-        parts.append(f'at most {joint.motor.max_speed:.4g} rad/s')
+        parts.append(f'at most {joint.motor.max_speed:.4g} {units.speed}')
     if joint.motor.rotor_inertia:
         parts.append(f'rotor {joint.motor.rotor_inertia:.4g} kg m^2 behind a gear of '
-                     f'{joint.motor.gear_ratio:.4g}: {joint.motor.reflected_inertia:.4g} kg m^2 '
-                     'at the joint')
+                     f'{joint.motor.gear_ratio:.4g}: {joint.motor.reflected_inertia:.4g} '
+                     f'{units.inertia} at the joint')
     if joint.elasticity is not None:
-        parts.append(f'elastic, {joint.elasticity.stiffness:.4g} N m/rad, '
-                     f'{joint.elasticity.damping:.4g} N m s/rad')
+        parts.append(f'elastic, {joint.elasticity.stiffness:.4g} {units.stiffness}, '
+                     f'{joint.elasticity.damping:.4g} {units.damping}')
     if joint.viscous_friction:
-        parts.append(f'friction {joint.viscous_friction:.4g} N m s/rad')
+        parts.append(f'friction {joint.viscous_friction:.4g} {units.damping}')
     if joint.coulomb_friction:
-        parts.append(f'Coulomb friction {joint.coulomb_friction:.4g} N m above '
-                     f'{joint.coulomb_speed:.4g} rad/s')
+        parts.append(f'Coulomb friction {joint.coulomb_friction:.4g} {units.torque} above '
+                     f'{joint.coulomb_speed:.4g} {units.speed}')
     if joint.housing.mass or joint.housing.inertia:
         parts.append(f'housing {joint.housing.mass:.4g} kg, {joint.housing.inertia:.4g} kg m^2')
     if math.isfinite(joint.lower_limit) or math.isfinite(joint.upper_limit):
-        low, high = np.degrees([joint.lower_limit, joint.upper_limit])
-        parts.append(f'{low:.4g} to {high:.4g} deg')
+        low, high = (units.scale * limit for limit in (joint.lower_limit, joint.upper_limit))
+        parts.append(f'{low:.4g} to {high:.4g} {units.position}')
     return ', '.join(parts)
 
 
-def _torque_limits(motor: Motor) -> str:
+def _torque_limits(motor: Motor, units: JointUnits) -> str:
     """Return the limits of a motor's torque in words."""
     if math.isinf(motor.standstill_torque):
         return 'no torque limit'
     if math.isinf(motor.no_load_speed):
-        return f'+-{motor.standstill_torque:.4g} N m at any speed'
+        return f'+-{motor.standstill_torque:.4g} {units.torque} at any speed'
     cap = 'without another limit when braking' if math.isinf(motor.torque_cap) else (
-        f'at most {motor.torque_cap:.4g} N m')
-    return (f'+-{motor.stall_torque:.4g} N m at standstill, no-load speed '
-            f'{motor.no_load_speed:.4g} rad/s, {cap}')
+        f'at most {motor.torque_cap:.4g} {units.torque}')
+    return (f'+-{motor.stall_torque:.4g} {units.torque} at standstill, no-load speed '
+            f'{motor.no_load_speed:.4g} {units.speed}, {cap}')
 
 
 def _describe_posture(model: ArmModel, posture: Array, parameters: Parameters) -> list[str]:
     """Return frequencies, deflection and holding torque at a posture."""
     arm = model.arm
-    degrees = ', '.join(f'{angle:.4g}' for angle in np.degrees(posture))
+    degrees = say_posture(arm, posture)
     rest, torque = equilibrium(model, posture, parameters)
-    lines = [f'at joint angles ({degrees}) deg:']
+    lines = [f'at joint angles {degrees}:']
     for label, locked in (('joints locked', True), ('joints free', False)):
         frequencies, _ = natural_modes(model, rest, parameters, locked=locked)
         lines.append(f'  natural frequencies, {label}: {_frequencies(frequencies)}')
@@ -183,8 +207,9 @@ def _modal_displacements(arm: Arm, rest: Array) -> list[str]:
     """Return what gravity displaces modes and twists by."""
     values = [f'{_shown(q) * 1e3:.3g}' for q in rest[arm.n_joints:]]
     twists, modes = values[:len(arm.elastic_joints)], values[len(arm.elastic_joints):]
+    turning = any('twist' in name for name in arm.modal_names)
     return [f'  {name} {", ".join(each)} {unit}' for name, each, unit in (
-        ('modes', modes, 'mm'), ('twists', twists, 'mrad')) if each]
+        ('modes', modes, 'mm, mrad where they twist' if turning else 'mm'), ('twists', twists, 'mrad')) if each]
 
 
 def _holding(arm: Arm, torque: Array) -> list[str]:

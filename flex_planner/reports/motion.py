@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 import sys
 
+from flex_planner.arms.spatial_joint import slides
 from flex_planner.base.text import printable
 from flex_planner.capacity.results import MaxPayload
 from flex_planner.planning.certificate import Certificate
@@ -37,12 +38,20 @@ def planning_row(seconds: float, *details: str) -> Row:
 
 
 def joint_rows(speeds: Sequence[float], speed_shares: Sequence[float], torques: Sequence[float],
-               torque_shares: Sequence[float]) -> list[Row]:
-    """Return the peaks of each joint, see `Peaks`; a share of 0 means that there is no limit."""
-    peaks = zip(speeds, speed_shares, torques, torque_shares, strict=True)
-    return [(f'joint {i}', f'peak speed {speed:.3f} rad/s{_share("", part, "no-load speed")}, '
-                           f'peak torque {torque:.3f} N m{_share("up to ", full, "its limit")}')
-            for i, (speed, part, torque, full) in enumerate(peaks, 1)]
+               torque_shares: Sequence[float], sliding: Sequence[bool] = ()) -> list[Row]:
+    """
+    Return the peaks of each joint, see `Peaks`; a share of 0 means that there is no limit.
+
+    Joints turn, unless `sliding` says of each whether it slides.
+
+    """
+    peaks = zip(speeds, speed_shares, torques, torque_shares,
+                sliding or [False] * len(speeds), strict=True)
+    return [(f'joint {i}', f'peak speed {speed:.3f} {"m/s" if slide else "rad/s"}'
+                           f'{_share("", part, "no-load speed")}, '
+                           f'peak {"force" if slide else "torque"} {torque:.3f} '
+                           f'{"N" if slide else "N m"}{_share("up to ", full, "its limit")}')
+            for i, (speed, part, torque, full, slide) in enumerate(peaks, 1)]
 
 
 def _share(before: str, share: float, whole: str) -> str:
@@ -88,7 +97,8 @@ def motion_rows(plan: Plan, peaks: Peaks) -> list[Row]:
         ('effort', f'{plan.effort:.6g} N^2 m^2 s, the integral of the squared torques'),
         ('energy', f'{plan.energy:.6g} J, the integral of the absolute power'),
         *joint_rows(*(list(values) for values in (
-            peaks.speeds, peaks.speed_shares, peaks.torques, peaks.torque_shares))),
+            peaks.speeds, peaks.speed_shares, peaks.torques, peaks.torque_shares,
+            map(slides, plan.arm.joints)))),
         ('motors on their limit', _saturation(plan)),
         *certificate_rows(plan.certificate)]
 

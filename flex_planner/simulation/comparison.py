@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import tip_position
+from flex_planner.arms.planar_only import require_planar
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array, number
 from flex_planner.control.default_gains import default_gains
@@ -107,13 +108,14 @@ def compare(task: Task, *, model: ArmModel | None = None, mismatch: Mismatch | N
     Raises
     ------
     InvalidValueError, InvalidTaskError
-        Naming what is wrong.
+        Naming what is wrong; spatial arms are not simulated.
     RunawayError
         If the simulated arm gets out of hand.
     StoppedError
         If the monitor stopped a simulation.
 
     """
+    require_planar(task.arm, 'simulations')
     watch = monitor or Monitor()
     simulated = (mismatch or Mismatch()).apply(task.arm)
     chosen = gains or Gains.of(task.arm.n_joints, _STIFFNESS, _DAMPING)

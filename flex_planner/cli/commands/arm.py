@@ -12,10 +12,10 @@ from flex_planner.base.validation import number
 from flex_planner.cli.options import (
     add_arm,
     add_folder,
-    angles,
     Commands,
     number_argument,
     path_argument,
+    positions,
 )
 from flex_planner.cli.pictures import drawn, print_files
 from flex_planner.optimal_control.arm_model import ArmModel
@@ -71,7 +71,7 @@ def _run(parser: argparse.ArgumentParser, options: argparse.Namespace) -> int:
         parser.error('the following arguments are required: ARM, or --template')
     arm = load_arm(options.arm)
     payload = number('--payload', options.payload, at_least=0, at_most=MAX_PAYLOAD, unit='kg')
-    postures = ([angles('--posture', text, arm.n_joints) for text in options.posture]
+    postures = ([positions('--posture', text, arm) for text in options.posture]
                 if options.posture else standard_postures(arm))
     model = ArmModel(arm)
     text = describe_arm(model, postures, payload)

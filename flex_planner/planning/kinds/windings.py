@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from flex_planner.arms.spatial_joint import slides
 from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.validation import Array
 from flex_planner.optimal_control.motion_problem import MotionProblem
@@ -34,7 +35,8 @@ def other_windings(problem: MotionProblem) -> list[MotionProblem]:
     start, goal = problem.start[:n], problem.goal[:n]
     lower, upper = problem.model.arm.angle_limits()
     found = []
-    for turn in np.vstack([np.eye(n), -np.eye(n)]) * 2 * np.pi:
+    turns = np.eye(n)[[not slides(joint) for joint in task.arm.joints]]
+    for turn in np.vstack([turns, -turns]) * 2 * np.pi:
         turned = goal + turn
         if (np.abs(turned - start).max() <= _LONGEST and (turned >= lower).all()
                 and (turned <= upper).all()):

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import link_points, payload_position, payload_velocity
+from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.rigid_inertia import RigidInertia
 from flex_planner.optimal_control.motion_problem import MotionProblem
@@ -54,6 +56,17 @@ class EndEnergy:
 
     def _doubt(self, payload: float) -> float:
         return _ROUNDING * (self.size + payload * self.size_per_payload)
+
+
+def knows_bounds(arm: Arm) -> bool:
+    """
+    Return whether bounds of the motions of an arm are known.
+
+    They follow from the mass matrices of planar arms in all postures, see `RigidInertia`. Of
+    spatial arms nothing is proved here.
+
+    """
+    return not isinstance(arm, SpatialArm)
 
 
 class MotionFacts:

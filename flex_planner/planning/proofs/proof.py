@@ -20,7 +20,7 @@ from flex_planner.planning.proofs.duration_bounds import (
     DurationBound,
     SAFETY,
 )
-from flex_planner.planning.proofs.motion_facts import MotionFacts
+from flex_planner.planning.proofs.motion_facts import knows_bounds, MotionFacts
 from flex_planner.planning.proofs.payload_bounds import (
     is_any_excluded,
     payload_by_energy,
@@ -102,7 +102,7 @@ def find_proof(problem: MotionProblem, *, thorough: bool = False) -> Proof | Non
 
     """
     asked = problem.task.duration
-    if problem.task.time_weight:  # it is only a guess
+    if problem.task.time_weight or not knows_bounds(problem.task.arm):
         return None
     facts = MotionFacts(problem)
     power = bound_by_power(facts)
@@ -138,6 +138,8 @@ def bound_duration(problem: MotionProblem) -> float:
         Start, goal and payload; its duration does not matter.
 
     """
+    if not knows_bounds(problem.task.arm):
+        return 0.0
     facts = MotionFacts(problem)
     return max(bound(facts).seconds for bound in (bound_by_power, bound_by_energy))
 
@@ -155,7 +157,7 @@ def bound_payload(problem: MotionProblem, carried: float = 0.0) -> PayloadBound:
 
     """
     bounds = [_bound_by_holding(problem)]
-    if not problem.task.time_weight:
+    if not problem.task.time_weight and knows_bounds(problem.task.arm):
         facts = MotionFacts(problem)
         bounds.append(_bounded(ProofName.POWER, payload_by_power(facts), facts))
         known = min(bound.payload for bound in bounds)
@@ -168,7 +170,7 @@ def is_payload_bounded(problem: MotionProblem) -> bool:
     """Return whether `bound_payload` finds a bound, which takes a twentieth of its time."""
     if np.isfinite(_bound_by_holding(problem).payload):
         return True
-    if problem.task.time_weight:
+    if problem.task.time_weight or not knows_bounds(problem.task.arm):
         return False
     facts = MotionFacts(problem)
     return bool(np.isfinite(payload_by_power(facts)) or is_any_excluded(facts))

@@ -17,7 +17,7 @@ from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import MAX_DURATION, MAX_VELOCITY
 from flex_planner.planning.kinds.paths import JointPath
 from flex_planner.planning.proofs.duration_bounds import bound_by_energy, bound_by_power
-from flex_planner.planning.proofs.motion_facts import MotionFacts
+from flex_planner.planning.proofs.motion_facts import knows_bounds, MotionFacts
 from flex_planner.planning.strategies.initial_guesses import rigid_problem
 import numpy as np
 
@@ -98,6 +98,8 @@ def rigid_bound(problem: MotionProblem) -> float:
     try:
         rigid = problem if not problem.model.arm.n_passive else rigid_problem(problem)
     except InvalidTaskError:  # motors that hold the bent arm may be too weak for the straight one
+        return 0.0
+    if not knows_bounds(rigid.task.arm):
         return 0.0
     facts = MotionFacts(rigid)
     return max(bound(facts).seconds for bound in (bound_by_power, bound_by_energy))

@@ -1,0 +1,164 @@
+"""Links in space: a body, and a beam that bends from the joint to the end, if there is one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+import math
+
+from flex_planner.arms.link import MAX_MODES
+from flex_planner.arms.spatial_beam import SpatialBeam
+from flex_planner.arms.spatial_body import clean, Point, point, SpatialBody
+from flex_planner.base.errors import InvalidValueError
+from flex_planner.base.validation import Array
+import numpy as np
+
+# of a direction: sine of the angle between two
+_PARALLEL = 1e-3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SpatialLink:
+    """
+    A link from its joint to the next one, or to the tip of the arm.
+
+    Parameters
+    ----------
+    end : array_like, shape (3,)
+        Where the next joint or the tip is, in the frame of the link, unbent [m].
+    body : SpatialBody
+        Fixed to the frame of the link: of a rigid link all of it, of a flexible one what is at its
+        base.
+    beam : SpatialBeam, optional
+        From the origin to the end; none for a rigid link.
+    tip_body : SpatialBody
+        Fixed to the end, with the axes of the link as it is bent there.
+
+    Raises
+    ------
+    InvalidValueError
+        If a value breaks its bound, or a beam has no length.
+
+    """
+
+    end: Point = (0.0, 0.0, 0.0)
+    body: SpatialBody = field(default_factory=SpatialBody)
+    beam: SpatialBeam | None = None
+    tip_body: SpatialBody = field(default_factory=SpatialBody)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, 'end', point('end', self.end))
+        if self.beam is not None and not self.length:
+            raise InvalidValueError('end', list(self.end),
+                                    'apart from the joint where the link is a beam')
+        if self.beam is not None:
+            self.axes()
+            self.beam.flexible_body(self.length)  # refuses shapes that cannot be computed
+
+    @property
+    def length(self) -> float:
+        """Return the distance from the joint to the end, unbent [m]."""
+        return math.hypot(*self.end)
+
+    @property
+    def modes(self) -> int:
+        """Return the number of modes of bending and twisting."""
+        return 0 if self.beam is None else self.beam.count
+
+    @property
+    def mass(self) -> float:
+        """Return the mass of all that belongs to the link [kg]."""
+        beam = 0.0 if self.beam is None else self.beam.linear_density * self.length
+        return self.body.mass + beam + self.tip_body.mass
+
+    @property
+    def flexural_rigidity(self) -> float:
+        """Return `SpatialBeam.reference_rigidity`; infinite for a rigid link [N m^2]."""
+        return math.inf if self.beam is None else self.beam.reference_rigidity
+
+    @property
+    def damping_ratios(self) -> Array:
+        """Return the damping ratio of each mode, shape (modes,)."""
+        return np.full(self.modes, 0.0 if self.beam is None else self.beam.damping_ratio)
+
+    @property
+    def is_clamped(self) -> bool:
+        """Return whether the link bends: beams in space are clamped to their joints."""
+        return self.modes > 0
+
+    @property
+    def family_assumed(self) -> bool:
+        """Return False: what bends in space is known to be clamped."""
+        return False
+
+    @property
+    def mode_names(self) -> tuple[str, ...]:
+        """Return a name of each mode: ``across1``, ``across2`` for the planes, ``twist``."""
+        if self.beam is None:
+            return ()
+        counts = zip(('y', 'z', 'twist'), (*self.beam.modes, self.beam.twist_modes), strict=True)
+        return tuple(f'{kind}{j}' for kind, count in counts for j in range(1, count + 1))
+
+    def axes(self) -> Array:
+        """
+        Return the axes of the beam in the frame of the link, columns of a rotation (3, 3).
+
+        The first is along it; the other two are those across which its planes are named.
+
+        Raises
+        ------
+        InvalidValueError
+            If the beam's `across` is along it.
+
+        """
+        if self.beam is None:
+            return np.eye(3)
+        along = np.array(self.end) / self.length
+        across = (np.eye(3)[(int(np.abs(along).argmax()) + 1) % 3]
+                  if self.beam.across is None else np.array(self.beam.across))
+        across = across - (across @ along) * along
+        size = float(np.linalg.norm(across))
+        if not size > _PARALLEL * max(1.0, float(np.linalg.norm(self.beam.across or 1.0))):
+            raise InvalidValueError('beam.across', self.beam.across, 'a direction across the beam')
+        across /= size
+        return clean(np.column_stack([along, across, np.cross(along, across)]))
+
+    def displace(self, modal: Array, stations: int) -> Array:
+        """
+        Return how far points along the link are moved by modal displacements.
+
+        Parameters
+        ----------
+        modal : numpy.ndarray, shape (..., modes)
+            [m, rad].
+        stations : int
+            Evenly spaced points, both ends included.
+
+        Returns
+        -------
+        numpy.ndarray, shape (..., stations, 3)
+            In the frame of the link, to first order [m].
+
+        """
+        if self.beam is None or not self.modes:
+            return np.zeros((*modal.shape[:-1], stations, 3))
+        places = np.linspace(0.0, self.length, stations, dtype=np.float64)
+        shapes = self.axes() @ self.beam.displace(self.length, places)  # (stations, 3, m)
+        moved: Array = np.einsum('sam,...m->...sa', shapes, modal)
+        return moved
+
+    def rigid(self) -> SpatialLink:
+        """Return the same link without modes."""
+        return self if self.beam is None else replace(self, beam=self.beam.rigid())
+
+    def with_rigidity(self, factor: float) -> SpatialLink:
+        """Return the same link with all its rigidities multiplied."""
+        return (self if self.beam is None
+                else replace(self, beam=self.beam.with_rigidity(factor)))
+
+    def with_more_modes(self, more: int) -> SpatialLink:
+        """Return the same link with so many modes more in each plane that has any."""
+        if self.beam is None:
+            return self
+        first, second = (min(count + more, MAX_MODES) if count else 0
+                         for count in self.beam.modes)
+        return replace(self, beam=replace(self.beam, modes=(first, second)))

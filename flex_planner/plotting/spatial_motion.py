@@ -1,0 +1,65 @@
+"""A motion in space: the path of the tip in three dimensions, and units of joints that slide."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from flex_planner.arms.arm import Arm
+from flex_planner.arms.kinematics import link_points
+from flex_planner.arms.spatial_joint import slides
+from flex_planner.base.colours import ARM, PLANNED
+from flex_planner.base.validation import Array
+import numpy as np
+
+_STATIONS, _POSTURES = 21, 6
+_LEAST_SIDE = 1e-9
+
+
+def draw_path_in_space(axes: Any, arm: Arm, coordinates: Array, tip: Array) -> None:
+    """
+    Draw the path of the tip with the arm at some instants.
+
+    Parameters
+    ----------
+    axes : mpl_toolkits.mplot3d.Axes3D
+        To draw in.
+    arm : Arm
+        A spatial one of n_t coordinates.
+    coordinates : numpy.ndarray, shape (k, n_t)
+        q.
+    tip : numpy.ndarray, shape (k, 3)
+        [m].
+
+    """
+    last = len(tip) - 1
+    shown = [tip]
+    for k in np.linspace(0, last, _POSTURES).astype(int):
+        points = link_points(arm, coordinates[k], _STATIONS).reshape(-1, 3)
+        axes.plot(*points.T, color=ARM, linewidth=2.5 if k in (0, last) else 1)
+        shown.append(points)
+    axes.plot(*tip.T, color=PLANNED, linewidth=1.5, label='tip, planned')
+    axes.plot(*tip[:1].T, 'o', color=PLANNED, label='start')
+    axes.plot(*tip[-1:].T, 's', color=PLANNED, label='goal')
+    _same_scale(axes, np.concatenate(shown))
+    for name in 'xyz':
+        getattr(axes, f'set_{name}label')(f'{name} [m]')
+    axes.set_title('path of the tip')
+
+
+def _same_scale(axes: Any, points: Array) -> None:
+    """Give all axes the same scale."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle, half = (low + high) / 2, max(float((high - low).max()), _LEAST_SIDE) / 2
+    for name, centre in zip('xyz', middle, strict=True):
+        getattr(axes, f'set_{name}lim')(centre - half, centre + half)
+    axes.set_box_aspect((1, 1, 1))
+
+
+def position_scale(arm: Arm) -> Array:
+    """Return the factors to degrees of joints that turn, to millimetres of those that slide."""
+    return np.array([1e3 if slides(joint) else np.degrees(1.0) for joint in arm.joints])
+
+
+def label(arm: Arm, turning: str, sliding: str) -> str:
+    """Return a label of the joints of an arm, with the unit of those that slide if any do."""
+    return f'{turning}, {sliding}' if any(map(slides, arm.joints)) else turning
