@@ -23,7 +23,7 @@ from flex_planner.collocation.solution import CollocationSolution
 import numpy as np
 
 # mu falls by this factor from mesh to mesh
-_FALL = 0.1
+_FALL = 0.01
 # meshes for one mu, at most
 _MOST_MESHES = 12
 # a slack that changes by more than this factor from point to point (its logarithm), where its

@@ -16,6 +16,7 @@ from flex_planner.optimal_control.constrained_motion import ConstrainedMotion, s
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.path_constraints import PathSlacks
 import numpy as np
+from numpy.typing import NDArray
 
 # by which a slack may be passed: less is rounding
 MARGIN = 1e-6
@@ -129,7 +130,7 @@ def _margin(k: int, slacks: PathSlacks, solution: CollocationSolution, times: Ar
         active=_find_intervals(times, values < _ACTIVE), price=price / label.scale)
 
 
-def _find_intervals(times: Array, active: Array) -> tuple[tuple[float, float], ...]:
+def _find_intervals(times: Array, active: NDArray[np.bool_]) -> tuple[tuple[float, float], ...]:
     """Return the times between which samples are active."""
     padded = np.concatenate([[False], active, [False]])
     edges = np.flatnonzero(padded[1:] != padded[:-1]).reshape(-1, 2)

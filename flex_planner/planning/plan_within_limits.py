@@ -13,7 +13,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from flex_planner.base.progress import StoppedError
-from flex_planner.collocation import CollocationResult, CollocationSolution, INTERRUPTED, Solver
+from flex_planner.collocation import CollocationSolution, Solver
+from flex_planner.collocation.interior_point import BarrierOutcome
 from flex_planner.optimal_control.constrained_motion import (
     ConstrainedMotion,
     end_states,
@@ -34,12 +35,18 @@ from flex_planner.planning.plan_problem import conclude, STOP_STATUS
 from flex_planner.planning.strategies.interior_point import applies
 from flex_planner.planning.strategies.payload_within_limits import find_largest_payload
 from flex_planner.planning.strategies.strategy import Attempt
-from flex_planner.planning.strategies.within_limits import solve_again, solve_within_limits
+from flex_planner.planning.strategies.within_limits import (
+    approach_limits,
+    solve_again,
+    solve_within_limits,
+)
 import numpy as np
 
 WITHIN_LIMITS = 'interior point within the limits'
 # other kinds of motion that are tried, those cheaper by this share
 _TRIED, _CHEAPER = 3, 1e-3
+# share of its cost that a motion has at least, which is known on a coarse mesh only
+_COARSE = 0.97
 # a motion this far from all its limits was not bent by them
 _FAR = 0.01
 _SHARES = np.linspace(0, 1, 9, dtype=np.float64)
@@ -118,16 +125,16 @@ def plan_again_within(problem: MotionProblem, near: CollocationSolution, solver:
     plan = conclude(limited, WITHIN_LIMITS, Attempt(result=result), solver)
     if not plan.solved:
         return None
-    return replace(_describe(plan, limited), iterations=solver.monitor.iteration,
+    return replace(_describe(plan), iterations=solver.monitor.iteration,
                    planning_time=solver.monitor.elapsed)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Found:
-    """A motion within the limits."""
+class _Near:
+    """A motion that keeps its limits at the points of a coarse mesh, and its kind."""
 
-    problem: ConstrainedMotion
-    result: CollocationResult
+    problem: MotionProblem
+    met: BarrierOutcome
     kind: KindOfMotion
 
 
@@ -137,40 +144,52 @@ class _Search:
     def __init__(self, free: Plan, slacks: PathSlacks, solver: Solver) -> None:
         self._free, self._slacks, self._solver = free, slacks, solver
         self._starts = 0
-        self._found: list[_Found] = []
-        self._failed: CollocationResult | None = None
+        self._near: list[_Near] = []
+        self._failed: CollocationSolution | None = None
 
     def run(self, effort: SearchEffort) -> None:
-        """Solve from all starts that may lead to something cheaper than what is found."""
-        for problem, near, bound in self._choose_starts(effort):
+        """Come near to a motion from each start that may lead to something cheaper."""
+        for problem, start, bound in self._choose_starts(effort):
             if bound >= (1 - _CHEAPER) * self._best_cost():
                 continue
             self._starts += 1
-            limited, result = solve_within_limits(problem, self._slacks, near, self._solver)
-            if result.status in INTERRUPTED:
-                self._solver.monitor.check()
-            if result.converged:
-                self._add(limited, result)
+            met = approach_limits(problem, self._slacks, start, self._solver)
+            if met.converged:
+                self._add(problem, met)
             elif self._failed is None:
-                self._failed = result
+                self._failed = met.solution
 
     def conclude(self) -> Plan:
-        """Return the plan of the cheapest motion found."""
-        free = self._free
-        if not self._found:
-            return free if free.solved else self._refuse()
-        self._found.sort(key=lambda one: one.kind.value)
-        best = self._found[0]
-        kinds = tuple(one.kind for one in self._found)[:MOST_KINDS]
-        plan = conclude(best.problem, WITHIN_LIMITS,
-                        Attempt(result=best.result, kinds=kinds, starts=self._starts),
-                        self._solver)
-        if not plan.solved:
-            return free if free.solved or plan.status in STOP_STATUS.values() else replace(
-                free, message=f'{free.message}; within its limits: {plan.message}')
-        if free.solved and free.cost <= plan.cost:
-            return free
-        return _describe(plan, best.problem)
+        """Return the plan of the cheapest motion that is found."""
+        free, best, failure = self._free, None, ''
+        order = sorted(self._near, key=lambda one: one.kind.value)
+        exact: dict[int, KindOfMotion] = {}
+        for one in order:
+            if one.kind.value * _COARSE > min(best.cost if best else np.inf, self._most()):
+                break
+            plan = self._solve(one)
+            if plan.status in STOP_STATUS.values():
+                return plan if best is None else best
+            if plan.solved:
+                exact[id(one)] = replace(one.kind, value=plan.cost)
+                best = plan if best is None or plan.cost < best.cost else best
+            failure = failure or plan.message
+        if best is None or (free.solved and free.cost <= best.cost):
+            return free if free.solved else self._refuse(failure)
+        kinds = sorted((exact.get(id(one), one.kind) for one in order),
+                       key=lambda kind: kind.value)
+        return _describe(replace(best, kinds=tuple(kinds)[:MOST_KINDS], starts=self._starts))
+
+    def _solve(self, near: _Near) -> Plan:
+        """Return the plan of a motion that is nearly found."""
+        limited, result = solve_within_limits(near.problem, self._slacks, near.met, self._solver)
+        if not result.converged and self._failed is None:
+            self._failed = result.solution
+        return conclude(limited, WITHIN_LIMITS, Attempt(result=result), self._solver)
+
+    def _most(self) -> float:
+        """Return what a motion may cost to be of use."""
+        return self._free.cost if self._free.solved else np.inf
 
     def _choose_starts(self, effort: SearchEffort,
                        ) -> Iterator[tuple[MotionProblem, CollocationSolution, float]]:
@@ -197,34 +216,30 @@ class _Search:
         return find_obstacles(self._slacks, self._slacks(states))
 
     def _best_cost(self) -> float:
-        """Return the cost of the cheapest motion within the limits so far."""
-        known = [one.kind.value for one in self._found]
-        return min([*known, self._free.cost] if self._free.solved else known, default=np.inf)
+        """Return about the cost of the cheapest motion within the limits so far."""
+        return min([one.kind.value for one in self._near], default=self._most())
 
-    def _add(self, limited: ConstrainedMotion, result: CollocationResult) -> None:
+    def _add(self, problem: MotionProblem, met: BarrierOutcome) -> None:
         """Keep a motion, unless it is one that is known."""
-        kind = as_kind(limited, result.solution)
-        sides = say_sides(limited, result.solution, self._obstacles())
+        kind = as_kind(problem, met.solution)
+        sides = say_sides(problem, met.solution, self._obstacles())
         if sides:
             kind = replace(kind, sentence=f'{sides}; {kind.sentence}')
-        same = [one for one in self._found if one.kind.sentence == kind.sentence
+        same = [one for one in self._near if one.kind.sentence == kind.sentence
                 and are_alike(one.kind.motion.angles, kind.motion.angles)]
-        if same and same[0].kind.value <= kind.value:
-            return
-        self._found = [one for one in self._found if one not in same]
-        self._found.append(_Found(problem=limited, result=result, kind=kind))
+        if not same:
+            self._near.append(_Near(problem=problem, met=met, kind=kind))
 
-    def _refuse(self) -> Plan:
+    def _refuse(self, failure: str) -> Plan:
         """Return the free plan with what stands against a motion within its limits."""
         free, failed = self._free, self._failed
         if failed is None:
-            return free
+            return replace(free, message=f'{free.message}; within its limits: {failure}')
         half = free.problem.size // 2
-        states = failed.solution.values_at(_SHARES)[..., :half].reshape(-1, half)
-        values = self._slacks(states)
-        _, worst = np.unravel_index(int(values.argmin()), values.shape)
+        values = self._slacks(failed.values_at(_SHARES)[..., :half].reshape(-1, half))
+        worst = int(values.min(axis=0).argmin())
         label, slack = self._slacks.labels[worst], float(values[:, worst].min())
-        nearest = (f', the nearest of {self._starts} tries breaks "{label.name}" by '
+        nearest = (f': of {self._starts} tries the first breaks "{label.name}" by '
                    f'{-slack * label.scale:.3g} {label.unit}' if slack < -MARGIN else '')
         message = (f'{free.message}; no motion within the limits was found, which does not show '
                    f'that there is none{nearest}{self._say_payload()}')
@@ -242,10 +257,13 @@ class _Search:
                 f'{payload:g} kg')
 
 
-def _describe(plan: Plan, limited: ConstrainedMotion) -> Plan:
+def _describe(plan: Plan) -> Plan:
     """Return a plan with what its limits leave, and what the barrier may cost."""
+    limited = plan.problem
+    assert isinstance(limited, ConstrainedMotion)
     tightest = min(plan.constraints, key=lambda one: one.slack)
-    others = ''.join(f'; {kind.sentence}: J = {kind.value:.4g}' for kind in plan.kinds[1:])
+    others = ''.join(f'; {kind.sentence}: J = {kind.value:.3g}' for kind in plan.kinds[1:])
     gap = limited.slacks.count * limited.mu * plan.task.duration
     return replace(plan, barrier_gap=gap, message=(
-        f'{PlanStatus.SOLVED.value}, within all limits on the way ({tightest}){others}'))
+        f'{PlanStatus.SOLVED.value}, within all limits on the way ({tightest})'
+        + (f'; other kinds of motion{others}' if others else '')))

@@ -9,6 +9,7 @@ left are solved exactly, as those of any motion.
 
 from __future__ import annotations
 
+from flex_planner.base.validation import Array
 from flex_planner.collocation import (
     CollocationResult,
     CollocationSolution,
@@ -17,7 +18,11 @@ from flex_planner.collocation import (
     Solver,
 )
 from flex_planner.collocation.barrier_mesh import follow_barrier
-from flex_planner.collocation.interior_point import BarrierOutcome, BarrierSchedule
+from flex_planner.collocation.interior_point import (
+    BarrierOutcome,
+    BarrierSchedule,
+    solve_barrier,
+)
 from flex_planner.optimal_control.barrier_problem import MotionBarrier
 from flex_planner.optimal_control.constrained_motion import ConstrainedMotion
 from flex_planner.optimal_control.motion_problem import MotionProblem
@@ -28,19 +33,20 @@ import numpy as np
 
 # of the method, and intervals of its first mesh
 _STAGES, _FEWEST = 4, 40
-# mu at first and at last, in units of the cost per time of the motion that it starts from
-_TRIES = ((1e-2, 1e-4), (1e-1, 1e-4), (1e-1, 1e-3))
-_TOLERANCE = 1e-4
+# mu in units of the cost per time of the motion that it starts from: at first, where a motion is
+# told from others, and at last; the second of each where the first leads to nothing
+_FIRST, _COARSE, _LAST = (1e-2, 1e-1), 1e-3, (1e-4, 1e-3)
+# at first, from a motion that limits have bent, in units of mu at last
+_NEAR = 10.0
+_TOLERANCE = 1e-2
 # iterations on a mesh, and of a first look from a motion like it
 _PATIENCE, _FIRST_LOOK = 60, 10
-# mu at first from there, in units of that at last
-_NEAR = 10.0
 
 
-def solve_within_limits(problem: MotionProblem, slacks: PathSlacks, near: CollocationSolution,
-                        solver: Solver) -> tuple[ConstrainedMotion, CollocationResult]:
+def approach_limits(problem: MotionProblem, slacks: PathSlacks, near: CollocationSolution,
+                    solver: Solver) -> BarrierOutcome:
     """
-    Return the conditions with a small barrier, and their solution if one was found.
+    Return a motion that keeps its limits at the points of a coarse mesh.
 
     Parameters
     ----------
@@ -59,21 +65,47 @@ def solve_within_limits(problem: MotionProblem, slacks: PathSlacks, near: Colloc
         If the monitor stopped it.
 
     """
-    rate = find_cost_rate(problem, near)
-    limited = ConstrainedMotion(problem, slacks, _TRIES[0][1] * rate)
+    barrier, rate = PathBarrier(MotionBarrier(problem), slacks), find_cost_rate(problem, near)
+    guess = near.on_mesh(_first_mesh(problem, solver), GaussRule.of(_STAGES))
+    for first in _FIRST:
+        schedule = _schedule(first * rate, _COARSE * rate, solver)
+        met = solve_barrier(barrier, guess, barrier.guess(guess, schedule.first), schedule,
+                            solver.monitor)
+        if met.converged:
+            break
+    return met
+
+
+def solve_within_limits(problem: MotionProblem, slacks: PathSlacks, met: BarrierOutcome,
+                        solver: Solver) -> tuple[ConstrainedMotion, CollocationResult]:
+    """
+    Return the conditions with a small barrier, and their solution if one was found.
+
+    Parameters
+    ----------
+    problem, slacks, solver
+        As of `approach_limits`.
+    met : BarrierOutcome
+        What that returned.
+
+    Raises
+    ------
+    StoppedError
+        If the monitor stopped it.
+
+    """
+    rate = find_cost_rate(problem, met.solution)
+    limited = ConstrainedMotion(problem, slacks, _LAST[0] * rate)
     failed: CollocationResult | None = None
-    for first, last in _TRIES:
+    for last in _LAST if met.converged else ():
         limited = limited.with_mu(last * rate)
-        met = lower_barrier(problem, slacks, near, first * rate, last * rate, solver)
-        if not met.converged:
-            failed = failed or CollocationResult.failed(met.solution, met.message)
-            continue
-        result = finish(limited, met.solution, solver)
+        finer = _follow(problem, slacks, met, last * rate, solver)
+        result = (finish(limited, finer.solution, solver) if finer.converged
+                  else CollocationResult.failed(finer.solution, finer.message))
         if result.converged or result.status in INTERRUPTED:
             return limited, result
-        failed = result
-    assert failed is not None
-    return limited, failed
+        failed = failed or result
+    return limited, failed or CollocationResult.failed(met.solution, met.message)
 
 
 def solve_again(problem: MotionProblem, slacks: PathSlacks, near: CollocationSolution,
@@ -87,30 +119,37 @@ def solve_again(problem: MotionProblem, slacks: PathSlacks, near: CollocationSol
         If the monitor stopped it.
 
     """
-    rate = _TRIES[0][1] * find_cost_rate(problem, near)
-    limited = ConstrainedMotion(problem, slacks, rate)
-    result = solver.with_settings(stages=_STAGES).patient(_FIRST_LOOK).solve(limited, near)
+    rate = find_cost_rate(problem, near)
+    limited = ConstrainedMotion(problem, slacks, _LAST[0] * rate)
+    quick = solver.with_settings(stages=_STAGES).patient(_FIRST_LOOK)
+    result = quick.solve(limited, near)
     if result.converged or result.status in INTERRUPTED:
         return limited, result
-    met = lower_barrier(problem, slacks, near, _NEAR * rate, rate, solver)
-    if not met.converged:
-        return limited, CollocationResult.failed(met.solution, met.message)
-    return limited, finish(limited, met.solution, solver)
-
-
-def lower_barrier(problem: MotionProblem, slacks: PathSlacks, near: CollocationSolution,
-                  first: float, last: float, solver: Solver) -> BarrierOutcome:
-    """Return the motion at the end of a barrier that falls from one mu to another."""
-    half = problem.size // 2
     barrier = PathBarrier(MotionBarrier(problem), slacks)
+    guess, mu = near.on_mesh(_first_mesh(problem, solver), GaussRule.of(_STAGES)), limited.mu
+    met = solve_barrier(barrier, guess, barrier.guess(guess, _NEAR * mu),
+                        _schedule(_NEAR * mu, _NEAR * mu, solver), solver.monitor)
+    return solve_within_limits(problem, slacks, met, solver)
+
+
+def _first_mesh(problem: MotionProblem, solver: Solver) -> Array:
+    """Return the times of the first mesh."""
     count = min(max(_FEWEST, problem.fewest_intervals(_STAGES)), solver.settings.max_intervals)
-    mesh = np.linspace(0, problem.task.duration, count + 1, dtype=np.float64)
-    guess = near.on_mesh(mesh, GaussRule.of(_STAGES))
-    schedule = BarrierSchedule(first=first, last=last, tolerance=_TOLERANCE,
-                               max_iterations=min(_PATIENCE, solver.settings.max_iterations))
+    return np.linspace(0, problem.task.duration, count + 1, dtype=np.float64)
+
+
+def _schedule(first: float, last: float, solver: Solver) -> BarrierSchedule:
+    return BarrierSchedule(first=first, last=last, tolerance=_TOLERANCE,
+                           max_iterations=min(_PATIENCE, solver.settings.max_iterations))
+
+
+def _follow(problem: MotionProblem, slacks: PathSlacks, met: BarrierOutcome, last: float,
+            solver: Solver) -> BarrierOutcome:
+    """Return the motion at the end of the barrier, which keeps its limits between points, too."""
+    half, barrier = problem.size // 2, PathBarrier(MotionBarrier(problem), slacks)
     return follow_barrier(
-        barrier, guess, barrier.guess(guess, first), schedule, solver.monitor,
-        slacks=lambda z: slacks(z[:, :half]), count=slacks.count,
+        barrier, met.solution, met.y, _schedule(met.mu, min(last, met.mu), solver),
+        solver.monitor, slacks=lambda z: slacks(z[:, :half]), count=slacks.count,
         most_intervals=solver.settings.max_intervals)
 
 
