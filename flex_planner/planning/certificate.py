@@ -137,4 +137,4 @@ def hamiltonian_drift(problem: MotionProblem, solution: CollocationSolution) -> 
     half = z.shape[1] // 2
     powers = np.abs(z[:, half:] * problem.rate(times, z)[:, :half]).max(axis=1)
     size = max(float(np.max(controls.cost_rate)), float(np.max(powers)), np.finfo(float).tiny)
-    return float(np.ptp(controls.hamiltonian)) / size
+    return float(np.ptp(controls.hamiltonian + problem.barrier_rate(z))) / size

@@ -7,6 +7,7 @@ from dataclasses import replace
 from flex_planner.collocation import CollocationSolution
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.planning.bending import find_bending, LARGEST
+from flex_planner.planning.constraint_margins import find_margins
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.warnings import find_warnings
 from flex_planner.planning.way_limits import find_limit_violations
@@ -26,6 +27,7 @@ def judge(plan: Plan) -> Plan:
     refused = find_refusal(plan.problem, plan.solution)
     status, message = refused or (PlanStatus.SOLVED, plan.message)
     return replace(plan, status=status, message=message,
+                   constraints=find_margins(plan.problem, plan.solution),
                    warnings=find_warnings(plan.problem, plan.solution))
 
 
@@ -55,6 +57,9 @@ def find_refusal(problem: MotionProblem,
         return PlanStatus.LIMIT_VIOLATED, (
             f'{violations[0]}{more}; another duration, another posture at start or goal, or '
             'weights on positions or speeds may lead past')
+    broken = [one for one in find_margins(problem, solution) if not one.kept]
+    if broken:
+        return PlanStatus.LIMIT_VIOLATED, str(min(broken, key=lambda one: one.slack))
     return None if problem.task.allow_large_bending else _find_bent_link(problem, solution)
 
 
