@@ -32,11 +32,14 @@ class FreeViaTimesProblem:
     ----------
     motion : MotionProblem
         Of the task, with times near the best.
+    jumps : numpy.ndarray, shape (K,), optional
+        Of H at the via points; none by default, others lead to that from times that are given.
 
     """
 
-    def __init__(self, motion: MotionProblem) -> None:
+    def __init__(self, motion: MotionProblem, jumps: Array | None = None) -> None:
         self.motion = motion
+        self._jumps = np.zeros(motion.via.times.size) if jumps is None else jumps
         self.size = motion.size + 2
         self.scale = np.concatenate([motion.scale, [motion.task.duration,
                                                     _SHORTEST * motion.task.duration]])
@@ -98,7 +101,8 @@ class FreeViaTimesProblem:
         # the gradient of H is (-psi', x')
         slopes = np.hstack([-rates[:, inner // 2:], rates[:, :inner // 2]])
         unit = self._unit(controls.cost_rate, slopes)
-        residual[-1] = unit * (controls.hamiltonian[0] - controls.hamiltonian[1])
+        fall = float(controls.hamiltonian[0] - controls.hamiltonian[1])
+        residual[-1] = unit * (fall - self._jumps[junction])
         rows[-1, :inner], rows[-1, size:size + inner] = unit * slopes[0], -unit * slopes[1]
         return residual, rows
 
@@ -106,6 +110,19 @@ class FreeViaTimesProblem:
         """Return what turns H into a duration, by which its row is scaled."""
         power = float(np.abs(slopes * self.motion.scale).max() + np.abs(cost).max())
         return float(self.scale[-1]) / max(power, np.finfo(float).tiny)
+
+    def with_jumps(self, jumps: Array) -> FreeViaTimesProblem:
+        """Return the problem whose H falls by given amounts at the via points."""
+        return FreeViaTimesProblem(self.motion, jumps)
+
+    def jumps(self, solution: CollocationSolution) -> Array:
+        """Return by how much H falls at each via point, shape (K,)."""
+        twice = np.flatnonzero(solution.steps == 0)
+        before, after = (self.motion.model.controls(solution.nodes[at, :self.motion.size],
+                                                    self.motion.p).hamiltonian
+                         for at in (twice, twice + 1))
+        fall: Array = before - after
+        return fall
 
     def extend(self, solution: CollocationSolution) -> CollocationSolution:
         """Return a motion that passes its via points at given times as a guess."""

@@ -20,6 +20,8 @@ from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.optimal_control.task import Task
 from flex_planner.optimal_control.torque_limits import TorqueLimits
+from flex_planner.optimal_control.via_conditions import ViaConditions
+from flex_planner.optimal_control.via_points import ViaPoint
 from flex_planner.planning.certificate import Certificate
 from flex_planner.planning.kinds.clusters import KindOfMotion
 from flex_planner.planning.kinds.explorer import ExploredMotion
@@ -183,6 +185,11 @@ class Plan:
         return self.problem.model
 
     @property
+    def via_times(self) -> Array:
+        """Return when the via points of the task are passed, shape (K,) [s]."""
+        return self.problem.junctions
+
+    @property
     def mesh_intervals(self) -> int:
         """Return the intervals of the final mesh, 0 without a solution."""
         return self.solution.intervals if self.solution else 0
@@ -285,7 +292,7 @@ class Plan:
 _SAVED = (Plan, PlanStatus, Certificate, Task, Arm, Link, BeamSection, Joint, Elasticity, Motor,
           Node, ArmModel, MotionProblem, BoundaryConditions, Parameters, CollocationSolution,
           GaussRule, ObjectiveSearch, Objectives, Objective, WeightTrial, Margin, KindOfMotion,
-          ExploredMotion, PlanWarning, WarningKind, TriedStrategy)
+          ExploredMotion, PlanWarning, WarningKind, TriedStrategy, ViaPoint, ViaConditions)
 
 
 def plan_view(plan: Plan) -> list[tuple[str, str]]:
