@@ -152,7 +152,8 @@ class _CompiledRun:
         arrays['explicit'], arrays['implicit'] = split_indices(scale.size, explicit)
         run = CoreNewton(
             count=guess.intervals, most_iterations=max_iterations, tolerance=tolerance, kept=KEPT,
-            smallest_step=SMALLEST_STEP, problem=core_problem(self._rate, calls.ends, calls.junction),
+            smallest_step=SMALLEST_STEP,
+            problem=core_problem(self._rate, calls.ends, calls.junction),
             junctions=CoreJunctions.of(self._junctions.intervals, self._junctions.rows),
             stop=STOP(calls.stop), report=REPORT(calls.report),
             **{name: array.ctypes.data for name, array in arrays.items()})

@@ -34,8 +34,8 @@ _OPTIONS = ('-O3', '-fno-math-errno', '-fno-trapping-math', *_VECTORS)
 
 
 _address, _number, _real = ctypes.c_void_p, ctypes.c_longlong, ctypes.c_double
-# functions that core.c calls: the boundary rows, those of a junction, who may stop it, and who hears
-# of an iteration
+# functions that core.c calls: the boundary rows, those of a junction, who may stop it, and who
+# hears of an iteration
 BOUNDARY_ROWS = ctypes.CFUNCTYPE(ctypes.c_int, *[_address] * 6)
 JUNCTION_ROWS = ctypes.CFUNCTYPE(ctypes.c_int, _number, *[_address] * 3)
 STOP = ctypes.CFUNCTYPE(ctypes.c_int)
@@ -71,7 +71,8 @@ class CoreNewton(ctypes.Structure):
         ('problem', CoreProblem), ('stop', STOP), ('report', REPORT), ('nodes', _address),
         ('stages', _address), ('factorisation', _address), ('jacobians', _address),
         ('left_rows', _address), ('right_rows', _address), ('scale', _address),
-        ('junctions', CoreJunctions), ('norm', _real), ('iterations', _number), ('factorised', _number), ('coarse', _number)]
+        ('junctions', CoreJunctions), ('norm', _real), ('iterations', _number),
+        ('factorised', _number), ('coarse', _number)]
 
 
 class CoreSizes(NamedTuple):

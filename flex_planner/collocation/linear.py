@@ -151,14 +151,16 @@ class NewtonSystem:
         inner = np.arange(size)
         blocks = (-transition * scale / scale[:, None]).swapaxes(1, 2)
         at, rows = self._junctions.intervals, self._junctions.rows
-        joined = (rows * np.tile(scale, 2) / scale[:, None]).swapaxes(1, 2)
-        blocks[at] = joined[:, :size]
+        if at.size:
+            joined = (rows * np.tile(scale, 2) / scale[:, None]).swapaxes(1, 2)
+            blocks[at] = joined[:, :size]
         per_node = columns.reshape(count + 1, size, -1)
         # entry (row, column) of the matrix stands at diagonal + row - column
         within = diagonal + top + inner - inner[:, None]
         per_node[:-1, inner[:, None], within] = blocks
         per_node[1:, inner, diagonal + top - size] = 1
-        per_node[at[:, None, None] + 1, inner[:, None], within - size] = joined[:, size:]
+        if at.size:
+            per_node[at[:, None, None] + 1, inner[:, None], within - size] = joined[:, size:]
         per_node[0, inner[:, None], diagonal + np.arange(top) - inner[:, None]] = (
             left * scale / self._row_scale[:top, None]).T
         per_node[-1, inner[:, None], diagonal + np.arange(top, size) - inner[:, None]] = (

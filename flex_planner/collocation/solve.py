@@ -51,7 +51,8 @@ def solve(problem: BoundaryValueProblem, guess: CollocationSolution, settings: S
     """
     if guess.rule.stages != settings.stages:
         guess = guess.on_mesh(guess.mesh, settings.rule)
-    return _MeshRefinement(problem, place_junctions(problem, guess), settings, monitor or Monitor(), expected_error).run()
+    return _MeshRefinement(problem, place_junctions(problem, guess), settings,
+                           monitor or Monitor(), expected_error).run()
 
 
 class _MeshRefinement:

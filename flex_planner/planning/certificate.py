@@ -27,8 +27,8 @@ class Certificate:
     boundary_error : float
         Left side of eq. (17) with W_p = W_v = 1, at the end of the re-simulation.
     hamiltonian_drift : float
-        Spread of H over the motion relative to its largest term; 0 on an extremal. H may jump where
-        a via point is passed at a given time, and the spread is that between such times.
+        Spread of H over the motion relative to its largest term; 0 on an extremal. H may jump
+        where a via point is passed at a given time: the spread is that between such times.
     tip_error : float
         Distance of the re-simulated tip from the point that was asked for, or else from where the
         goal's joint angles have it [m].

@@ -117,9 +117,9 @@ class FastVibrations:
             error += float((1 + rate**2) * vector @ vector / 2)
             away += float(np.linalg.norm(tip_position(arm, state[:n_t]) - asked))
             vibration += residual_vibration(problem.model, state, rest[:n_t], problem.parameters)
-        return Certificate(collocation_residual=0.0, boundary_error=error, hamiltonian_drift=0.0, via_error=0.0,
+        return Certificate(collocation_residual=0.0, boundary_error=error, hamiltonian_drift=0.0,
                            tip_error=away, residual_vibration=vibration, state_error=0.0,
-                           costate_error=0.0)
+                           costate_error=0.0, via_error=0.0)
 
 
 def price_rest(along: Sequence[FastVibrations], start: Array, goal: Array, *,

@@ -45,8 +45,8 @@ def continue_in_payload(problem: MotionProblem, solver: Solver) -> Attempt | Non
     """
     Start with little payload and let it grow, at a rising price of effort, up to the task's.
 
-    What can be carried does not depend on the weights, which come last. None where the times of via
-    points are free.
+    What can be carried does not depend on the weights, which come last. None where the times of
+    via points are free.
 
     """
     wanted = problem.task.payload_mass
