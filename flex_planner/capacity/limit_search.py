@@ -254,6 +254,8 @@ class LimitSearch:
 
     def _find_kinds(self, bare: MotionProblem) -> tuple[MotionProblem, list[KindOfMotion]]:
         """Note all kinds of motion; return those of the best way round to the goal."""
+        if bare.junctions.size:  # paths are looked for without via points
+            return bare, []
         unknown, solver = self._parameter.unknown, self._solver
         ways = other_windings(bare) if self._effort.explores else []
         self.starts = self._effort.starts + _OTHER_WAY * len(ways)

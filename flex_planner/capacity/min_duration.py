@@ -66,7 +66,8 @@ def find_min_duration(task: Task, *, model: ArmModel | None = None,
     Raises
     ------
     InvalidTaskError
-        If a motor has no limit, or if the arm need not come to rest at the goal.
+        If a motor has no limit, if the arm need not come to rest at the goal, or if there are via
+        points.
     InvalidValueError
         If the accuracy breaks its bound.
 
@@ -77,6 +78,9 @@ def find_min_duration(task: Task, *, model: ArmModel | None = None,
     if not np.isfinite([joint.motor.standstill_torque for joint in task.arm.joints]).all():
         raise InvalidTaskError('a motor of the arm has no stall torque, so no duration is the '
                                'shortest')
+    if task.via_points:
+        raise InvalidTaskError('via_points must be empty: the shortest duration is that of a '
+                               'motion without via points')
     if not task.ends_at_rest:
         raise InvalidTaskError('the shortest duration is that of a motion which ends at rest')
     if stays(task):

@@ -30,6 +30,7 @@ from flex_planner.ros.messages.plans import (
     report_from_plan,
     report_trajectory,
 )
+from flex_planner.ros.messages.via_points import fill_via_points
 from flex_planner.ros.planner.outcome import Outcome
 from flex_planner.ros.planner.recorder import OutcomeRecorder
 from flex_planner.ros.planner.request_state import RequestState
@@ -109,6 +110,7 @@ def task_message(request: Request) -> MotionTask:
     for name in OBJECTIVE_FIELDS if request.objectives else ():
         setattr(message, name, getattr(request.objectives, name).tolist())
     _fill_start(message, task)
+    fill_via_points(message, task)
     if task.goal_point.size:
         message.goal_point = _point(task.goal_point)
         message.space = (MotionTask.CARTESIAN if task.start_point.size

@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+import re
 from typing import Any
 
 from flex_planner.arms.arm import Arm
@@ -17,7 +18,7 @@ from flex_planner.base.errors import (
     SingularError,
     UnreachableError,
 )
-from flex_planner.base.sentences import say_reason
+from flex_planner.base.sentences import count_of, say_reason
 from flex_planner.base.validation import Array, number
 from flex_planner.capacity.results import MaxPayload
 from flex_planner.cli.controller_options import sampling_settings
@@ -28,6 +29,7 @@ from flex_planner.cli.options import (
     numbers,
     positions,
 )
+from flex_planner.cli.via_options import add_via_points, via_points
 from flex_planner.optimal_control.ends_at_points import ends_at_points
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.objectives import Objectives
@@ -88,7 +90,7 @@ class Request:
                 arm=arm, **_ends(options, arm), **_start(options, arm), duration=options.duration,
                 payload_mass=options.payload_mass, payload_inertia=options.payload_inertia,
                 tolerance=options.tolerance, allow_large_bending=options.allow_large_bending,
-                **_weights(options, arm))
+                via_points=via_points(options.via_points, arm), **_weights(options, arm))
             objectives = _objectives(options, task)
         return cls(task=task, elbow=options.elbow, time_limit=limit,
                    objectives=objectives, sampled=sampling_settings(options, arm))
@@ -102,7 +104,9 @@ class Request:
     def __str__(self) -> str:
         """Return the motion in words."""
         ends = ' to '.join(_say_end(self.task, name) for name in ('start', 'goal'))
-        return f'{ends} in {self.task.duration:g} s'
+        count = len(self.task.via_points)
+        via = f' by {count_of(count, "via point")}' if count else ''
+        return f'{ends}{via} in {self.task.duration:g} s'
 
 
 def say_failure(outcome: Plan | MaxPayload, time_limit: float) -> str:
@@ -126,6 +130,7 @@ def add_task(parser: argparse.ArgumentParser, payload: str) -> None:
         help='joint angles at the start, instead of a point')
     add('--to-angles', dest='goal_positions', metavar='DEG,DEG,...',
         help='joint angles at the goal')
+    add_via_points(parser)
     add('--start-velocities', metavar='V,V,...',
         help='velocities at the start, one per joint [rad/s] or one per coordinate, modes too '
         '[m/s] (default: zeros)')
@@ -172,17 +177,29 @@ def translate_errors() -> Iterator[None]:
         raise type(error)(_option(error.field), error.value, error.bound) from None
     except (UnreachableError, SingularError) as error:
         name, _, reason = str(error).partition(': ')
-        raise type(error)(f'{_POINTS.get(name, name)}: {reason}') from None
+        raise type(error)(f'{_POINTS.get(name, _via_option(name))}: {reason}') from None
 
 
 def _option(field: str) -> str:
     """Return the option that a field comes from."""
+    if field.startswith('via_points'):
+        return _via_option(field)
     name, bracket, index = field.partition('[')
     if name.startswith('--'):
         return field
     if name in _ANGLES:
         return f'{_ANGLES[name]}{bracket}{index} in radians'
     return _RENAMED.get(name, f'--{name.replace("_", "-")}') + bracket + index
+
+
+def _via_option(field: str) -> str:
+    """Return which of the options for via points a field comes from."""
+    found = re.fullmatch(r'via_points\[(\d+)\](?:\.(\w+))?(.*)', field)
+    if found is None:
+        return field.replace('via_points', '--via and --via-angles')
+    number, name, entry = int(found[1]) + 1, found[2] or '', found[3]
+    part = {'positions': f', angles{entry} in radians', 'time': ', its time'}.get(name, '')
+    return f'via point {number} of --via and --via-angles{part}'
 
 
 def _ends(options: argparse.Namespace, arm: Arm) -> dict[str, Any]:

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+import ctypes
 from typing import Any
 
 from flex_planner.base.validation import Array
-from flex_planner.collocation.core import Core, CoreSizes, load_core, pack_rule
+from flex_planner.collocation.core import (
+    Core,
+    CoreJunctions,
+    CoreSizes,
+    load_core,
+    pack_rule,
+)
 from flex_planner.collocation.gauss import GaussRule
+from flex_planner.collocation.junctions import JunctionRows, NO_JUNCTIONS
 from flex_planner.collocation.linear import (
     BAD_BOUNDARY_ROW,
     LinearSystem,
@@ -24,7 +32,8 @@ Linearisation = tuple[Array, Array, Array, Array, Array, Indices]
 
 
 def factorise_system(rule: GaussRule, steps: Array, jacobians: Array, left: Array, right: Array,
-                     scale: Array, explicit: Indices) -> LinearSystem:
+                     scale: Array, explicit: Indices,
+                     junctions: JunctionRows = NO_JUNCTIONS) -> LinearSystem:
     """
     Return the linearised collocation equations, factorised by the fastest means there are.
 
@@ -34,8 +43,9 @@ def factorise_system(rule: GaussRule, steps: Array, jacobians: Array, left: Arra
     core = load_core(CoreSizes(scale.size, left.shape[0], explicit.size, rule.stages,
                                int(jacobians.ndim == 4)))
     if core is None:
-        return NewtonSystem(rule, steps, jacobians, left, right, scale, explicit)
-    return CompiledSystem.factorise(core, rule, (steps, jacobians, left, right, scale, explicit))
+        return NewtonSystem(rule, steps, jacobians, left, right, scale, explicit, junctions)
+    return CompiledSystem.factorise(core, rule, (steps, jacobians, left, right, scale, explicit),
+                                    junctions)
 
 
 class CompiledSystem:
@@ -49,18 +59,22 @@ class CompiledSystem:
     rule : GaussRule
         The method.
     parts : tuple
-        The other arguments of `NewtonSystem`.
+        The other arguments of `NewtonSystem` but the last.
     factors : numpy.ndarray
         Memory in which core.c has factorised it.
+    junctions : JunctionRows
+        The last argument of `NewtonSystem`.
 
     """
 
-    def __init__(self, core: Core, rule: GaussRule, parts: Linearisation,
-                 factors: Array) -> None:
+    def __init__(self, core: Core, rule: GaussRule, parts: Linearisation, factors: Array,
+                 junctions: JunctionRows = NO_JUNCTIONS) -> None:
         self._core, self._rule, self._parts, self._factors = core, rule, parts, factors
+        self._junctions = junctions
 
     @classmethod
-    def factorise(cls, core: Core, rule: GaussRule, parts: Linearisation) -> CompiledSystem:
+    def factorise(cls, core: Core, rule: GaussRule, parts: Linearisation,
+                  junctions: JunctionRows = NO_JUNCTIONS) -> CompiledSystem:
         """
         Return the system, factorised.
 
@@ -74,17 +88,19 @@ class CompiledSystem:
         factors = core.allocate(numbers[0].size)
         arrays: list[Any] = [pack_rule(rule), *map(_contiguous, numbers),
                              *split_indices(numbers[-1].size, explicit)]
+        inner = CoreJunctions.of(junctions.intervals, junctions.rows)
         failure = core.factorise_system(factors.ctypes.data, numbers[0].size,
-                                        *(array.ctypes.data for array in arrays), None)
+                                        *(array.ctypes.data for array in arrays),
+                                        ctypes.byref(inner), None)
         if failure:
             raise SingularSystemError(FAILURES[failure])
-        return cls(core, rule, parts, factors)
+        return cls(core, rule, parts, factors, junctions)
 
     def with_rule(self, rule: GaussRule) -> LinearSystem:
         """Return the system of another rule on the same mesh, see `NewtonSystem.with_rule`."""
         steps, jacobians, left, right, scale, explicit = self._parts
         return factorise_system(rule, steps, resample_jacobians(jacobians, self._rule, rule),
-                                left, right, scale, explicit)
+                                left, right, scale, explicit, self._junctions)
 
     def correction(self, residual: Residual) -> tuple[Array, Array]:
         """Return the correction of nodes (N + 1, m) and stage derivatives (N, s, m)."""

@@ -18,6 +18,7 @@ from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
 from flex_planner.collocation.compiled_system import factorise_system
 from flex_planner.collocation.equations import CHUNK
+from flex_planner.collocation.junctions import evaluate_junctions
 from flex_planner.collocation.linear import Residual
 from flex_planner.collocation.problem import Indices, RATE_NOT_FINITE, SingularSystemError
 from flex_planner.collocation.solution import CollocationSolution
@@ -189,11 +190,12 @@ def _find_step(problem: BarrierProblem, at: BarrierOutcome, monitor: Monitor) ->
     (left, left_rows), (right, right_rows) = (
         problem.left(solution.nodes[0]), problem.right(solution.nodes[-1]))
     scale = np.maximum(np.abs(solution.nodes).max(axis=0), problem.scale(at.mu))
-    system = factorise_system(solution.rule, solution.steps,
-                              jacobians.reshape(count, stages, size, size), left_rows, right_rows,
-                              scale, problem.explicit)
     gaps = np.diff(solution.nodes, axis=0) - solution.steps[:, None] * (
         solution.rule.weights @ solution.stages)
+    junctions = evaluate_junctions(problem, solution, gaps)
+    system = factorise_system(solution.rule, solution.steps,
+                              jacobians.reshape(count, stages, size, size), left_rows, right_rows,
+                              scale, problem.explicit, junctions)
     nodes, rates = system.correction(Residual(
         solution.stages - rate.reshape(solution.stages.shape), gaps, left, right))
     norm = float(np.sqrt(np.mean((nodes / scale) ** 2)))

@@ -111,7 +111,7 @@ class ArmModel(ArmDynamics):
         Parameters
         ----------
         name : str
-            ``optimality``, ``free_payload`` or ``free_duration``.
+            ``optimality``, ``free_payload``, ``free_duration`` or ``free_times``.
         p : numpy.ndarray
             `Parameters.stack`.
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from flex_planner.base.errors import InvalidTaskError
 from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationResult, CollocationSolution
 from flex_planner.collocation.problem import CompiledRate
@@ -35,9 +36,16 @@ class FreeDurationProblem:
     price : float
         rho, > 0 [1/s].
 
+    Raises
+    ------
+    InvalidTaskError
+        If the motion has via points, whose times belong to a given duration.
+
     """
 
     def __init__(self, motion: MotionProblem, price: float) -> None:
+        if motion.junctions.size:
+            raise InvalidTaskError('the duration of a motion with via points must be given')
         self.motion, self._price = motion, price
         self.size = motion.size + 1
         self.scale = np.append(motion.scale, _SHORTEST * motion.task.duration)

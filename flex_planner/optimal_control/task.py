@@ -12,6 +12,7 @@ from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.validation import Array, number, vector
 from flex_planner.optimal_control.ends_at_points import ends_at_points, MAX_COORDINATE
 from flex_planner.optimal_control.path_constraints.path_constraint import PathConstraint
+from flex_planner.optimal_control.via_points import check_via_points, ViaPoint
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -67,6 +68,9 @@ class Task:
     time_weight : float
         Price of a second, >= 0 [1/s]: if not 0, the duration is free and this times t_f is
         added to eq. (6). The larger it is, the nearer the motion comes to minimum time.
+    via_points : sequence of ViaPoint
+        Joint angles or points of the tip that are passed on the way, in this order, without a
+        stop; not with `time_weight`.
     tolerance : float
         eps of eq. (17) with W_p = W_v = 1, 1e-15 to 1.
     allow_large_bending : bool
@@ -100,6 +104,7 @@ class Task:
     goal_position_weights: Array = field(default_factory=lambda: np.zeros(0))
     goal_velocity_weights: Array = field(default_factory=lambda: np.zeros(0))
     time_weight: float = 0.0
+    via_points: tuple[ViaPoint, ...] = ()
     tolerance: float = 1e-3
     allow_large_bending: bool = False
     path_constraints: tuple[PathConstraint, ...] = ()
@@ -114,8 +119,8 @@ class Task:
                 goal_velocities: ArrayLike = ..., start_modal_displacements: ArrayLike = ...,
                 start_point: ArrayLike = ..., goal_point: ArrayLike = ...,
                 goal_position_weights: ArrayLike = ..., goal_velocity_weights: ArrayLike = ...,
-                time_weight: float = ..., tolerance: float = ...,
-                allow_large_bending: bool = ...,
+                time_weight: float = ..., via_points: Sequence[ViaPoint] = ...,
+                tolerance: float = ..., allow_large_bending: bool = ...,
                 path_constraints: Sequence[PathConstraint] = ...) -> None:
             """Accept lists where arrays are kept."""
 
@@ -205,6 +210,7 @@ class Task:
             self._set(name, _goal_weights(name, getattr(self, name), n, n_t))
         self._set_bending()
         self._set_constraints()
+        self._set_via_points()
 
     @property
     def ends_at_rest(self) -> bool:
@@ -241,6 +247,15 @@ class Task:
                 raise InvalidValueError(name, one, 'a PathConstraint, such as KeepOut')
             one.check(name, self.arm)
         object.__setattr__(self, 'path_constraints', given)
+
+    def _set_via_points(self) -> None:
+        """Check the via points."""
+        points = check_via_points(self.arm, tuple(self.via_points), self.duration,
+                                  MAX_JOINT_ANGLE)
+        object.__setattr__(self, 'via_points', points)
+        if points and self.time_weight:
+            raise InvalidValueError('time_weight', self.time_weight, '0 where there are via '
+                                    'points: their times are those of a given duration')
 
     def _set(self, name: str, value: Array) -> None:
         object.__setattr__(self, name, value)

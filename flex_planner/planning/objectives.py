@@ -23,6 +23,7 @@ from flex_planner.base.validation import Array, number
 from flex_planner.collocation import CollocationSolution
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import MAX_TIME_WEIGHT, Task
+from flex_planner.optimal_control.via_points import free_times
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -95,7 +96,8 @@ class Objectives:
         InvalidSizeError
             If there are too few or too many.
         InvalidTaskError
-            If the duration is free: it would grow where weights are raised.
+            If the duration is free: it would grow where weights are raised; or if the time of a
+            via point is.
 
         """
         arm = task.arm
@@ -109,6 +111,9 @@ class Objectives:
         if task.time_weight:
             raise InvalidTaskError(f'time_weight is {task.time_weight:g}, but must be 0 where '
                                    'objectives are given')
+        if free_times(task.via_points):
+            raise InvalidTaskError('a via point has no time, but must have one where objectives '
+                                   'are given')
 
     def limits(self, objective: Objective, arm: Arm) -> Array:
         """Return the limits of all joints or modes, ``inf`` where there is none."""

@@ -38,6 +38,8 @@ from flex_planner.optimal_control.path_constraints import (
 )
 from flex_planner.optimal_control.task import Task
 from flex_planner.optimal_control.torque_limits import TorqueLimits
+from flex_planner.optimal_control.via_conditions import ViaConditions
+from flex_planner.optimal_control.via_points import ViaPoint
 from flex_planner.planning.certificate import Certificate
 from flex_planner.planning.constraint_margins import ConstraintMargin
 from flex_planner.planning.kinds.clusters import KindOfMotion
@@ -210,6 +212,11 @@ class Plan:
         return self.problem.model
 
     @property
+    def via_times(self) -> Array:
+        """Return when the via points of the task are passed, shape (K,) [s]."""
+        return self.problem.junctions
+
+    @property
     def mesh_intervals(self) -> int:
         """Return the intervals of the final mesh, 0 without a solution."""
         return self.solution.intervals if self.solution else 0
@@ -315,7 +322,7 @@ _SAVED = (Plan, PlanStatus, Certificate, Task, Arm, Link, BeamSection, Joint, El
           ObjectiveSearch, Objectives, Objective, WeightTrial, Margin, KindOfMotion,
           ExploredMotion, PlanWarning, WarningKind, TriedStrategy, ConstraintMargin,
           ConstrainedMotion, PathSlacks, JointRange, JointSpeed, KeepOut, Circle, Capsule,
-          HalfPlane, SelfClearance, BendingMoment, Deflection)
+          HalfPlane, SelfClearance, BendingMoment, Deflection, ViaPoint, ViaConditions)
 
 
 def plan_view(plan: Plan) -> list[tuple[str, str]]:

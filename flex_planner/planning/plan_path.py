@@ -14,7 +14,7 @@ from typing import Any
 from flex_planner.base.errors import HoldingError, InvalidTaskError
 from flex_planner.base.processes import helper_processes
 from flex_planner.base.progress import Monitor
-from flex_planner.base.validation import integer
+from flex_planner.base.validation import Array, integer
 from flex_planner.collocation import CollocationSolution, KnownSolution, Solver
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.constrained_motion import ConstrainedMotion
@@ -101,7 +101,8 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
     solver = (solver or Solver()).watched_by(monitor)
     parameters = task_parameters(task)
     try:
-        problem = MotionProblem(model, task, parameters)
+        problem = MotionProblem(model, task, parameters,
+                                via_times=_known_times(task, start_from))
     except HoldingError as error:
         refused = MotionProblem(model, task, parameters, holds=False)
         return _impossible(refused, prove_not_held(error, task.payload_mass))
@@ -138,6 +139,18 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
     if within is plan or objectives is None:
         return within
     return check_objectives(within, plan.objectives, objectives)
+
+
+def _known_times(task: Task,
+                 start: Plan | KindOfMotion | CollocationSolution | None) -> Array | None:
+    """Return the times at which a given plan passes the via points of a task, if it does."""
+    if not (isinstance(start, Plan) and start.via_times.size == len(task.via_points) > 0):
+        return None
+    times = start.via_times * (task.duration / start.task.duration)
+    given = [via.time for via in task.via_points]
+    known = np.array([time if wanted is None else wanted
+                      for time, wanted in zip(times.tolist(), given, strict=True)])
+    return known if (np.diff([0.0, *known, task.duration]) > 0).all() else None
 
 
 def plan_kind(task: Task, number: int, **options: Any) -> Plan:

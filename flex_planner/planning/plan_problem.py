@@ -10,6 +10,7 @@ from flex_planner.collocation import CollocationResult, Solver, SolverStatus
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import MAX_DURATION
 from flex_planner.optimal_control.totals import integrate_totals
+from flex_planner.optimal_control.via_points import free_times
 from flex_planner.planning.advice import suggest_changes
 from flex_planner.planning.certificate import CertificateLimits, certify
 from flex_planner.planning.kinds.cheaper import find_cheaper
@@ -21,6 +22,7 @@ from flex_planner.planning.strategies.initial_guesses import WARM_START
 from flex_planner.planning.strategies.price_continuation import free_duration
 from flex_planner.planning.strategies.strategy import Attempt, Strategy
 from flex_planner.planning.strategies.try_strategies import TriedStrategy, try_strategies
+from flex_planner.planning.strategies.via_times import choose_via_times, free_via_times
 from flex_planner.planning.verdict import judge
 from flex_planner.planning.warnings import find_arm_warnings
 
@@ -61,9 +63,10 @@ def plan_problem(problem: MotionProblem, solver: Solver,
         if problem.task.time_weight:
             problem, strategy, attempt = _solve_in_any_time(problem, solver, strategies, tried)
         else:
-            strategy, attempt = try_strategies(problem, solver, strategies, tried)
+            problem, strategy, attempt = _solve_with_via_points(problem, solver, strategies, tried)
         plan = _conclude(problem, strategy, attempt, solver)
         if (effort.explores and strategy != WARM_START and plan.solution is not None
+                and not problem.junctions.size  # kinds are looked for without via points
                 and plan.status not in STOP_STATUS.values()
                 and plan.cost > 0):  # nothing is cheaper than nothing
             plan = _look_for_cheaper(plan, attempt, solver, effort)
@@ -74,6 +77,20 @@ def plan_problem(problem: MotionProblem, solver: Solver,
     warnings = plan.warnings or find_arm_warnings(problem.task.arm)
     return replace(plan, warnings=warnings, iterations=solver.monitor.iteration,
                    tried=tuple(tried), planning_time=solver.monitor.elapsed)
+
+
+def _solve_with_via_points(
+        problem: MotionProblem, solver: Solver, strategies: Sequence[Strategy],
+        tried: list[TriedStrategy]) -> tuple[MotionProblem, str, Attempt]:
+    """Solve a task; free times of its via points are found once there is a motion."""
+    free = free_times(problem.task.via_points)
+    if free and not any(strategy.name == WARM_START for strategy in strategies):
+        problem = choose_via_times(problem, solver)
+    strategy, attempt = try_strategies(problem, solver, strategies, tried)
+    if free and attempt.result.converged:
+        problem, result = free_via_times(problem, attempt.result, solver)
+        attempt = replace(attempt, result=result)
+    return problem, strategy, attempt
 
 
 def _look_for_cheaper(plan: Plan, attempt: Attempt, solver: Solver,

@@ -251,8 +251,8 @@ def _unsolved(plan: Plan, problem: MotionProblem) -> Plan:
 
 
 def find_stiff_links(problem: MotionProblem, solver: Solver) -> StiffLinks | None:
-    """Return the stiff links and joints of a problem; None without any."""
-    if not problem.model.arm.n_passive:
+    """Return the stiff links and joints of a problem; None without any, or with via points."""
+    if not problem.model.arm.n_passive or problem.junctions.size:
         return None
     try:
         found = StiffLinks(problem, solver)

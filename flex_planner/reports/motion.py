@@ -8,6 +8,7 @@ import sys
 from flex_planner.arms.spatial_joint import slides
 from flex_planner.base.text import printable
 from flex_planner.capacity.results import MaxPayload
+from flex_planner.optimal_control.via_points import say_via_points
 from flex_planner.planning.certificate import Certificate
 from flex_planner.planning.kinds.clusters import KindOfMotion
 from flex_planner.planning.plan import Peaks, Plan
@@ -66,7 +67,14 @@ def certificate_rows(certificate: Certificate) -> list[Row]:
         ('  boundary error', f'{certificate.boundary_error:.1e}'),
         ('  Hamiltonian drift', f'{certificate.hamiltonian_drift:.1e}'),
         ('  re-simulated tip error', f'{certificate.tip_error * 1e3:.1e} mm'),
-        ('  residual vibration', f'{certificate.residual_vibration * 1e3:.1e} mm')]
+        ('  residual vibration', f'{certificate.residual_vibration * 1e3:.1e} mm'),
+        *via_rows(certificate)]
+
+
+def via_rows(certificate: Certificate) -> list[Row]:
+    """Return by how much via points are missed; empty without any, and of older reports."""
+    error = getattr(certificate, 'via_error', 0.0)
+    return [('  via points missed by', f'{error * 1e3:.1e} mm')] if error else []
 
 
 def plan_rows(plan: Plan) -> list[Row]:
@@ -100,6 +108,8 @@ def motion_rows(plan: Plan, peaks: Peaks) -> list[Row]:
             peaks.speeds, peaks.speed_shares, peaks.torques, peaks.torque_shares,
             map(slides, plan.arm.joints)))),
         ('motors on their limit', _saturation(plan)),
+        *(('passes', sentence) for sentence in say_via_points(plan.task.via_points,
+                                                              plan.via_times)),
         *certificate_rows(plan.certificate)]
 
 

@@ -162,8 +162,8 @@ def direct_collocation(problem: MotionProblem, solver: Solver) -> Attempt | None
     arm starts from the rigid motion that is bent by its forces, if there is one.
 
     """
-    if np.isfinite(problem.goal_weights).any():
-        return None  # the transcription knows hard goals only
+    if np.isfinite(problem.goal_weights).any() or problem.junctions.size:
+        return None  # the transcription knows hard goals only, and no via points
     intervals = min(max(_DIRECT_INTERVALS, problem.fewest_intervals(_DIRECT_STAGES)),
                     solver.settings.max_intervals)
     direct = DirectProblem(problem.model, DirectSettings(

@@ -11,11 +11,13 @@ from flex_planner.reports.recording.findings import CheckLimits, Finding
 import numpy as np
 
 _TINY = float(np.finfo(float).tiny)
+# points are at whole nanoseconds
+_SAME_TIME = 1e-9
 
 
 def optimality_findings(model: ArmModel, motion: RecordedMotion, parameters: Parameters,
                         limits: CheckLimits, delay: float, settled: float,
-                        interpolation_error: float) -> list[Finding]:
+                        interpolation_error: float, via_times: Array) -> list[Finding]:
     """
     Return the violation of the torque bounds, and the errors of efforts and Hamiltonian.
 
@@ -36,6 +38,8 @@ def optimality_findings(model: ArmModel, motion: RecordedMotion, parameters: Par
         arm [s].
     interpolation_error : float
         Of the efforts, as the report has it [N m].
+    via_times : numpy.ndarray
+        At which H may jump, as via points are passed then [s].
 
     """
     # the samples that hold the arm are not of the extremal
@@ -61,7 +65,13 @@ def optimality_findings(model: ArmModel, motion: RecordedMotion, parameters: Par
         Finding(name='torques against the costates', unit='N m', limit=size,
                 value=float(np.abs(expected - efforts).max())),
         Finding(name='Hamiltonian drift', unit='', limit=limits.hamiltonian_drift,
-                value=float(np.ptp(controls.hamiltonian)) / scale)]
+                value=_spread(controls.hamiltonian, motion.times[moving], via_times) / scale)]
+
+
+def _spread(values: Array, times: Array, jumps: Array) -> float:
+    """Return the largest spread of values between times at which they may jump."""
+    phases = np.searchsorted(jumps, times + _SAME_TIME, side='right')
+    return max(float(np.ptp(values[phases == k])) for k in np.unique(phases))
 
 
 def _shifted(model: ArmModel, motion: RecordedMotion, parameters: Parameters,

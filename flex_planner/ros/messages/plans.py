@@ -40,6 +40,7 @@ from flex_planner.ros.messages.classes import (
 )
 from flex_planner.ros.messages.measured_starts import ArmStateError
 from flex_planner.ros.messages.spaces import SPACES
+from flex_planner.ros.messages.via_points import via_points_from_message
 from flex_planner.ros.settings.planner import PlannerSettings
 import numpy as np
 
@@ -100,6 +101,7 @@ def task_from_message(message: MotionTask, arm: Arm, settings: PlannerSettings) 
         effort_weights=np.asarray(message.effort_weights or settings.effort_weights),
         position_weights=np.asarray(message.position_weights),
         velocity_weights=np.asarray(message.velocity_weights),
+        via_points=via_points_from_message(message, arm),
         tolerance=tolerance or settings.tolerance,
         allow_large_bending=message.allow_large_bending)
 
@@ -157,7 +159,7 @@ def failure_report(code: int, sentence: str) -> PlanReport:
     report = PlanReport(error_code=code, error_msg=printable(sentence))
     for name in ('cost', 'effort', 'energy', 'collocation_residual', 'boundary_error',
                  'hamiltonian_drift', 'tip_error', 'residual_vibration', 'state_error',
-                 'costate_error', 'torque_interpolation_error', *EXECUTION_FIELDS,
+                 'costate_error', 'via_error', 'torque_interpolation_error', *EXECUTION_FIELDS,
                  *ROBUSTNESS_FIELDS):
         setattr(report, name, float('inf'))
     return report
@@ -174,6 +176,7 @@ def report_from_plan(plan: Plan) -> PlanReport:
     for name in plan.certificate.__slots__:
         setattr(report, name, float(getattr(plan.certificate, name)))
     report.switching_times = plan.switching_times.tolist()
+    report.via_times = plan.via_times.tolist()
     report.saturation = plan.saturation.tolist()
     add_warnings(report, plan.warnings)
     report.velocity_weights = plan.task.velocity_weights.tolist()
