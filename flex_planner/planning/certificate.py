@@ -133,8 +133,10 @@ def hamiltonian_drift(problem: MotionProblem, solution: CollocationSolution) -> 
     """Return the spread of H over the motion relative to the size of its terms."""
     times = np.linspace(0, problem.task.duration, 4 * solution.intervals + 1, dtype=np.float64)
     z = solution(times)
-    controls = problem.model.controls(z, problem.p)
+    controls = problem.controls(times, z)
     half = z.shape[1] // 2
     powers = np.abs(z[:, half:] * problem.rate(times, z)[:, :half]).max(axis=1)
     size = max(float(np.max(controls.cost_rate)), float(np.max(powers)), np.finfo(float).tiny)
-    return float(np.ptp(controls.hamiltonian)) / size
+    rates = problem.hamiltonian_rate(times, z)
+    due = np.append(0.0, np.cumsum((rates[1:] + rates[:-1]) / 2 * np.diff(times)))
+    return float(np.ptp(controls.hamiltonian - due)) / size

@@ -14,12 +14,14 @@ from flex_planner.base.html_view import html_view
 from flex_planner.base.validation import Array
 from flex_planner.base.value_files import load_value, save_value
 from flex_planner.collocation import CollocationSolution, GaussRule
+from flex_planner.control.joint_controller import EffortHold, Gains, JointController
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.boundary_conditions import BoundaryConditions
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.optimal_control.task import Task
 from flex_planner.optimal_control.torque_limits import TorqueLimits
+from flex_planner.optimal_control.torque_offset import OffsetProblem, TorqueOffset
 from flex_planner.planning.certificate import Certificate
 from flex_planner.planning.kinds.clusters import KindOfMotion
 from flex_planner.planning.kinds.explorer import ExploredMotion
@@ -30,6 +32,7 @@ from flex_planner.planning.objectives import (
     ObjectiveSearch,
     WeightTrial,
 )
+from flex_planner.planning.robust.objective import Robustness, RobustSearch, RobustTrial
 from flex_planner.planning.strategies.try_strategies import TriedStrategy
 from flex_planner.planning.warnings import PlanWarning, WarningKind
 import numpy as np
@@ -252,7 +255,7 @@ class Plan:
         times = self._within(times)
         arm, z = self.arm, self.solution(times)
         n_t = arm.n_coordinates
-        control = self.model.controls(z, self.problem.p)
+        control = self.problem.controls(times, z)
         lower, upper = TorqueLimits.of(arm).bounds(z[:, n_t:n_t + arm.n_joints])
         return Samples(
             times=times, coordinates=z[:, :n_t], rates=z[:, n_t:2 * n_t],
@@ -285,7 +288,8 @@ class Plan:
 _SAVED = (Plan, PlanStatus, Certificate, Task, Arm, Link, BeamSection, Joint, Elasticity, Motor,
           Node, ArmModel, MotionProblem, BoundaryConditions, Parameters, CollocationSolution,
           GaussRule, ObjectiveSearch, Objectives, Objective, WeightTrial, Margin, KindOfMotion,
-          ExploredMotion, PlanWarning, WarningKind, TriedStrategy)
+          ExploredMotion, PlanWarning, WarningKind, TriedStrategy, OffsetProblem, TorqueOffset,
+          Robustness, RobustSearch, RobustTrial, JointController, Gains, EffortHold)
 
 
 def plan_view(plan: Plan) -> list[tuple[str, str]]:

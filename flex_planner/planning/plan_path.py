@@ -32,6 +32,7 @@ from flex_planner.planning.proofs import (
     Proof,
     prove_not_held,
 )
+from flex_planner.planning.robust.make_robust import make_robust
 from flex_planner.planning.stiff_links import find_stiff_links
 from flex_planner.planning.strategies.catalogue import CATALOGUE
 from flex_planner.planning.strategies.initial_guesses import restart, warm_start
@@ -114,7 +115,7 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
         return _not_found(problem, doubt)
     plan = _plan_as_rigid(problem, solver, start_from, objectives, strategies, effort)
     if plan is not None:
-        return plan
+        return _forgive(plan, objectives, solver)
     plan = plan_problem(problem, solver, (*_given(start_from, problem, solver), *strategies),
                         effort)
     if plan.status in (PlanStatus.NOT_FOUND, PlanStatus.NOT_CONVERGED):
@@ -124,7 +125,14 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
     # weights that meet an objective may well bring a motion back within its limits
     if objectives is None or not plan.certified:
         return plan
-    return adapt_weights(plan, objectives, solver)
+    return _forgive(adapt_weights(plan, objectives, solver), objectives, solver)
+
+
+def _forgive(plan: Plan, objectives: Objectives | None, solver: Solver) -> Plan:
+    """Return the plan that forgives errors of the model, if that is asked and it can be made."""
+    if objectives is None or objectives.robustness is None or not plan.certified:
+        return plan
+    return make_robust(plan, objectives, solver)
 
 
 def plan_kind(task: Task, number: int, **options: Any) -> Plan:
@@ -178,6 +186,8 @@ def _plan_as_rigid(problem: MotionProblem, solver: Solver,
     solution = start.solution if isinstance(start, Plan) else start
     if isinstance(solution, CollocationSolution):
         solution = stiff.restrict(solution)
+    if objectives is not None:  # rigid links leave nothing to forgive
+        objectives = replace(objectives, robustness=None)
     plan = plan_path(stiff.task(), solver=solver, start_from=solution, objectives=objectives,
                      strategies=strategies, search=effort)
     return stiff.lift(plan, solver)
