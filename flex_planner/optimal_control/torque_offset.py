@@ -13,7 +13,6 @@ from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.optimal_control.task import Task
 import numpy as np
 
-
 DEGREE = 5
 
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import link_deflections
-from flex_planner.base.errors import NoEquilibriumError
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
 from flex_planner.control.joint_controller import JointController
@@ -37,6 +36,55 @@ def tabulate_reference(plan: Plan, controller: JointController) -> JointReferenc
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Ringing:
+    """
+    How an arm rings about its goal under its controller, by equations linearised there.
+
+    Attributes
+    ----------
+    rest : numpy.ndarray, shape (2 n_t,)
+        The state that the controller leads it to.
+    deflections : numpy.ndarray, shape (k instants, 2 n_t)
+        From a state less `rest` to the deflections of k points of the links in the second after
+        it; those of one point follow one another.
+    instants : int
+        How many there are: updates of the controller.
+
+    """
+
+    rest: Array
+    deflections: Array
+    instants: int
+
+    @classmethod
+    def of(cls, execution: Execution, goal: Array, hold: Array) -> Ringing:
+        """
+        Return the ringing of an arm at joint angles (n,) under torques (n,) that should hold it.
+
+        Raises
+        ------
+        NoEquilibriumError
+            If the arm buckles there.
+
+        """
+        rest, period = _rest_and_period(execution, goal, hold)
+        rows, power = _deflections(execution.dynamics.arm)[:, None], period
+        count = int(np.ceil(WATCHED / execution.controller.period - 1e-6)) + 1
+        while rows.shape[1] < count:  # twice as many instants each time
+            rows = np.concatenate([rows, rows @ power], axis=1)
+            power = power @ power
+        rows = rows[:, :count]
+        return cls(rest=rest, deflections=rows.reshape(-1, rest.size), instants=count)
+
+    def residual(self, away: Array) -> float:
+        """Return the largest peak-to-peak deflection from a state less the rest (2 n_t,) [m]."""
+        if not np.isfinite(away).all():
+            return np.inf
+        deflections = (self.deflections @ away).reshape(-1, self.instants)
+        return float(np.nan_to_num(np.ptp(deflections, axis=1), nan=np.inf).max())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Arrival:
     """
     An arm on its way and after it.
@@ -45,81 +93,50 @@ class Arrival:
     ----------
     execution : Execution
         By that arm.
+    ringing : Ringing
+        Of it.
     times, states : numpy.ndarray, shape (m + 1,) and (m + 1, 2 n_t)
         Updates of the controller up to the first at or after the arrival [s].
-    ringing : numpy.ndarray, shape (r, 2 n_t)
-        From the state on arrival less `rest` to deflections of links at instants of the second
-        after it; deflections of one point follow one another.
-    rest : numpy.ndarray, shape (2 n_t,)
-        Where the controller leads the arm to.
-    instants : int
-        How many there are.
 
     """
 
     execution: Execution
+    ringing: Ringing
     times: Array
     states: Array
-    ringing: Array
-    rest: Array
-    instants: int
+
+    @classmethod
+    def of(cls, execution: Execution, ringing: Ringing, reference: JointReference,
+           monitor: Monitor | None = None) -> Arrival:
+        """
+        Return how an arm arrives that follows a trajectory.
+
+        Raises
+        ------
+        StoppedError
+            If the monitor stopped it.
+
+        """
+        motion = execution.arm.follow(reference, execution.start, execution.duration, monitor)
+        return cls(execution=execution, ringing=ringing, times=motion.times,
+                   states=motion.states)
+
+    @property
+    def away(self) -> Array:
+        """Return the state on arrival less the rest, shape (2 n_t,)."""
+        away: Array = self.states[-1] - self.ringing.rest
+        return away
 
     @property
     def residual(self) -> float:
-        """Return the peak-to-peak deflection where it is largest [m]."""
-        return self.residual_of(self.states[-1] - self.rest)
-
-    def residual_of(self, away: Array) -> float:
-        """Return the same of an arm that arrives so far from its rest (2 n_t,) [m]."""
-        if not np.isfinite(away).all():
-            return np.inf
-        deflections = (self.ringing @ away).reshape(-1, self.instants)
-        return float(np.nan_to_num(np.ptp(deflections, axis=1), nan=np.inf).max())
+        """Return the peak-to-peak deflection in the second after it, where it is largest [m]."""
+        return self.ringing.residual(self.away)
 
 
-def arrive(execution: Execution, reference: JointReference,
-           monitor: Monitor | None = None) -> Arrival:
-    """
-    Return how an arm arrives; after that, equations linearised at its rest say how it rings.
-
-    Parameters
-    ----------
-    execution : Execution
-        By the arm.
-    reference : JointReference
-        The trajectory.
-    monitor : Monitor, optional
-        May stop it.
-
-    Raises
-    ------
-    StoppedError
-        If the monitor stopped it.
-    NoEquilibriumError
-        If the arm buckles where it should arrive.
-
-    """
-    motion = execution.arm.follow(reference, execution.start, execution.duration, monitor)
-    rest, period = _rest_and_period(execution, reference)
-    ringing, instants = _ringing(execution, period)
-    return Arrival(execution=execution, times=motion.times, states=motion.states,
-                   ringing=ringing, rest=rest, instants=instants)
-
-
-def residual_bending(execution: Execution, reference: JointReference,
-                     monitor: Monitor | None = None) -> float:
-    """Return the residual of `arrive`; infinite for an arm that buckles [m]."""
-    try:
-        return arrive(execution, reference, monitor).residual
-    except NoEquilibriumError:
-        return np.inf
-
-
-def _rest_and_period(execution: Execution, reference: JointReference) -> tuple[Array, Array]:
+def _rest_and_period(execution: Execution, goal: Array, hold: Array) -> tuple[Array, Array]:
     """Return where an arm comes to rest under its controller, and what a period makes of it."""
     dynamics, gains = execution.dynamics, execution.controller.gains
     n, n_t = dynamics.arm.n_joints, dynamics.arm.n_coordinates
-    goal, hold = reference.positions[-1], reference.torques[-1]
     rest, _ = equilibrium(dynamics, goal, execution.parameters)
     state, physical = np.concatenate([rest, np.zeros(n_t)]), execution.parameters.physical
     A, B = (part[0] for part in linearise_dynamics(dynamics, state[None], hold[None], physical))
@@ -129,18 +146,6 @@ def _rest_and_period(execution: Execution, reference: JointReference) -> tuple[A
     state = state - np.linalg.lstsq(A - B @ feedback, rate, rcond=None)[0]
     free, forced = hold_inputs(A, B, execution.controller.period)
     return state, free - forced @ feedback
-
-
-def _ringing(execution: Execution, period: Array) -> tuple[Array, int]:
-    """Return deflections after each period of a second, by the state on arrival."""
-    shown = _deflections(execution.dynamics.arm)
-    count = int(np.ceil(WATCHED / execution.controller.period - 1e-6)) + 1
-    rows, power = shown[:, None], period
-    while rows.shape[1] < count:  # twice as many instants each time
-        rows = np.concatenate([rows, rows @ power], axis=1)
-        power = power @ power
-    rows = rows[:, :count]
-    return rows.reshape(-1, period.shape[0]), count
 
 
 def _deflections(arm: Arm) -> Array:

@@ -78,7 +78,7 @@ def weighed_errors(robustness: Robustness, nominal: Execution, *, finely: bool =
     drift = _slow_frequency(nominal) * nominal.duration * robustness.stiffness_error / 2
     levels = min(int(np.ceil(drift / (_LOOKED_AT if finely else _WEIGHED))), _MOST_LEVELS)
     shares = np.arange(-levels, levels + 1) / max(levels, 1)
-    if not finely and levels:
+    if levels:
         shares = shares[shares != 0]
     payloads = np.unique([-payload, payload])
     return np.array([(robustness.stiffness_error * share, error)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from flex_planner.base.errors import InvalidTaskError, InvalidValueError
 from flex_planner.base.validation import Array, number
 from flex_planner.control.joint_controller import JointController
 from flex_planner.optimal_control.task import Task
-import numpy as np
 
 # larger errors than half of a value are no errors of a model any more
 MAX_ERROR = 0.5
@@ -111,15 +110,13 @@ class RobustSearch:
     weight : float
         Of the motion; 0 where the plain one forgives enough [1/J].
     plain_cost, plain_residual : float
-        J of eq. (6) of the motion with weight 0, and its `residual` [m].
+        J of eq. (6) of the motion with weight 0, and the largest residual of the arms that are
+        weighed, see `weighed_errors` [m].
     errors : numpy.ndarray, shape (k, 2)
         Errors of stiffness and payload of the arms that were simulated, as shares.
     residuals : numpy.ndarray, shape (k,)
         Their residual bending: peak to peak, where it is largest, in the second after the arrival;
         ``inf`` if they run away [m].
-    more_modes : numpy.ndarray, shape (k,)
-        The same with two more modes for every link that has any, at most 8; NaN where that was
-        not simulated [m].
     reason : str
         Why it is not met; empty if it is.
     trials : tuple of RobustTrial
@@ -134,7 +131,6 @@ class RobustSearch:
     plain_residual: float
     errors: Array
     residuals: Array
-    more_modes: Array = field(default_factory=lambda: np.zeros(0))
     reason: str = ''
     trials: tuple[RobustTrial, ...] = ()
 

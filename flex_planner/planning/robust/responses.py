@@ -71,7 +71,7 @@ class Responses:
         paths = [_Path.nominal(plan, times, states, torques),
                  *(_Path.of(arrival, times, states, torques) for arrival in arrivals)]
         roots = np.stack([_energy_root(arrival) for arrival in arrivals])
-        misses = [root @ (arrival.states[-1] - arrival.rest)
+        misses = [root @ arrival.away
                   for root, arrival in zip(roots, arrivals, strict=True)]
         nominal, differing = _respond(paths, roots, step)
         return cls(times=times, step=step, free=free, nominal=nominal, differing=differing,
@@ -165,7 +165,7 @@ def _energy_root(arrival: Arrival) -> Array:
     execution = arrival.execution
     dynamics, physical = execution.dynamics, execution.parameters.physical
     n, n_t = dynamics.arm.n_joints, dynamics.arm.n_coordinates
-    rest = arrival.rest[:n_t]
+    rest = arrival.ringing.rest[:n_t]
     stiffness = dynamics.static_forces(rest[None], physical)[1][0].copy()
     stiffness[:n, :n] += np.diag(execution.controller.gains.stiffness)
     mass = dynamics.mass_and_energy(np.concatenate([rest, np.zeros(n_t)])[None], physical)[0][0]
