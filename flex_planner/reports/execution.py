@@ -8,7 +8,8 @@ from flex_planner.planning.execution import (
     ExecutionCertificate,
     RobustnessReport,
 )
-from flex_planner.planning.robustness import DIFFERENCE, MORE_MODES
+from flex_planner.planning.robust.differing_arms import MORE_MODES
+from flex_planner.planning.robustness import DIFFERENCE
 from flex_planner.reports.motion import Row
 import numpy as np
 

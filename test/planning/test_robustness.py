@@ -15,11 +15,8 @@ from flex_planner.optimal_control.task import Task
 from flex_planner.planning.execution import RobustnessReport
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_path
-from flex_planner.planning.robustness import (
-    assess_robustness,
-    robustness_warnings,
-    with_more_modes,
-)
+from flex_planner.planning.robust.differing_arms import with_more_modes
+from flex_planner.planning.robustness import assess_robustness, robustness_warnings
 from flex_planner.planning.sampling import (
     judge_execution,
     sample_plan,

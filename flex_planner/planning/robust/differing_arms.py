@@ -1,4 +1,4 @@
-"""Arms that differ from the one that a motion is planned for: how stiff they are, what they carry."""
+"""Arms that differ from the one that a motion is planned for, in stiffness and in payload."""
 
 from __future__ import annotations
 

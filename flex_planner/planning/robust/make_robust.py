@@ -2,8 +2,8 @@
 Plans that forgive errors of the model: the weight of the arms' energy is raised until they do.
 
 Every trial linearises the arms about the last plan, chooses the weight whose predicted residual
-is just small enough, and solves the boundary-value problem with its offset from that plan. Then the
-arms carry the new plan out: what counts is what they do.
+is just small enough, and solves the boundary-value problem with its offset from that plan. Then
+the arms carry the new plan out: what counts is what they do.
 
 """
 
@@ -66,7 +66,8 @@ def make_robust(plan: Plan, objectives: Objectives, solver: Solver) -> Plan:
                     strategy=plan.strategy, problem=plan.problem, solution=None,
                     iterations=solver.monitor.iteration, planning_time=solver.monitor.elapsed)
     before = plan.objectives or ObjectiveSearch(objectives=objectives, met=True)
-    found = replace(found, objectives=replace(before, robust=report, met=before.met and report.met),
+    outcome = replace(before, robust=report, met=before.met and report.met)
+    found = replace(found, objectives=outcome,
                     kinds=plan.kinds, starts=plan.starts, warnings=found.warnings or plan.warnings,
                     planning_time=solver.monitor.elapsed)
     reasons = [*([] if report.met else [report.reason]), *_broken(found, objectives)]
@@ -177,8 +178,8 @@ class _Search:
                       or step.predict_effort(middle, torques) > growth)
             low, high = (low, middle) if enough else (middle, high)
         allowed = [one for one in tried if step.predict_effort(one, torques) <= growth]
-        enough = [one for one in allowed if tried[one] <= _AIM * self._limit]
-        return min(enough) if enough else min(allowed or tried, key=lambda one: tried[one])
+        adequate = [one for one in allowed if tried[one] <= _AIM * self._limit]
+        return min(adequate) if adequate else min(allowed or tried, key=lambda one: tried[one])
 
     def _predict(self, step: OffsetStep, weight: float) -> float:
         """Return the residual that a weight should lead to [m]."""

@@ -8,8 +8,8 @@ their states and N of that of the plan, linear in a change v of the torque, its 
 
 with e what they miss. As the plan is an extremal of effort from an offset w, ``R u = R w - N^T l``
 of its own, the torque is ``-R^-1 (G^T m + N^T l')`` away from what the costates of the plan ask
-for: an offset that leaves these as they are. The plan that it leads to is an extremal again, within
-the limits of the motors, whatever was linearised.
+for: an offset that leaves these as they are. The plan that it leads to is an extremal again,
+within the limits of the motors, whatever was linearised.
 
 """
 

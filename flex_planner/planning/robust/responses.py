@@ -66,7 +66,7 @@ class Responses:
         """Return the responses of arms (S,) that carry a plan out, none of which runs away."""
         count = _count_steps(plan)
         step = plan.task.duration / count
-        times = (np.arange(count) + 0.5) * step
+        times: Array = (np.arange(count, dtype=np.float64) + 0.5) * step
         states, torques, free = _sample(plan, times)
         paths = [_Path.nominal(plan, times, states, torques),
                  *(_Path.of(arrival, times, states, torques) for arrival in arrivals)]

@@ -1,4 +1,4 @@
-"""A plan in whose cost the energy of differing arms has a weight, and the step to another weight."""
+"""A plan in whose cost the energy of differing arms has a weight, and the step to another."""
 
 from __future__ import annotations
 
