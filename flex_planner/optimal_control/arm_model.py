@@ -8,7 +8,7 @@ conditions z = (q, q', psi_1, psi_2).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -52,6 +52,14 @@ class Controls:
     hamiltonian: Array
     payload_share: Array
     acceleration: Array
+
+    @classmethod
+    def of(cls, values: Sequence[Array]) -> Controls:
+        """Return what a compiled function found."""
+        torque, free, cost, hamiltonian, share, acceleration = values
+        return cls(torque=torque, free_torque=free, cost_rate=cost[:, 0],
+                   hamiltonian=hamiltonian[:, 0], payload_share=share[:, 0],
+                   acceleration=acceleration)
 
 
 class ArmModel(ArmDynamics):
@@ -125,11 +133,7 @@ class ArmModel(ArmDynamics):
 
     def controls(self, z: Array, p: Array) -> Controls:
         """Return torque, cost and Hamiltonian at points, see `Controls`."""
-        torque, free, cost, hamiltonian, share, acceleration = self._load_optimality(
-            'control')(z, p)
-        return Controls(torque=torque, free_torque=free, cost_rate=cost[:, 0],
-                        hamiltonian=hamiltonian[:, 0], payload_share=share[:, 0],
-                        acceleration=acceleration)
+        return Controls.of(self._load_optimality('control')(z, p))
 
     def barrier(self, name: str) -> BatchFunction:
         """Return a function of `build_barrier_functions`; they are derived when first wanted."""
@@ -138,6 +142,15 @@ class ArmModel(ArmDynamics):
             self._loaded |= load_functions(
                 content_key(key, 'barrier', 'caps' if has_caps(self.arm) else ''),
                 self._build_barrier)
+        return self._loaded[name]
+
+    def offset_function(self, name: str) -> BatchFunction:
+        """Return a function of `build_offset_functions`; they are derived when first wanted."""
+        if name not in self._loaded:
+            key = cache_key(self.arm, 'dynamics', 'optimal_control')
+            self._loaded |= load_functions(
+                content_key(key, 'offset', 'caps' if has_caps(self.arm) else ''),
+                self._build_offset)
         return self._loaded[name]
 
     def payload_sensitivity(self, z: Array, p: Array) -> tuple[Array, Array, Array]:
@@ -158,6 +171,12 @@ class ArmModel(ArmDynamics):
         from flex_planner.optimal_control.barrier_conditions import build_barrier_functions
 
         return build_barrier_functions(self.arm)
+
+    def _build_offset(self) -> Mapping[str, tuple[Any, int]]:
+        """Derive the functions of effort from an offset; CasADi is imported only here."""
+        from flex_planner.optimal_control.offset_conditions import build_offset_functions
+
+        return build_offset_functions(self.arm)
 
     def _build_optimality(self) -> Mapping[str, tuple[Any, int]]:
         """Derive the functions; CasADi is imported only here."""

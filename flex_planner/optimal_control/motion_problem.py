@@ -9,7 +9,7 @@ from flex_planner.collocation import CollocationSolution, GaussRule
 from flex_planner.collocation.junctions import double_nodes
 from flex_planner.collocation.problem import CompiledRate
 from flex_planner.dynamics.statics import check_inertia, natural_modes
-from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.arm_model import ArmModel, Controls
 from flex_planner.optimal_control.boundary_conditions import BoundaryConditions
 from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.optimal_control.task import Task
@@ -106,9 +106,17 @@ class MotionProblem:
         """Return both as machine code, None without a compiler."""
         return self.model.compiled_rate('optimality', self.p)
 
+    def controls(self, t: Array, z: Array) -> Controls:
+        """Return torque, cost and Hamiltonian at times (k,) and points (k, 4 n_t)."""
+        return self.model.controls(z, self.p)
+
+    def hamiltonian_rate(self, t: Array, z: Array) -> Array:
+        """Return dH/dt of an extremal at times (k,) and points (k, 4 n_t), shape (k,): zero."""
+        return np.zeros(len(t))
+
     def switches(self, t: Array, z: Array, p: Array | None = None) -> Array:
         """Return the distances of the unbounded torque from its bounds, 2 n columns or more."""
-        free = self.model.controls(z, self.p if p is None else p).free_torque
+        free = (self.controls(t, z) if p is None else self.model.controls(z, p)).free_torque
         n_t, n = self.model.arm.n_coordinates, self.model.arm.n_joints
         return np.hstack(self.parameters.torque_limits.distances(free, z[:, n_t:n_t + n]))
 

@@ -165,11 +165,17 @@ def hamiltonian_drift(problem: MotionProblem, solution: CollocationSolution) -> 
     """Return the spread of H over the motion relative to the size of its terms."""
     times = np.linspace(0, problem.task.duration, 4 * solution.intervals + 1, dtype=np.float64)
     z = solution(times)
-    controls = problem.model.controls(z, problem.p)
+    controls = problem.controls(times, z)
     half = z.shape[1] // 2
     powers = np.abs(z[:, half:] * problem.rate(times, z)[:, :half]).max(axis=1)
     size = max(float(np.max(controls.cost_rate)), float(np.max(powers)), np.finfo(float).tiny)
-    constant = controls.hamiltonian + problem.barrier_rate(z)
+    constant = controls.hamiltonian + problem.barrier_rate(z) - _due_change(problem, times, z)
     phases = np.searchsorted(problem.junctions[problem.via.given], times, side='right')
     spread = max(float(np.ptp(constant[phases == k])) for k in np.unique(phases))
     return spread / size
+
+
+def _due_change(problem: MotionProblem, times: Array, z: Array) -> Array:
+    """Return how much H changes by the conditions themselves."""
+    rates = problem.hamiltonian_rate(times, z)
+    return np.append(0.0, np.cumsum((rates[1:] + rates[:-1]) / 2 * np.diff(times)))

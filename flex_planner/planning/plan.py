@@ -19,6 +19,7 @@ from flex_planner.base.html_view import html_view
 from flex_planner.base.validation import Array
 from flex_planner.base.value_files import load_value, save_value
 from flex_planner.collocation import CollocationSolution, GaussRule
+from flex_planner.control.joint_controller import EffortHold, Gains, JointController
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.boundary_conditions import BoundaryConditions
 from flex_planner.optimal_control.constrained_motion import ConstrainedMotion
@@ -38,6 +39,7 @@ from flex_planner.optimal_control.path_constraints import (
 )
 from flex_planner.optimal_control.task import Task
 from flex_planner.optimal_control.torque_limits import TorqueLimits
+from flex_planner.optimal_control.torque_offset import OffsetProblem, TorqueOffset
 from flex_planner.optimal_control.via_conditions import ViaConditions
 from flex_planner.optimal_control.via_points import ViaPoint
 from flex_planner.planning.certificate import Certificate
@@ -51,6 +53,7 @@ from flex_planner.planning.objectives import (
     ObjectiveSearch,
     WeightTrial,
 )
+from flex_planner.planning.robust.objective import Robustness, RobustSearch, RobustTrial
 from flex_planner.planning.strategies.try_strategies import TriedStrategy
 from flex_planner.planning.warnings import PlanWarning, WarningKind
 import numpy as np
@@ -286,7 +289,7 @@ class Plan:
         times = self._within(times)
         arm, z = self.arm, self.solution(times)
         n_t = arm.n_coordinates
-        control = self.model.controls(z, self.problem.p)
+        control = self.problem.controls(times, z)
         lower, upper = TorqueLimits.of(arm).bounds(z[:, n_t:n_t + arm.n_joints])
         return Samples(
             times=times, coordinates=z[:, :n_t], rates=z[:, n_t:2 * n_t],
@@ -322,7 +325,9 @@ _SAVED = (Plan, PlanStatus, Certificate, Task, Arm, Link, BeamSection, Joint, El
           ObjectiveSearch, Objectives, Objective, WeightTrial, Margin, KindOfMotion,
           ExploredMotion, PlanWarning, WarningKind, TriedStrategy, ConstraintMargin,
           ConstrainedMotion, PathSlacks, JointRange, JointSpeed, KeepOut, Circle, Capsule,
-          HalfPlane, SelfClearance, BendingMoment, Deflection, ViaPoint, ViaConditions)
+          HalfPlane, SelfClearance, BendingMoment, Deflection, ViaPoint, ViaConditions,
+          OffsetProblem, TorqueOffset, Robustness, RobustSearch, RobustTrial, JointController,
+          Gains, EffortHold)
 
 
 def plan_view(plan: Plan) -> list[tuple[str, str]]:

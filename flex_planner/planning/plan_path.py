@@ -34,6 +34,7 @@ from flex_planner.planning.proofs import (
     Proof,
     prove_not_held,
 )
+from flex_planner.planning.robust.make_robust import make_robust
 from flex_planner.planning.stiff_links import find_stiff_links
 from flex_planner.planning.strategies.catalogue import CATALOGUE
 from flex_planner.planning.strategies.initial_guesses import restart, warm_start
@@ -120,7 +121,7 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
         return _not_possible(problem, broken)
     plan = _plan_as_rigid(problem, solver, start_from, objectives, strategies, effort)
     if plan is not None:
-        return plan
+        return _forgive(plan, objectives, solver)
     bent = _bent_by_limits(start_from)
     again = None if bent is None or objectives is not None else plan_again_within(
         problem, bent, solver)
@@ -136,9 +137,9 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
     if objectives is not None and plan.certified:
         plan = adapt_weights(plan, objectives, solver)
     within = keep_limits(plan, solver, effort)
-    if within is plan or objectives is None:
-        return within
-    return check_objectives(within, plan.objectives, objectives)
+    if within is not plan and objectives is not None:
+        within = check_objectives(within, plan.objectives, objectives)
+    return _forgive(within, objectives, solver)
 
 
 def _known_times(task: Task,
@@ -151,6 +152,19 @@ def _known_times(task: Task,
     known = np.array([time if wanted is None else wanted
                       for time, wanted in zip(times.tolist(), given, strict=True)])
     return known if (np.diff([0.0, *known, task.duration]) > 0).all() else None
+
+
+def _forgive(plan: Plan, objectives: Objectives | None, solver: Solver) -> Plan:
+    """Return the plan that forgives errors of the model, if that is asked and it can be made."""
+    if objectives is None or objectives.robustness is None or not plan.certified:
+        return plan
+    if isinstance(plan.problem, ConstrainedMotion):
+        reason = ('its limits on the way bend this motion, and motions that forgive errors of '
+                  'the model are not looked for within them')
+        return plan if not plan.solved else replace(
+            plan, status=PlanStatus.OBJECTIVE_NOT_MET,
+            message=f'{PlanStatus.OBJECTIVE_NOT_MET.value}; {reason}')
+    return make_robust(plan, objectives, solver)
 
 
 def plan_kind(task: Task, number: int, **options: Any) -> Plan:
@@ -222,6 +236,8 @@ def _plan_as_rigid(problem: MotionProblem, solver: Solver,
     solution = start.solution if isinstance(start, Plan) else start
     if isinstance(solution, CollocationSolution):
         solution = stiff.restrict(solution)
+    if objectives is not None:  # rigid links leave nothing to forgive
+        objectives = replace(objectives, robustness=None)
     plan = plan_path(stiff.task(), solver=solver, start_from=solution, objectives=objectives,
                      strategies=strategies, search=effort)
     return stiff.lift(plan, solver)
