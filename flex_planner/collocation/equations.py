@@ -102,8 +102,9 @@ def linearise(problem: BoundaryValueProblem, solution: CollocationSolution, moni
 
 
 def factorise(problem: BoundaryValueProblem, solution: CollocationSolution,
-              jacobians: Array) -> LinearSystem:
-    """Return the linear system at a point, given its Jacobians."""
+              jacobians: Array, monitor: Monitor | None = None) -> LinearSystem:
+    """Return the linear system at a point, given its Jacobians; a monitor may stop it."""
     return factorise_system(
         solution.rule, solution.steps, jacobians, problem.left(solution.nodes[0])[1],
-        problem.right(solution.nodes[-1])[1], magnitudes(problem, solution), problem.explicit)
+        problem.right(solution.nodes[-1])[1], magnitudes(problem, solution), problem.explicit,
+        monitor)

@@ -47,7 +47,8 @@ static int eliminate_node(struct interval *k, double panel[ROWS][WIDTH])
 }
 
 /*
- * Factorise the linearised equations; what comes of it is kept in f. Nobody need watch.
+ * Factorise the linearised equations; what comes of it is kept in f. Nobody need watch; who
+ * does is asked by `correct`, too.
  *
  * jacobians (N, m, m), or (N, s, m, m) with EXACT; left (l, m) and right (m - l, m): boundary rows.
  */
