@@ -52,7 +52,7 @@ def solve_compiled(problem: BoundaryValueProblem, guess: CollocationSolution, to
         return None
     left = problem.left(guess.nodes[0])[0].size
     core = load_core(CoreSizes(problem.size, left, problem.explicit.size, guess.rule.stages,
-                               int(exact)))
+                               int(exact)), monitor)
     if core is None:
         return None
     run = _CompiledRun(core, problem, rate, guess, left, exact=exact)

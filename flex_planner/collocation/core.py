@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 from flex_planner.base.compiled_library import build_library, content_key, find_library
 from flex_planner.base.compiler import CompilerError
 from flex_planner.base.library_cache import warn_once
+from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
 from flex_planner.collocation.gauss import ComplexArray, GaussRule
 from flex_planner.collocation.problem import CompiledRate
@@ -59,6 +60,12 @@ class CoreJunctions(ctypes.Structure):
     def of(cls, intervals: Any, rows: Array) -> CoreJunctions:
         """Return intervals (J,) and rows (J, m, 2 m), which must live as long."""
         return cls(count=intervals.size, intervals=intervals.ctypes.data, rows=rows.ctypes.data)
+
+
+class CoreWatch(ctypes.Structure):
+    """`struct watch` of core.c."""
+
+    _fields_ = [('stop', STOP), ('asked', _real)]
 
 
 class CoreNewton(ctypes.Structure):
@@ -137,11 +144,22 @@ class Core:
         return np.empty(self.factorisation_size(intervals), dtype=np.uint8)
 
 
-def load_core(sizes: CoreSizes) -> Core | None:
-    """Return the core for a size of problem, None if NumPy is to do without."""
+# cores by their sizes; None where there is no compiler
+LOADED: dict[CoreSizes, Core | None] = {}
+
+
+def load_core(sizes: CoreSizes, monitor: Monitor | None = None) -> Core | None:
+    """
+    Return the core for a size of problem, None if NumPy is to do without.
+
+    A monitor may stop its compilation, by a StoppedError.
+
+    """
     if os.environ.get(CORE_VARIABLE) == 'numpy':
         return None
-    return _load_core(sizes)
+    if sizes not in LOADED:
+        LOADED[sizes] = _load_core(sizes, monitor)
+    return LOADED[sizes]
 
 
 def prepare_core(size: int, left: int, explicit: int, stages: int) -> None:
@@ -156,16 +174,18 @@ def read_source() -> str:
                   _SOURCE.read_text())
 
 
-@cache
-def _load_core(sizes: CoreSizes) -> Core | None:
+def _load_core(sizes: CoreSizes, monitor: Monitor | None) -> Core | None:
+    """Return the core from the disk, or built and kept."""
     source = read_source()
     key = content_key(source, *_OPTIONS, *sizes.definitions)
     core = find_library(key, lambda library, record: Core(library))
     if core is not None:
         return core
+    if monitor is not None:
+        monitor.announce(f'compiling the solver for {sizes.size} unknowns')
     try:
         return build_library(key, source, Core, record={},
-                             options=(*_OPTIONS, *sizes.definitions))
+                             options=(*_OPTIONS, *sizes.definitions), monitor=monitor)
     except CompilerError as error:
         warn_once(f'{error}: NumPy solves the equations of a motion, some three times slower')
     return None

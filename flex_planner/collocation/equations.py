@@ -105,9 +105,10 @@ def linearise(problem: BoundaryValueProblem, solution: CollocationSolution, moni
 
 
 def factorise(problem: BoundaryValueProblem, solution: CollocationSolution,
-              jacobians: Array, junctions: JunctionRows = NO_JUNCTIONS) -> LinearSystem:
+              jacobians: Array, junctions: JunctionRows = NO_JUNCTIONS,
+              monitor: Monitor | None = None) -> LinearSystem:
     """Return the linear system at a point, given its Jacobians and junctions."""
     return factorise_system(
         solution.rule, solution.steps, jacobians, problem.left(solution.nodes[0])[1],
         problem.right(solution.nodes[-1])[1], magnitudes(problem, solution), problem.explicit,
-        junctions)
+        junctions, monitor)

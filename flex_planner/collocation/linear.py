@@ -15,6 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
 from flex_planner.collocation.banded import BandedFactors
 from flex_planner.collocation.exact_stages import ExactStages
@@ -69,9 +70,9 @@ class Stages(Protocol):
 class LinearSystem(Protocol):
     """The linearised collocation equations, factorised once for several right-hand sides."""
 
-    def with_rule(self, rule: GaussRule) -> LinearSystem:
+    def with_rule(self, rule: GaussRule, monitor: Monitor | None = None) -> LinearSystem:
         """
-        Return the system of another rule on the same mesh.
+        Return the system of another rule on the same mesh; a monitor may stop it.
 
         Its factors are its own: on a step much longer than a layer one more stage turns the sign
         of the transition matrix.
@@ -135,8 +136,10 @@ class NewtonSystem:
         if self._factors.singular:
             raise SingularSystemError(SINGULAR_PROBLEM)
 
-    def with_rule(self, rule: GaussRule) -> NewtonSystem:
+    def with_rule(self, rule: GaussRule, monitor: Monitor | None = None) -> NewtonSystem:
         """Return the system of another rule on the same mesh."""
+        if monitor is not None:
+            monitor.check()
         steps, jacobians, left, right, scale, explicit = self._parts
         return NewtonSystem(rule, steps, resample_jacobians(jacobians, self._rule, rule), left,
                             right, scale, explicit, self._junctions)

@@ -112,7 +112,8 @@ class _Run:
         self._scale = magnitudes(self._problem, self._solution)
         residual, jacobians, junctions = linearise(self._problem, self._solution, self._monitor,
                                                    exact=self._exact)
-        system = self._system = factorise(self._problem, self._solution, jacobians, junctions)
+        system = self._system = factorise(self._problem, self._solution, jacobians, junctions,
+                                          self._monitor)
         full = self._measure(system, residual)
         self.iterations += 1
         self._norm = full.norm

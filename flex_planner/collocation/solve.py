@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from flex_planner.base.progress import Monitor, StopReason
+from dataclasses import replace
+
+from flex_planner.base.progress import Monitor, StoppedError, StopReason
 from flex_planner.base.validation import Array
 from flex_planner.collocation.estimate import Estimate, estimate_error
 from flex_planner.collocation.junctions import place_junctions
@@ -82,7 +84,11 @@ class _MeshRefinement:
             switches = switching_times(self._problem, self._point)
             if self._place_nodes(switches):
                 continue
-            estimate = estimate_error(self._problem, self._point, outcome.system)
+            try:
+                estimate = estimate_error(self._problem, self._point, outcome.system,
+                                          self._monitor)
+            except StoppedError as error:
+                return self._fail(replace(outcome, stopped=error.reason, message=str(error)))
             if tolerance > 3 * self._newton_tolerance(estimate.worst):
                 self._expected = estimate.worst  # the mesh deserves a better solution
                 continue

@@ -10,11 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from flex_planner.arms.arm import Arm
 from flex_planner.base.compiled_library import content_key
 from flex_planner.base.errors import InvalidTaskError
+from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
 from flex_planner.collocation import SolverSettings
 from flex_planner.collocation.core import prepare_core
@@ -138,10 +140,7 @@ class ArmModel(ArmDynamics):
     def barrier(self, name: str) -> BatchFunction:
         """Return a function of `build_barrier_functions`; they are derived when first wanted."""
         if name not in self._loaded:
-            key = cache_key(self.arm, 'dynamics', 'optimal_control')
-            self._loaded |= load_functions(
-                content_key(key, 'barrier', 'caps' if has_caps(self.arm) else ''),
-                self._build_barrier)
+            self.prepare_barrier()
         return self._loaded[name]
 
     def offset_function(self, name: str) -> BatchFunction:
@@ -152,6 +151,31 @@ class ArmModel(ArmDynamics):
                 content_key(key, 'offset', 'caps' if has_caps(self.arm) else ''),
                 self._build_offset)
         return self._loaded[name]
+
+    def prepare_barrier(self, monitor: Monitor | None = None) -> None:
+        """
+        Load the functions of an interior-point method from disk, or compile them.
+
+        Parameters
+        ----------
+        monitor : Monitor, optional
+            Told of it; it may stop it.
+
+        Raises
+        ------
+        StoppedError
+            If the monitor stopped it.
+
+        """
+        if 'barrier' in self._loaded:
+            return
+        if monitor is not None:
+            monitor.check()
+            monitor.announce('loading the functions of the interior-point method')
+        key = cache_key(self.arm, 'dynamics', 'optimal_control')
+        self._loaded |= load_functions(
+            content_key(key, 'barrier', 'caps' if has_caps(self.arm) else ''),
+            partial(_build_barrier, self.arm), monitor)
 
     def payload_sensitivity(self, z: Array, p: Array) -> tuple[Array, Array, Array]:
         """Return dz'/dm_p (k, 4 n_t), dH/dm_p and d2H/dm_p2 (k,)."""
@@ -166,12 +190,6 @@ class ArmModel(ArmDynamics):
                                            self._build_optimality)
         return self._loaded[name]
 
-    def _build_barrier(self) -> Mapping[str, tuple[Any, int]]:
-        """Derive the functions of an interior-point method; CasADi is imported only here."""
-        from flex_planner.optimal_control.barrier_conditions import build_barrier_functions
-
-        return build_barrier_functions(self.arm)
-
     def _build_offset(self) -> Mapping[str, tuple[Any, int]]:
         """Derive the functions of effort from an offset; CasADi is imported only here."""
         from flex_planner.optimal_control.offset_conditions import build_offset_functions
@@ -183,3 +201,10 @@ class ArmModel(ArmDynamics):
         from flex_planner.optimal_control.pontryagin import build_optimality_functions
 
         return build_optimality_functions(self.arm)
+
+
+def _build_barrier(arm: Arm) -> Mapping[str, tuple[Any, int]]:
+    """Derive the functions of an interior-point method; CasADi is imported only here."""
+    from flex_planner.optimal_control.barrier_conditions import build_barrier_functions
+
+    return build_barrier_functions(arm)

@@ -249,6 +249,8 @@ int solve_newton(struct newton *n)
         memcpy(n->nodes, r.solution.nodes, (n->count + 1) * SIZE * sizeof *memory);
         memcpy(n->stages, r.solution.stages, n->count * STAGES * SIZE * sizeof *memory);
     }
+    /* its watch ends here */
+    ((struct factorisation *)n->factorisation)->watch = NULL;
     free(memory);
     return outcome;
 }

@@ -55,7 +55,8 @@ static int eliminate_node(struct interval *k, double panel[ROWS][WIDTH])
 }
 
 /*
- * Factorise the linearised equations; what comes of it is kept in f. Nobody need watch.
+ * Factorise the linearised equations; what comes of it is kept in f. Nobody need watch; who
+ * does is asked by `correct`, too.
  *
  * jacobians (N, m, m), or (N, s, m, m) with EXACT; left (l, m) and right (m - l, m): boundary rows.
  * At `junctions` intervals of no length, in order, rows (m, 2 m) stand for the step.

@@ -94,6 +94,7 @@ def pass_barrier_from(problem: MotionProblem, near: CollocationSolution,
 def _pass_on_meshes(problem: MotionProblem, make_guess: MakeGuess,
                     tries: tuple[tuple[float, float], ...], solver: Solver) -> CollocationResult:
     """Return the solution that a guess leads to, on the first mesh and with the first mu."""
+    problem.model.prepare_barrier(solver.monitor)
     barrier, exact = MotionBarrier(problem), solver.with_settings(exact=True)
     rate = barrier.cost_rate
     for share, first in tries:

@@ -98,6 +98,7 @@ def _count(problem: MotionProblem) -> int:
 def _lower_mu(barrier: PayloadBarrier, solver: Solver) -> CollocationSolution | None:
     """Return the motion at the end of the barrier."""
     problem = barrier.motion
+    problem.model.prepare_barrier(solver.monitor)
     count = min(_count(problem), solver.settings.max_intervals)
     guess = barrier.extend(problem.straight_line(count, GaussRule.of(_STAGES)))
     scale = barrier.price * moved_mass(problem) / problem.task.duration
