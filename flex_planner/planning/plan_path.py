@@ -119,20 +119,21 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
     broken = check_ends(problem)
     if broken:
         return _not_possible(problem, broken)
-    plan = _plan_as_rigid(problem, solver, start_from, objectives, strategies, effort)
+    plan = (_plan_as_rigid(problem, solver, start_from, objectives, strategies, effort)
+            or _plan_again_within(problem, solver, start_from, objectives))
     if plan is not None:
         return _forgive(plan, objectives, solver)
-    bent = _bent_by_limits(start_from)
-    again = None if bent is None or objectives is not None else plan_again_within(
-        problem, bent, solver)
-    if again is not None:
-        return again
     plan = plan_problem(problem, solver, (*_given(start_from, problem, solver), *strategies),
                         effort)
     if plan.status in (PlanStatus.NOT_FOUND, PlanStatus.NOT_CONVERGED):
         proof = find_proof(problem, thorough=True)
         return plan if proof is None else replace(
             plan, status=PlanStatus.INFEASIBLE, message=str(proof))
+    return _keep(plan, objectives, solver, effort)
+
+
+def _keep(plan: Plan, objectives: Objectives | None, solver: Solver, effort: SearchEffort) -> Plan:
+    """Return the plan that meets its objectives within its limits on the way."""
     # weights that meet an objective may well bring a motion back within its limits
     if objectives is not None and plan.certified:
         plan = adapt_weights(plan, objectives, solver)
@@ -140,6 +141,16 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
     if within is not plan and objectives is not None:
         within = check_objectives(within, plan.objectives, objectives)
     return _forgive(within, objectives, solver)
+
+
+def _plan_again_within(problem: MotionProblem, solver: Solver,
+                       start: Plan | KindOfMotion | CollocationSolution | None,
+                       objectives: Objectives | None) -> Plan | None:
+    """Return the plan from one that its limits on the way have bent, if that is given."""
+    bent = _bent_by_limits(start)
+    if bent is None or objectives is not None:
+        return None
+    return plan_again_within(problem, bent, solver)
 
 
 def _known_times(task: Task,

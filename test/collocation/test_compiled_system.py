@@ -22,7 +22,7 @@ def factorise(monitor: Monitor | None, *, exact: bool = True) -> LinearSystem:
     shape = (COUNT, 3, 2, 2) if exact else (COUNT, 2, 2)
     return factorise_system(RULE, np.full(COUNT, 1 / COUNT), np.broadcast_to(rate, shape),
                             np.array([[1.0, 0.0]]), np.array([[1.0, 0.0]]), np.ones(2),
-                            np.array([], dtype=np.intp), monitor)
+                            np.array([], dtype=np.intp), monitor=monitor)
 
 
 RESIDUAL = Residual(np.zeros((COUNT, 3, 2)), np.zeros((COUNT, 2)), np.zeros(1), -np.ones(1))
