@@ -30,7 +30,8 @@ from flex_planner.arms.spatial_joint import SpatialJoint
 from flex_planner.arms.spatial_link import SpatialLink
 from flex_planner.arms.urdf import read_urdf, Urdf, UrdfJoint
 from flex_planner.arms.urdf_chain import ChainLink, find_chain, UrdfChain, whole_body
-from flex_planner.base.errors import InvalidValueError
+from flex_planner.base.errors import InvalidSizeError, InvalidValueError
+from flex_planner.base.sentences import count_of
 from flex_planner.base.suggestions import one_of
 from flex_planner.base.validation import number
 from flex_planner.base.yaml_files import YamlSection
@@ -110,8 +111,8 @@ def _paired(top: YamlSection, ends: list[Any]) -> Iterator[tuple[YamlSection, An
     """Yield each link with its end."""
     sections = list(top.sections('links'))
     if len(sections) != len(ends):
-        raise InvalidValueError(top.name('links'), f'{len(sections)} links',
-                                f'{len(ends)}, one per joint')
+        raise InvalidSizeError(top.name('links'), count_of(len(sections), 'link'),
+                               f'{len(ends)}, one per joint')
     return zip(sections, ends, strict=True)
 
 
