@@ -244,9 +244,9 @@ class _Overlay:
                 f'stand for the {link.body.mass:.4g} kg of its <inertial>')
         away = float(np.linalg.norm(np.subtract(said.center_of_mass, link.body.center_of_mass)))
         self._notes.append(
-            f'link {link.name}: as a beam its centre of mass is {away * 1e3:.3g} mm from that of '
-            f'its <inertial>, and its principal moments are {_moments(said)} kg m^2 instead of '
-            f'{_moments(link.body)}')
+            f'link {link.name}: as a beam its centre of mass is {round(away, 6) * 1e3:.3g} mm '
+            f'from that of its <inertial>, and its principal moments are {_moments(said)} kg m^2 '
+            f'instead of {_moments(link.body)}')
 
     def _with_merged(self, link: ChainLink, made: SpatialLink) -> SpatialLink:
         """Return a flexible link with what is fixed to it, at the end that is nearer."""
