@@ -60,6 +60,8 @@ setup(
                              'xarray>=2024.10', 'zarr>=2.18,!=3.0.*'],
                     # for progress bars
                     'notebooks': ['tqdm>=4.60'],
+                    # for URDF files that end in .xacro
+                    'xacro': ['xacro>=2.0'],
                     'test': ['autograd', 'hypothesis', 'mcap-ros2-support', 'mpmath', 'pytest',
                              'pytest-timeout']},
     zip_safe=False,

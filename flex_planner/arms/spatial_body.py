@@ -11,6 +11,8 @@ from flex_planner.base.validation import Array, vector
 import numpy as np
 from numpy.typing import ArrayLike
 
+__all__ = ['SpatialBody']
+
 Point = tuple[float, float, float]
 Matrix = tuple[Point, Point, Point]
 

@@ -30,7 +30,8 @@ from flex_planner.arms.spatial_joint import SpatialJoint
 from flex_planner.arms.spatial_link import SpatialLink
 from flex_planner.arms.urdf import read_urdf, Urdf, UrdfJoint
 from flex_planner.arms.urdf_chain import ChainLink, find_chain, UrdfChain, whole_body
-from flex_planner.base.errors import InvalidValueError
+from flex_planner.base.errors import InvalidSizeError, InvalidValueError
+from flex_planner.base.sentences import count_of
 from flex_planner.base.suggestions import one_of
 from flex_planner.base.validation import number
 from flex_planner.base.yaml_files import YamlSection
@@ -110,8 +111,8 @@ def _paired(top: YamlSection, ends: list[Any]) -> Iterator[tuple[YamlSection, An
     """Yield each link with its end."""
     sections = list(top.sections('links'))
     if len(sections) != len(ends):
-        raise InvalidValueError(top.name('links'), f'{len(sections)} links',
-                                f'{len(ends)}, one per joint')
+        raise InvalidSizeError(top.name('links'), count_of(len(sections), 'link'),
+                               f'{len(ends)}, one per joint')
     return zip(sections, ends, strict=True)
 
 
@@ -243,9 +244,9 @@ class _Overlay:
                 f'stand for the {link.body.mass:.4g} kg of its <inertial>')
         away = float(np.linalg.norm(np.subtract(said.center_of_mass, link.body.center_of_mass)))
         self._notes.append(
-            f'link {link.name}: as a beam its centre of mass is {away * 1e3:.3g} mm from that of '
-            f'its <inertial>, and its principal moments are {_moments(said)} kg m^2 instead of '
-            f'{_moments(link.body)}')
+            f'link {link.name}: as a beam its centre of mass is {round(away, 6) * 1e3:.3g} mm '
+            f'from that of its <inertial>, and its principal moments are {_moments(said)} kg m^2 '
+            f'instead of {_moments(link.body)}')
 
     def _with_merged(self, link: ChainLink, made: SpatialLink) -> SpatialLink:
         """Return a flexible link with what is fixed to it, at the end that is nearer."""

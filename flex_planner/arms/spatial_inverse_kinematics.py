@@ -24,9 +24,9 @@ from numpy.typing import ArrayLike
 _EXACT = 1e-9
 # of the reach: so near to it an arm that sags may come to what the unbent one does not reach
 _SAGS = 5e-2
-_CANDIDATES = 24
-# on the distance from the wanted posture, less and less
-_WEIGHTS = (1e-1, 1e-2, 1e-4, 0.0)
+_CANDIDATES = 12
+# on the distance from the wanted posture, less and less; from other starts it hardly matters
+_WEIGHTS, _OTHER_WEIGHTS = (1e-1, 1e-2, 1e-4, 0.0), (1e-2, 0.0)
 # smallest singular value of the Jacobian, of the reach
 _SINGULAR = 1e-3
 _SEED = 0
@@ -67,6 +67,7 @@ def spatial_inverse_kinematics(arm: SpatialArm, point: ArrayLike, near: ArrayLik
     target = _Target(arm, vector('point', point, 3, unit='m'),
                      None if orientation is None else np.array(
                          rotation('orientation', orientation)))
+    _check_reach(arm, target.point)
     posture, miss = _search(target, near)
     if miss > _EXACT:
         what = '' if orientation is None else ' with that orientation'
@@ -93,6 +94,7 @@ def spatial_posture_near_point(arm: SpatialArm, point: ArrayLike,
 
     """
     if arm.bends_at_rest:
+        _check_reach(arm, vector('point', point, 3, unit='m'), _SAGS)
         posture, miss = _search(_Target(arm, vector('point', point, 3, unit='m'), None), near)
         if _EXACT < miss <= _SAGS:
             return posture
@@ -129,6 +131,17 @@ def check_spatial_singularity(arm: SpatialArm, positions: Array,
             f'at joint coordinates {_say(positions)} rad the tip of the arm cannot move in every '
             f'direction: the smallest singular value of its Jacobian, {least * arm.reach:.3g} m, '
             f'is below {_SINGULAR * arm.reach:.3g} m')
+
+
+def _check_reach(arm: SpatialArm, point: Array, slack: float = _EXACT) -> None:
+    """Raise UnreachableError if a point is farther than the arm is long, slides included."""
+    far = arm.reach
+    for joint, limits in zip(arm.joints, zip(*arm.angle_limits(), strict=True), strict=True):
+        far += float(np.abs(limits).max()) if joint.slides else 0.0
+    distance = float(np.linalg.norm(point - arm.base))
+    if distance > far + slack * arm.reach:
+        raise UnreachableError(f'the point {_say(point)} m is {distance:.6g} m from the first '
+                               f'joint; the arm reaches at most {far:.6g} m')
 
 
 @lru_cache(maxsize=64)
@@ -202,8 +215,8 @@ def _search(target: _Target, near: ArrayLike | None) -> tuple[Array, float]:
     n = target.arm.n_joints
     wanted = np.zeros(n) if near is None else vector('near', near, n)
     best, least = wanted, np.inf
-    for start in _starts(target.arm, wanted):
-        posture = _descend(target, start, wanted)
+    for i, start in enumerate(_starts(target.arm, wanted)):
+        posture = _descend(target, start, wanted, _OTHER_WEIGHTS if i else _WEIGHTS)
         miss = float(np.linalg.norm(target.miss(posture)))
         if miss < least:
             best, least = posture, miss
@@ -212,17 +225,18 @@ def _search(target: _Target, near: ArrayLike | None) -> tuple[Array, float]:
     return best, least
 
 
-def _descend(target: _Target, start: Array, wanted: Array) -> Array:
+def _descend(target: _Target, start: Array, wanted: Array,
+             weights: tuple[float, ...]) -> Array:
     """Return the posture near a wanted one that comes closest, from a start."""
     from scipy.optimize import least_squares  # a tenth of a second, and not every task needs it
 
     lower, upper = target.arm.angle_limits()
     posture = start
-    for weight in _WEIGHTS:
+    for weight in weights:
         posture = least_squares(
             lambda q, w=weight: np.concatenate([target.miss(q), w * (q - wanted)]), posture,
             lambda q, w=weight: np.vstack([target.slope(q), w * np.eye(q.size)]),
-            bounds=(lower, upper), max_nfev=60, xtol=1e-15, ftol=1e-15, gtol=1e-15).x
+            bounds=(lower, upper), max_nfev=40, xtol=1e-13, ftol=1e-15, gtol=1e-15).x
     return np.asarray(posture, dtype=float)
 
 

@@ -10,6 +10,8 @@ from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.validation import vector
 import numpy as np
 
+__all__ = ['SpatialJoint']
+
 _SHORTEST = 1e-6
 
 

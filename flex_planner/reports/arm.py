@@ -208,8 +208,9 @@ def _modal_displacements(arm: Arm, rest: Array) -> list[str]:
     values = [f'{_shown(q) * 1e3:.3g}' for q in rest[arm.n_joints:]]
     twists, modes = values[:len(arm.elastic_joints)], values[len(arm.elastic_joints):]
     turning = any('twist' in name for name in arm.modal_names)
-    return [f'  {name} {", ".join(each)} {unit}' for name, each, unit in (
-        ('modes', modes, 'mm, mrad where they twist' if turning else 'mm'), ('twists', twists, 'mrad')) if each]
+    unit = 'mm, mrad where they twist' if turning else 'mm'
+    return [f'  {name} {", ".join(each)} {shown}' for name, each, shown in (
+        ('modes', modes, unit), ('twists', twists, 'mrad')) if each]
 
 
 def _holding(arm: Arm, torque: Array) -> list[str]:

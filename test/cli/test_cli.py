@@ -11,9 +11,9 @@ from flex_planner import __version__
 from flex_planner.arms.arm_files import load_arm, preset_files
 from flex_planner.base.library_cache import cache_folder
 from flex_planner.cli import main
+from presets import PLANAR_PRESETS
 import pytest
 
-PRESETS = sorted(preset_files())
 MOTION = ['--from', '0.5,0', '--to', '0.5,0.5', '--duration', '1']
 
 
@@ -39,7 +39,7 @@ def frequencies(text: str, joints: str) -> list[float]:
     return [float(part) for part in found[1].replace('unstable', 'nan').split(', ')]
 
 
-@pytest.mark.parametrize('name', PRESETS)
+@pytest.mark.parametrize('name', PLANAR_PRESETS)
 def test_every_preset_is_described(capsys: pytest.CaptureFixture[str], name: str) -> None:
     code, out, err = run(capsys, name, '--no-plot', '--payload', '0.5')
     arm = load_arm(name)
@@ -53,6 +53,31 @@ def test_every_preset_is_described(capsys: pytest.CaptureFixture[str], name: str
     for i, link in enumerate(arm.links, 1):
         assert f'link {i}: {link.length:.4g} m, {link.mass:.4g} kg' in out
     assert out.count('joints locked') == out.count('joints free') >= 1
+
+
+def test_spatial_arm_is_described(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path = tmp_path / 'arm.yaml'
+    path.write_text(SPATIAL)
+    code, out, err = run(capsys, str(path), '--no-plot', '--posture', '30,0.1')
+    assert (code, err) == (0, '')
+    for part in ('mass: 2.5 kg', 'link 2: to (0.5, 0, 0) m, 0.5 kg, beam of 1 kg/m, clamped_free: '
+                 '1 mode across along (0, 1, 0) with EI 20 N m^2',
+                 'joint 1: turns about (0, 0, 1), no torque limit',
+                 'joint 2: slides along (0, 0, 1), no torque limit, friction 0.5 N s/m, '
+                 '-0.2 to 0.4 m', 'at joint angles (30, 0.1) deg, m:'):
+        assert part in out
+
+
+SPATIAL = """\
+name: lift
+kind: spatial
+joints: [{axis: [0, 0, 1]},
+         {type: prismatic, axis: [0, 0, 1], viscous_friction: 0.5, lower_limit: -0.2,
+          upper_limit: 0.4}]
+tip: {xyz: [0.5, 0, 0]}
+links: [{inertial: {mass: 2.0, inertia: [0.1, 0.1, 0.1]}},
+        {mass: 0.5, flexural_rigidity: 20.0, modes: {across: 1}}]
+"""
 
 
 def test_text_says_what_the_paper_s_arm_is_like(capsys: pytest.CaptureFixture[str]) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import casadi as ca
 from data_sheet_arms import data_sheet_arm
-from flex_planner.arms.arm_files import load_arm, preset_files
+from flex_planner.arms.arm_files import load_arm
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.build_chain import build_chain, chain_of
 from flex_planner.dynamics.chain import Chain
@@ -15,6 +15,7 @@ from flex_planner.dynamics.dynamics_functions import physical_symbols
 import numpy as np
 from planar_energies import build_energy_chain
 from point_mechanisms import point_energies, point_mechanism, PointLink
+from presets import PLANAR_PRESETS
 import pytest
 from scipy.spatial.transform import Rotation
 
@@ -86,7 +87,7 @@ def test_power_does_not_depend_on_the_axes_of_the_base(seed: int) -> None:
     np.testing.assert_allclose(same_bias, bias, rtol=0, atol=1e-12 * np.abs(bias).max())
 
 
-@pytest.mark.parametrize('name', [*sorted(preset_files()), *range(4)])
+@pytest.mark.parametrize('name', [*PLANAR_PRESETS, *range(4)])
 def test_arms_have_the_dynamics_of_their_energies(name: str | int) -> None:
     arm = load_arm(name) if isinstance(name, str) else data_sheet_arm(name)
     chain, energies = build_chain(arm), build_energy_chain(arm)

@@ -12,6 +12,7 @@ from flex_planner.arms.arm_files import arm_from_mapping, load_arm
 from flex_planner.arms.joint import Elasticity, Motor
 from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.arms.spatial_beam import SpatialBeam
+from flex_planner.arms.spatial_body import as_matrix, as_point, place_body, turn_rpy
 from flex_planner.arms.spatial_joint import SpatialJoint
 from flex_planner.arms.spatial_kinematics import tip_frame, tip_moves
 from flex_planner.arms.spatial_link import SpatialLink
@@ -238,3 +239,24 @@ def test_planar_arm_in_space_has_the_same_forces() -> None:
         expected = np.array(function(*state, physical)).ravel()
         np.testing.assert_allclose(ours(*state, PAYLOAD, INERTIA), expected, rtol=0,
                                    atol=1e-13 * np.abs(expected).max())
+
+
+def test_forces_do_not_depend_on_how_frames_are_named() -> None:
+    arm = flexible_3r(1, 1)
+    turn = turn_rpy(0.5, -0.7, 1.9)
+    link, (first, second, third) = arm.links[1], arm.joints
+    beam = link.beam
+    assert beam is not None
+    renamed = replace(
+        arm, joints=(first, replace(second, rotation=as_matrix(turn),
+                                    axis=as_point(turn.T @ second.axis)),
+                     replace(third, rotation=as_matrix(turn.T))),
+        links=(arm.links[0], replace(
+            link, end=as_point(turn.T @ link.end),
+            body=place_body(link.body, np.zeros(3), turn.T),
+            tip_body=place_body(link.tip_body, np.zeros(3), turn.T),
+            beam=replace(beam, across=as_point(turn.T @ [0, 1, 0]))), arm.links[2]))
+    state = point(arm, 0, 0.02)
+    expected = forces(arm)(*state, PAYLOAD, INERTIA)
+    np.testing.assert_allclose(forces(renamed)(*state, PAYLOAD, INERTIA), expected, rtol=0,
+                               atol=1e-12 * np.abs(expected).max())

@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import casadi as ca
 from data_sheet_arms import data_sheet_arm
-from flex_planner.arms.arm_files import load_arm, preset_files
+from flex_planner.arms.arm import Arm
+from flex_planner.arms.arm_files import load_arm
 from flex_planner.dynamics.build_chain import build_chain
 from flex_planner.dynamics.physical_parameters import coulomb_frictions
 from flex_planner.optimal_control.parameters import Parameters, ParameterSymbols
 from flex_planner.optimal_control.pontryagin import derive_conditions
 import numpy as np
+from presets import PLANAR_PRESETS
 import pytest
+from spatial_arms import yaw_pitch
 
 
-@pytest.mark.parametrize('name', [*sorted(preset_files()), 0, 1])
-def test_structured_jacobian_is_the_derivative_of_the_conditions(name: str | int) -> None:
-    arm = load_arm(name) if isinstance(name, str) else data_sheet_arm(name)
+@pytest.mark.parametrize('name', [*PLANAR_PRESETS, 0, 1, yaw_pitch])
+def test_structured_jacobian_is_the_derivative_of_the_conditions(
+        name: str | int | Callable[[], Arm]) -> None:
+    arm = (load_arm(name) if isinstance(name, str) else data_sheet_arm(name)
+           if isinstance(name, int) else name())
     chain = build_chain(arm)
     symbols = ParameterSymbols.of(chain)
     found = derive_conditions(chain, symbols)

@@ -32,6 +32,7 @@ EXPECTED = {
     'plan_again.py': ('the tip rests at (0.7000, -0.4000) m', 'from the first plan'),
     'plan_a_path.py': ('solved and certified by a cold start', 'J = 0.647'),
     'replay_and_report.py': ('/flex_planner/motion_task', 'the check of the recording passed'),
+    'your_own_urdf.py': ('link forearm was merged with gripper', 'solved and certified'),
     'your_own_arm.py': ('dampingratio', 'joints locked: 2.803', 'solved and certified'),
 }
 

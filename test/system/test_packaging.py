@@ -89,7 +89,8 @@ def test_pinned_versions_satisfy_setup():
 def test_what_is_imported_is_declared():
     ros = {depend.name for depend in parse_package(str(ROOT / 'package.xml')).exec_depends}
     extras = setup_keyword('extras_require')
-    lines = [*setup_keyword('install_requires'), *extras['maps'], *extras['notebooks']]
+    lines = [*setup_keyword('install_requires'), *extras['maps'], *extras['notebooks'],
+             *extras['xacro']]
     pip = {Requirement(line).name for line in lines}
     # rosdep's names of what comes from pip; it has none for mcap, which another brings along
     ros = {name.removesuffix('-pip') for name in ros} - {'mcap-ros2-support'}

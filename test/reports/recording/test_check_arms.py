@@ -15,7 +15,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from flex_planner.arms.arm_files import load_arm, preset_files
+from flex_planner.arms.arm_files import load_arm
 from flex_planner.cli.recorder import RequestRecorder
 from flex_planner.cli.request import Request
 from flex_planner.control.default_gains import default_gains
@@ -27,6 +27,7 @@ from flex_planner.planning.robustness import assess_robustness
 from flex_planner.planning.sampling import judge_execution, sample_plan, SamplingSettings
 from flex_planner.reports.recording import check_motion, RecordedRequest
 import numpy as np
+from presets import PLANAR_PRESETS
 import pytest
 
 ARMS = Path(__file__).parents[2] / 'data' / 'published_arms'
@@ -124,7 +125,7 @@ def task_of(name: str, start: list[float], goal: list[float], duration: float, p
 
 
 def test_every_preset_is_among_them() -> None:
-    assert set(PRESETS) == set(preset_files())
+    assert set(PRESETS) == set(PLANAR_PRESETS)
 
 
 def test_every_arm_and_motion_is_among_those_kept() -> None:

@@ -1,0 +1,106 @@
+"""
+Motions of spatial arms from cold: what they cost, and what a direct method says of it.
+
+    tools/run python -m bench.spatial [--direct] [CASE ...]
+
+For every case: CPU time to plan with the compiled functions at hand, and the cost J. With
+``--direct``, too, the cost that IPOPT finds without costates from a straight line on a Gauss mesh
+of 60 intervals, where it may find another kind of motion, and the one that it finds from the plan.
+That takes minutes for arms of more than ten coordinates.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+import sys
+import time
+from typing import NamedTuple
+
+from flex_planner import Arm, load_arm, plan_path, Task
+from flex_planner.arms.spatial_arm import SpatialArm
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectSettings
+from flex_planner.planning.plan import Plan
+import numpy as np
+
+_INTERVALS = 60
+
+
+class Case(NamedTuple):
+    """A motion: arm, joint positions at both ends [rad], duration [s] and payload [kg]."""
+
+    make: Callable[[], Arm]
+    start: list[float]
+    goal: list[float]
+    duration: float
+    payload: float
+
+
+def with_modes(modes: int, twist: int) -> Arm:
+    """Return the arm of three joints with other modes per plane, and of twisting."""
+    arm = load_arm('spatial_3r')
+    assert isinstance(arm, SpatialArm)
+    links = []
+    for link in arm.links:
+        beam = link.beam and replace(link.beam, modes=(modes, modes), twist_modes=twist,
+                                     torsional_rigidity=720.0)
+        links.append(replace(link, beam=beam))
+    return replace(arm, links=tuple(links))
+
+
+_UR5 = [0, -1.2, 1.2, -1.5, -1.5, 0.0], [1.0, -0.8, 0.9, -1.0, -1.2, 0.5]
+_3R = [0, -0.3, 0.9], [1.2, -0.6, 0.4]
+CASES: dict[str, Case] = {
+    '3R': Case(lambda: load_arm('spatial_3r'), *_3R, 1.0, 0.5),
+    '3R, 1 kg in 1.5 s': Case(lambda: load_arm('spatial_3r'), *_3R, 1.5, 1.0),
+    '3R with torsion': Case(lambda: with_modes(1, 1), *_3R, 1.0, 0.5),
+    '3R, two modes per plane': Case(lambda: with_modes(2, 0), *_3R, 1.0, 0.5),
+    'TUDOR-like': Case(lambda: load_arm('tudor_like'), [0, -0.5, 1.0], [1.0, -1.0, 0.6], 1.0, 0.1),
+    'UR5, rigid': Case(lambda: load_arm('ur5_elastic').rigid(), *_UR5, 1.2, 2.0),
+    'UR5, joints 1 to 3 elastic': Case(lambda: load_arm('ur5_elastic'), *_UR5, 1.2, 1.5),
+}
+
+
+def task_of(case: Case) -> Task:
+    """Return the task of a case, with effort weighed by the motors' torques."""
+    arm = case.make()
+    stall = np.array([joint.motor.stall_torque for joint in arm.joints])
+    return Task(arm=arm, start_positions=case.start, goal_positions=case.goal,
+                duration=case.duration, payload_mass=case.payload,
+                effort_weights=(100 / stall)**2 / 100)
+
+
+def direct_costs(plan: Plan) -> list[str]:
+    """Return the cost that IPOPT finds from a straight line, and from the plan."""
+    problem = plan.problem
+    direct = DirectProblem(problem.model, DirectSettings(intervals=_INTERVALS))
+    costs = []
+    for guess in (None, plan.solution):
+        found = direct.solve(problem.parameters, problem.start, problem.goal,
+                             plan.task.duration, guess=guess)
+        costs.append(f'{found.cost:.6f}' if found.converged else 'not found')
+    return costs
+
+
+def main(arguments: list[str]) -> None:
+    """Plan cases and print a line for each."""
+    names = [name for name in arguments if name != '--direct'] or list(CASES)
+    direct = '--direct' in arguments
+    print('case | CPU [s] | J | strategy' + ' | IPOPT, cold | IPOPT, from the plan' * direct)
+    for name in names:
+        task = task_of(CASES[name])
+        ArmModel.of(task.arm)
+        if task.arm.n_passive:
+            ArmModel.of(task.arm.rigid())
+        before = time.process_time()
+        plan = plan_path(task, search='fast')
+        seconds = time.process_time() - before
+        row = [name, f'{seconds:.2f}', f'{plan.cost:.6f}' if plan.solved else plan.status.value,
+               plan.strategy, *(direct_costs(plan) if plan.solved and direct else [])]
+        print(' | '.join(row), flush=True)
+
+
+if __name__ == '__main__':
+    main(sys.argv[1:])
