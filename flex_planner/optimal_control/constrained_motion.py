@@ -17,7 +17,7 @@ from flex_planner.optimal_control.path_constraints import limits_of_arm, PathSla
 import numpy as np
 
 # slacks at both ends are taken as at least so much, see `PathSlacks.relieved`
-_AT_ENDS = 1e-6
+_AT_ENDS = 2e-7
 # of slacks of a motion, before a share of it is a floor
 _LEAST_FLOOR = 1e-8
 
@@ -61,8 +61,9 @@ class ConstrainedMotion(MotionProblem):
         lam = self.multipliers(z)
         slacks, slopes, curvature = self.slacks.linearise(z[:, :half], lam)
         rate[:, half:] += _pull(slopes, lam)
-        jacobian[:, half:, :half] += curvature - _stiffen(
-            slopes, self.mu / np.maximum(slacks, self.floor)**2)
+        kept = np.maximum(slacks, self.floor)
+        ratio = np.where(kept > 0, self.mu / np.where(kept > 0, kept, 1.0)**2, np.nan)
+        jacobian[:, half:, :half] += curvature - _stiffen(slopes, ratio)
         return rate, jacobian
 
     def compiled_rate(self) -> CompiledRate | None:
@@ -82,9 +83,10 @@ class ConstrainedMotion(MotionProblem):
         """Return lam at points (k, m), shape (k, n_c)."""
         slacks = self.slacks(z[:, :self.size // 2])
         kept = np.maximum(slacks, self.floor)
-        with np.errstate(invalid='ignore', divide='ignore'):
-            lam: Array = np.where(kept > 0, self.mu / kept * (1 + (kept - slacks) / kept), np.nan)
-        return lam
+        inside = np.where(kept > 0, kept, 1.0)
+        lam: Array = np.where(kept > 0, self.mu / inside * (1 + (inside - slacks) / inside),
+                              np.nan)
+        return np.where((slacks >= self.floor) & (kept > 0), self.mu / inside, lam)
 
     def with_changes(self, **changes: float) -> ConstrainedMotion:
         """Return the problem of the same task changed in payload or duration."""

@@ -117,27 +117,17 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
     broken = check_ends(problem)
     if broken:
         return _not_possible(problem, broken)
-    plan = _plan_as_rigid(problem, solver, start_from, objectives, strategies, effort)
+    plan = (_plan_as_rigid(problem, solver, start_from, objectives, strategies, effort)
+            or _plan_again(problem, solver, start_from, objectives))
     if plan is not None:
         return plan
-    bent = _bent_by_limits(start_from)
-    again = None if bent is None or objectives is not None else plan_again_within(
-        problem, bent, solver)
-    if again is not None:
-        return again
     plan = plan_problem(problem, solver, (*_given(start_from, problem, solver), *strategies),
                         effort)
     if plan.status in (PlanStatus.NOT_FOUND, PlanStatus.NOT_CONVERGED):
         proof = find_proof(problem, thorough=True)
         return plan if proof is None else replace(
             plan, status=PlanStatus.INFEASIBLE, message=str(proof))
-    # weights that meet an objective may well bring a motion back within its limits
-    if objectives is not None and plan.certified:
-        plan = adapt_weights(plan, objectives, solver)
-    within = keep_limits(plan, solver, effort)
-    if within is plan or objectives is None:
-        return within
-    return check_objectives(within, plan.objectives, objectives)
+    return _keep(plan, solver, objectives, effort)
 
 
 def plan_kind(task: Task, number: int, **options: Any) -> Plan:
@@ -174,16 +164,31 @@ def plan_kind(task: Task, number: int, **options: Any) -> Plan:
     return replace(plan, kinds=(*plan.kinds[:1], *others), starts=best.starts)
 
 
-def _bent_by_limits(start: Plan | KindOfMotion | CollocationSolution | None,
-                    ) -> CollocationSolution | None:
-    """Return what a plan starts from if limits on the way have bent it."""
+def _keep(plan: Plan, solver: Solver, objectives: Objectives | None,
+          effort: SearchEffort) -> Plan:
+    """Return a plan that meets its objectives and keeps its limits on the way."""
+    # weights that meet an objective may well bring a motion back within its limits
+    if objectives is not None and plan.certified:
+        plan = adapt_weights(plan, objectives, solver)
+    within = keep_limits(plan, solver, effort)
+    if within is plan or objectives is None:
+        return within
+    return check_objectives(within, plan.objectives, objectives)
+
+
+def _plan_again(problem: MotionProblem, solver: Solver,
+                start: Plan | KindOfMotion | CollocationSolution | None,
+                objectives: Objectives | None) -> Plan | None:
+    """Return the plan from a motion that limits on the way have bent; None from another one."""
     if isinstance(start, KindOfMotion):
         start_problem, solution = start.motion.problem, start.motion.solution
     elif isinstance(start, Plan) and start.solution is not None:
         start_problem, solution = start.problem, start.solution
     else:
         return None
-    return solution if isinstance(start_problem, ConstrainedMotion) else None
+    if objectives is not None or not isinstance(start_problem, ConstrainedMotion):
+        return None
+    return plan_again_within(problem, solution, solver)
 
 
 def _not_possible(problem: MotionProblem, why: str) -> Plan:

@@ -241,7 +241,7 @@ class _Search:
 
     def _add(self, problem: MotionProblem, met: BarrierOutcome) -> None:
         """Keep a motion, unless it is one that is known."""
-        kind = as_kind(problem, met.solution)
+        kind = as_kind(ConstrainedMotion(problem, self._slacks, met.mu), met.solution)
         sides = say_sides(problem, met.solution, self._obstacles())
         if sides:
             kind = replace(kind, sentence=f'{sides}; {kind.sentence}')

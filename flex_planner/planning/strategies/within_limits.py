@@ -41,6 +41,8 @@ _NEAR = 10.0
 _TOLERANCE = 1e-2
 # iterations on a mesh: of the interior point, at the end, of a first look from a motion like it
 _PATIENCE, _FINISH, _FIRST_LOOK = 60, 30, 10
+# positions in an interval
+_BETWEEN = 17
 # of the smallest slacks, below which multipliers grow no more than linearly at the end
 _FLOOR = 0.3
 
@@ -108,6 +110,9 @@ def solve_within_limits(problem: MotionProblem, slacks: PathSlacks, met: Barrier
         limited = limited.with_mu(last * rate).floored(finer.solution, _FLOOR)
         result = (_finish(limited, finer.solution, solver) if finer.converged
                   else CollocationResult.failed(finer.solution, finer.message))
+        if result.converged and not _keeps(limited, result.solution):
+            limited = limited.floored(result.solution, _FLOOR)
+            result = _finish(limited, result.solution, solver)
         if result.converged or result.status in INTERRUPTED:
             return limited, result
         failed = failed or result
@@ -129,7 +134,8 @@ def solve_again(problem: MotionProblem, slacks: PathSlacks, near: CollocationSol
     limited = ConstrainedMotion(problem, slacks, _LAST[0] * rate).floored(near, _FLOOR)
     quick = solver.with_settings(stages=_STAGES).patient(_FIRST_LOOK)
     result = quick.solve(limited, near)
-    if result.converged or result.status in INTERRUPTED:
+    kept = result.converged and _keeps(limited, result.solution)
+    if kept or result.status in INTERRUPTED:
         return limited, result
     barrier = PathBarrier(MotionBarrier(problem), slacks)
     guess, mu = near.on_mesh(_first_mesh(problem, solver), GaussRule.of(_STAGES)), limited.mu
@@ -167,6 +173,14 @@ def _finish(limited: ConstrainedMotion, near: CollocationSolution,
     if result.converged or result.status in INTERRUPTED:
         return result
     return quick.with_settings(exact=True).solve(limited, near)
+
+
+def _keeps(limited: ConstrainedMotion, solution: CollocationSolution) -> bool:
+    """Return whether a motion keeps its limits between the points of its mesh, too."""
+    half = limited.size // 2
+    between = np.linspace(0, 1, _BETWEEN, dtype=np.float64)
+    states = solution.values_at(between)[..., :half].reshape(-1, half)
+    return bool((limited.slacks(states) > 0).all())
 
 
 def find_cost_rate(problem: MotionProblem, near: CollocationSolution) -> float:
