@@ -10,18 +10,21 @@ lam``. The torque of eqs. (13) to (15) stays as it is. What H lacks to be consta
 from __future__ import annotations
 
 from flex_planner.base.validation import Array
+from flex_planner.collocation import CollocationSolution
 from flex_planner.collocation.problem import CompiledRate
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.path_constraints import limits_of_arm, PathSlacks
 import numpy as np
 
 # slacks at both ends are taken as at least so much, see `PathSlacks.relieved`
-_AT_ENDS = 1e-6
+_AT_ENDS = 2e-7
+# of slacks of a motion, before a share of it is a floor
+_LEAST_FLOOR = 1e-8
 
 
 class ConstrainedMotion(MotionProblem):
     """
-    The conditions of `MotionProblem` with the barrier; F is undefined where a slack is not > 0.
+    The conditions of `MotionProblem` with the barrier.
 
     Parameters
     ----------
@@ -31,30 +34,36 @@ class ConstrainedMotion(MotionProblem):
         Of the limits, at least one.
     mu : float
         > 0 [J of eq. (6) per second].
+    floor : numpy.ndarray, shape (n_c,), optional
+        Slacks below which multipliers grow no more than linearly, > 0: an iterate may be there, a
+        solution is not. Without it F is undefined where a slack is not positive.
 
     """
 
-    def __init__(self, motion: MotionProblem, slacks: PathSlacks, mu: float) -> None:
+    def __init__(self, motion: MotionProblem, slacks: PathSlacks, mu: float,
+                 floor: Array | None = None) -> None:
         super().__init__(motion.model, motion.task, motion.parameters)
         self.slacks, self.mu = slacks, mu
+        self.floor: Array = np.zeros(slacks.count) if floor is None else floor
 
     def rate(self, t: Array, z: Array) -> Array:
-        """Return z', not a number where a slack is not positive."""
+        """Return z'."""
         rate = super().rate(t, z)
         half = self.size // 2
         states = z[:, :half]
-        rate[:, half:] += add_multipliers(self.slacks, states, self._multipliers(states))
+        rate[:, half:] += add_multipliers(self.slacks, states, self.multipliers(z))
         return rate
 
     def rate_jacobian(self, t: Array, z: Array) -> tuple[Array, Array]:
         """Return z' and its Jacobian."""
         rate, jacobian = super().rate_jacobian(t, z)
         half = self.size // 2
-        states = z[:, :half]
-        lam = self._multipliers(states)
-        slacks, slopes, curvature = self.slacks.linearise(states, lam)
+        lam = self.multipliers(z)
+        slacks, slopes, curvature = self.slacks.linearise(z[:, :half], lam)
         rate[:, half:] += _pull(slopes, lam)
-        jacobian[:, half:, :half] += curvature - _stiffen(slopes, lam / slacks)
+        kept = np.maximum(slacks, self.floor)
+        ratio = np.where(kept > 0, self.mu / np.where(kept > 0, kept, 1.0)**2, np.nan)
+        jacobian[:, half:, :half] += curvature - _stiffen(slopes, ratio)
         return rate, jacobian
 
     def compiled_rate(self) -> CompiledRate | None:
@@ -63,25 +72,36 @@ class ConstrainedMotion(MotionProblem):
 
     def barrier_rate(self, z: Array) -> Array:
         """Return what the barrier adds to L and H, shape (k,)."""
+        slacks = self.slacks(z[:, :self.size // 2])
         with np.errstate(invalid='ignore', divide='ignore'):
-            rate: Array = -self.mu * np.log(self.slacks(z[:, :self.size // 2])).sum(axis=1)
+            kept, share = np.maximum(slacks, self.floor), np.maximum(1 - slacks / self.floor, 0.0)
+            beyond = np.where(slacks < self.floor, share + share**2 / 2, 0.0)
+            rate: Array = self.mu * (beyond - np.log(kept)).sum(axis=1)
         return rate
+
+    def multipliers(self, z: Array) -> Array:
+        """Return lam at points (k, m), shape (k, n_c)."""
+        slacks = self.slacks(z[:, :self.size // 2])
+        kept = np.maximum(slacks, self.floor)
+        inside = np.where(kept > 0, kept, 1.0)
+        lam: Array = np.where(kept > 0, self.mu / inside * (1 + (inside - slacks) / inside),
+                              np.nan)
+        return np.where((slacks >= self.floor) & (kept > 0), self.mu / inside, lam)
 
     def with_changes(self, **changes: float) -> ConstrainedMotion:
         """Return the problem of the same task changed in payload or duration."""
-        return ConstrainedMotion(super().with_changes(**changes), self.slacks, self.mu)
+        return ConstrainedMotion(super().with_changes(**changes), self.slacks, self.mu,
+                                 self.floor)
 
     def with_mu(self, mu: float) -> ConstrainedMotion:
         """Return the same problem with another barrier."""
-        return ConstrainedMotion(self, self.slacks, mu)
+        return ConstrainedMotion(self, self.slacks, mu, self.floor)
 
-    def multipliers(self, z: Array) -> Array:
-        """Return lam at points, shape (k, n_c)."""
-        return self._multipliers(z[:, :self.size // 2])
-
-    def _multipliers(self, states: Array) -> Array:
-        slacks = self.slacks(states)
-        return np.where(slacks > 0, self.mu / np.where(slacks > 0, slacks, 1.0), np.nan)
+    def floored(self, near: CollocationSolution, share: float) -> ConstrainedMotion:
+        """Return the same problem with a floor at a share of the smallest slacks of a motion."""
+        states = near.stage_values()[..., :self.size // 2].reshape(-1, self.size // 2)
+        least = np.maximum(self.slacks(states).min(axis=0), _LEAST_FLOOR)
+        return ConstrainedMotion(self, self.slacks, self.mu, share * least)
 
 
 def slacks_of(motion: MotionProblem) -> PathSlacks | None:

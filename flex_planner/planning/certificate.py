@@ -12,6 +12,7 @@ from flex_planner.dynamics.integration import integrate
 from flex_planner.dynamics.statics import residual_vibration
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.planned_torque import PlannedTorque
+from flex_planner.planning.constraint_margins import smallest_slack
 import numpy as np
 
 
@@ -41,6 +42,10 @@ class Certificate:
     via_error : float
         Largest distance of the re-simulated tip from a via point at its time; of joint angles, the
         largest error of one times the reach of the arm; 0 without via points [m].
+    limit_slack : float
+        Smallest slack of all limits on the way, at the nodes of the mesh in the re-simulation, as
+        a share of the limit's scale; ``inf`` without limits. `Plan.constraints` has those of the
+        motion as it is planned, between the nodes, too.
 
     """
 
@@ -52,6 +57,7 @@ class Certificate:
     state_error: float = np.inf
     costate_error: float = np.inf
     via_error: float = np.inf
+    limit_slack: float = np.inf
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,7 +118,8 @@ def certify(problem: MotionProblem, result: CollocationResult, monitor: Monitor,
                                               problem.goal[:n_t], problem.parameters),
         state_error=float(result.errors[:2 * n_t].max()),
         costate_error=float(result.errors[2 * n_t:].max()),
-        via_error=_via_error(problem, torque.breaks, states))
+        via_error=_via_error(problem, torque.breaks, states),
+        limit_slack=smallest_slack(problem, states))
 
 
 def simulate_to_goal(problem: MotionProblem, solution: CollocationSolution, monitor: Monitor,

@@ -120,7 +120,7 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
     if broken:
         return _not_possible(problem, broken)
     plan = (_plan_as_rigid(problem, solver, start_from, objectives, strategies, effort)
-            or _plan_again_within(problem, solver, start_from, objectives))
+            or _plan_again(problem, solver, start_from, objectives))
     if plan is not None:
         return _forgive(plan, objectives, solver)
     plan = plan_problem(problem, solver, (*_given(start_from, problem, solver), *strategies),
@@ -129,28 +129,7 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
         proof = find_proof(problem, thorough=True)
         return plan if proof is None else replace(
             plan, status=PlanStatus.INFEASIBLE, message=str(proof))
-    return _keep(plan, objectives, solver, effort)
-
-
-def _keep(plan: Plan, objectives: Objectives | None, solver: Solver, effort: SearchEffort) -> Plan:
-    """Return the plan that meets its objectives within its limits on the way."""
-    # weights that meet an objective may well bring a motion back within its limits
-    if objectives is not None and plan.certified:
-        plan = adapt_weights(plan, objectives, solver)
-    within = keep_limits(plan, solver, effort)
-    if within is not plan and objectives is not None:
-        within = check_objectives(within, plan.objectives, objectives)
-    return _forgive(within, objectives, solver)
-
-
-def _plan_again_within(problem: MotionProblem, solver: Solver,
-                       start: Plan | KindOfMotion | CollocationSolution | None,
-                       objectives: Objectives | None) -> Plan | None:
-    """Return the plan from one that its limits on the way have bent, if that is given."""
-    bent = _bent_by_limits(start)
-    if bent is None or objectives is not None:
-        return None
-    return plan_again_within(problem, bent, solver)
+    return _keep(plan, solver, objectives, effort)
 
 
 def _known_times(task: Task,
@@ -212,16 +191,31 @@ def plan_kind(task: Task, number: int, **options: Any) -> Plan:
     return replace(plan, kinds=(*plan.kinds[:1], *others), starts=best.starts)
 
 
-def _bent_by_limits(start: Plan | KindOfMotion | CollocationSolution | None,
-                    ) -> CollocationSolution | None:
-    """Return what a plan starts from if limits on the way have bent it."""
+def _keep(plan: Plan, solver: Solver, objectives: Objectives | None,
+          effort: SearchEffort) -> Plan:
+    """Return a plan that meets its objectives and keeps its limits on the way."""
+    # weights that meet an objective may well bring a motion back within its limits
+    if objectives is not None and plan.certified:
+        plan = adapt_weights(plan, objectives, solver)
+    within = keep_limits(plan, solver, effort)
+    if within is not plan and objectives is not None:
+        within = check_objectives(within, plan.objectives, objectives)
+    return _forgive(within, objectives, solver)
+
+
+def _plan_again(problem: MotionProblem, solver: Solver,
+                start: Plan | KindOfMotion | CollocationSolution | None,
+                objectives: Objectives | None) -> Plan | None:
+    """Return the plan from a motion that limits on the way have bent; None from another one."""
     if isinstance(start, KindOfMotion):
         start_problem, solution = start.motion.problem, start.motion.solution
     elif isinstance(start, Plan) and start.solution is not None:
         start_problem, solution = start.problem, start.solution
     else:
         return None
-    return solution if isinstance(start_problem, ConstrainedMotion) else None
+    if objectives is not None or not isinstance(start_problem, ConstrainedMotion):
+        return None
+    return plan_again_within(problem, solution, solver)
 
 
 def _not_possible(problem: MotionProblem, why: str) -> Plan:

@@ -129,6 +129,26 @@ def plan_again_within(problem: MotionProblem, near: CollocationSolution, solver:
                    planning_time=solver.monitor.elapsed)
 
 
+def plan_from(problem: MotionProblem, slacks: PathSlacks, near: CollocationSolution,
+              solver: Solver) -> Plan | None:
+    """
+    Return the plan within limits that a motion near the limit of the motors leads to, or None.
+
+    Raises
+    ------
+    StoppedError
+        If the monitor stopped it.
+
+    """
+    met = approach_limits(problem, slacks, near, solver)
+    limited, result = solve_within_limits(problem, slacks, met, solver, coarse=True)
+    if not result.converged:
+        solver.monitor.check()
+        return None
+    plan = conclude(limited, WITHIN_LIMITS, Attempt(result=result), solver)
+    return _describe(plan) if plan.solved else None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Near:
     """A motion that keeps its limits at the points of a coarse mesh, and its kind."""
@@ -221,7 +241,7 @@ class _Search:
 
     def _add(self, problem: MotionProblem, met: BarrierOutcome) -> None:
         """Keep a motion, unless it is one that is known."""
-        kind = as_kind(problem, met.solution)
+        kind = as_kind(ConstrainedMotion(problem, self._slacks, met.mu), met.solution)
         sides = say_sides(problem, met.solution, self._obstacles())
         if sides:
             kind = replace(kind, sentence=f'{sides}; {kind.sentence}')

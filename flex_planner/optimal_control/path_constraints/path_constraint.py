@@ -1,8 +1,8 @@
 """
 What a limit on the way is: slacks that must stay positive at every moment of a motion.
 
-A slack is a smooth, dimensionless function ``s(q, q')`` of the state, >= 0 where the limit is kept.
-A new limit is a class with the four methods of `PathConstraint`, and changes no other file.
+A slack is a smooth, dimensionless function ``s(q, q')`` of the state, >= 0 where the limit is
+kept. A new limit is a class with the methods of `PathConstraint`, and changes no other file.
 
 """
 

@@ -17,6 +17,8 @@ from flex_planner.optimal_control.path_constraints.path_constraint import (
 )
 import numpy as np
 
+# of slacks: less than what counts as rounding
+_RESERVE = 3e-7
 _SOURCES = 'optimal_control/path_constraints'
 # functions by their keys: those of a map's thousands of tasks are one
 _LOADED: dict[str, dict[str, BatchFunction]] = {}
@@ -77,11 +79,11 @@ class PathSlacks:
         Return slacks that are at least so much in given states (k, 2 n_t).
 
         A motion may start or end on a limit, where a barrier is infinite; so little of the limit
-        is given up then.
+        is given up then. All others have a reserve for what is between the points of a mesh.
 
         """
         lowest = (self(ends) - self.relief).min(axis=0)
-        return PathSlacks(self.arm, self.constraints, np.maximum(least - lowest, 0.0))
+        return PathSlacks(self.arm, self.constraints, np.maximum(least - lowest, -_RESERVE))
 
     def __call__(self, states: Array) -> Array:
         """Return the slacks in states (k, 2 n_t), shape (k, n_c)."""
@@ -122,7 +124,6 @@ def _load(arm: Arm, constraints: Sequence[PathConstraint]) -> dict[str, BatchFun
 def _build(arm: Arm, constraints: Sequence[PathConstraint]) -> dict[str, tuple[Any, int]]:
     """Derive the functions; CasADi is imported only here."""
     import casadi as ca
-
     from flex_planner.dynamics.dynamics_functions import batch
     from flex_planner.optimal_control.path_constraints.symbolic_arm import SymbolicArm
 

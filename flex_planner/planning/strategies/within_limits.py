@@ -39,8 +39,12 @@ _FIRST, _COARSE, _LAST = (1e-2, 1e-1), 1e-3, (1e-4, 1e-3)
 # at first, from a motion that limits have bent, in units of mu at last
 _NEAR = 10.0
 _TOLERANCE = 1e-2
-# iterations on a mesh, and of a first look from a motion like it
-_PATIENCE, _FIRST_LOOK = 60, 10
+# iterations on a mesh: of the interior point, at the end, of a first look from a motion like it
+_PATIENCE, _FINISH, _FIRST_LOOK = 60, 30, 10
+# positions in an interval
+_BETWEEN = 17
+# of the smallest slacks, below which multipliers grow no more than linearly at the end
+_FLOOR = 0.3
 
 
 def approach_limits(problem: MotionProblem, slacks: PathSlacks, near: CollocationSolution,
@@ -77,7 +81,8 @@ def approach_limits(problem: MotionProblem, slacks: PathSlacks, near: Collocatio
 
 
 def solve_within_limits(problem: MotionProblem, slacks: PathSlacks, met: BarrierOutcome,
-                        solver: Solver) -> tuple[ConstrainedMotion, CollocationResult]:
+                        solver: Solver, *,
+                        coarse: bool = False) -> tuple[ConstrainedMotion, CollocationResult]:
     """
     Return the conditions with a small barrier, and their solution if one was found.
 
@@ -87,6 +92,9 @@ def solve_within_limits(problem: MotionProblem, slacks: PathSlacks, met: Barrier
         As of `approach_limits`.
     met : BarrierOutcome
         What that returned.
+    coarse : bool
+        Whether only the larger barrier is tried, that more motions near the limit of the motors
+        are solved with.
 
     Raises
     ------
@@ -97,11 +105,14 @@ def solve_within_limits(problem: MotionProblem, slacks: PathSlacks, met: Barrier
     rate = find_cost_rate(problem, met.solution)
     limited = ConstrainedMotion(problem, slacks, _LAST[0] * rate)
     failed: CollocationResult | None = None
-    for last in _LAST if met.converged else ():
-        limited = limited.with_mu(last * rate)
+    for last in _LAST[int(coarse):] if met.converged else ():
         finer = _follow(problem, slacks, met, last * rate, solver)
-        result = (finish(limited, finer.solution, solver) if finer.converged
+        limited = limited.with_mu(last * rate).floored(finer.solution, _FLOOR)
+        result = (_finish(limited, finer.solution, solver) if finer.converged
                   else CollocationResult.failed(finer.solution, finer.message))
+        if result.converged and not _keeps(limited, result.solution):
+            limited = limited.floored(result.solution, _FLOOR)
+            result = _finish(limited, result.solution, solver)
         if result.converged or result.status in INTERRUPTED:
             return limited, result
         failed = failed or result
@@ -120,10 +131,11 @@ def solve_again(problem: MotionProblem, slacks: PathSlacks, near: CollocationSol
 
     """
     rate = find_cost_rate(problem, near)
-    limited = ConstrainedMotion(problem, slacks, _LAST[0] * rate)
+    limited = ConstrainedMotion(problem, slacks, _LAST[0] * rate).floored(near, _FLOOR)
     quick = solver.with_settings(stages=_STAGES).patient(_FIRST_LOOK)
     result = quick.solve(limited, near)
-    if result.converged or result.status in INTERRUPTED:
+    kept = result.converged and _keeps(limited, result.solution)
+    if kept or result.status in INTERRUPTED:
         return limited, result
     barrier = PathBarrier(MotionBarrier(problem), slacks)
     guess, mu = near.on_mesh(_first_mesh(problem, solver), GaussRule.of(_STAGES)), limited.mu
@@ -153,14 +165,22 @@ def _follow(problem: MotionProblem, slacks: PathSlacks, met: BarrierOutcome, las
         most_intervals=solver.settings.max_intervals)
 
 
-def finish(limited: ConstrainedMotion, near: CollocationSolution,
+def _finish(limited: ConstrainedMotion, near: CollocationSolution,
            solver: Solver) -> CollocationResult:
     """Solve the conditions with their barrier from a motion within the limits."""
-    quick = solver.with_settings(stages=_STAGES)
+    quick = solver.with_settings(stages=_STAGES).patient(_FINISH)
     result = quick.solve(limited, near)
     if result.converged or result.status in INTERRUPTED:
         return result
     return quick.with_settings(exact=True).solve(limited, near)
+
+
+def _keeps(limited: ConstrainedMotion, solution: CollocationSolution) -> bool:
+    """Return whether a motion keeps its limits between the points of its mesh, too."""
+    half = limited.size // 2
+    between = np.linspace(0, 1, _BETWEEN, dtype=np.float64)
+    states = solution.values_at(between)[..., :half].reshape(-1, half)
+    return bool((limited.slacks(states) > 0).all())
 
 
 def find_cost_rate(problem: MotionProblem, near: CollocationSolution) -> float:
