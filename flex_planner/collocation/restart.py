@@ -150,13 +150,14 @@ class _Restart:
         mesh = self.nearest.mesh
         nearest = mesh[np.abs(before[:, None] - mesh).argmin(axis=1)]
         fixed = np.concatenate([mesh[:1], junction_times(self._problem), mesh[-1:]])
-        ends = [np.sort(np.concatenate([fixed, times])) for times in (nearest, after)]
-        if not np.diff(ends[0]).min() > 0:
+        old: Array = np.sort(np.concatenate([fixed, nearest]))
+        new: Array = np.sort(np.concatenate([fixed, after]))
+        if not np.diff(old).min() > 0:
             return None
-        stretches = np.diff(ends[1]) / np.diff(ends[0])
+        stretches = np.diff(new) / np.diff(old)
         if not (stretches.max() <= _MOST_STRETCH and stretches.min() >= 1 / _MOST_STRETCH):
             return None
-        moved: Array = np.interp(mesh, *ends)
+        moved: Array = np.interp(mesh, old, new)
         return moved
 
     def _judge(self, switches: Array) -> CollocationResult | None:

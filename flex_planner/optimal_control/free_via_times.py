@@ -18,6 +18,8 @@ import numpy as np
 
 # smallest magnitude of a duration that counts, of that of the motion
 _SHORTEST = 1e-3
+# of H in units of the smallest that matters
+_TYPICAL = 100.0
 
 
 class FreeViaTimesProblem:
@@ -100,16 +102,17 @@ class FreeViaTimesProblem:
         rates = self.motion.rate(np.zeros(2), points)
         # the gradient of H is (-psi', x')
         slopes = np.hstack([-rates[:, inner // 2:], rates[:, :inner // 2]])
-        unit = self._unit(controls.cost_rate, slopes)
+        unit = self._unit
         fall = float(controls.hamiltonian[0] - controls.hamiltonian[1])
         residual[-1] = unit * (fall - self._jumps[junction])
         rows[-1, :inner], rows[-1, size:size + inner] = unit * slopes[0], -unit * slopes[1]
         return residual, rows
 
-    def _unit(self, cost: Array, slopes: Array) -> float:
+    @property
+    def _unit(self) -> float:
         """Return what turns H into a duration, by which its row is scaled."""
-        power = float(np.abs(slopes * self.motion.scale).max() + np.abs(cost).max())
-        return float(self.scale[-1]) / max(power, np.finfo(float).tiny)
+        _, rates, costates, _ = self.motion.scale.reshape(4, -1)
+        return float(self.scale[-1]) / (_TYPICAL * float(rates @ costates))
 
     def with_jumps(self, jumps: Array) -> FreeViaTimesProblem:
         """Return the problem whose H falls by given amounts at the via points."""

@@ -124,7 +124,7 @@ class ViaConditions:
             share = np.linalg.solve(C[:, pivots], C[:, others]).T
         except np.linalg.LinAlgError:
             raise SingularSystemError('the arm is stretched at a via point') from None
-        nu = np.linalg.solve(C[:, pivots].T, jump[pivots])
+        nu: Array = np.asarray(np.linalg.solve(C[:, pivots].T, jump[pivots]), dtype=np.float64)
         bend = _second_derivative(self.arm, q, nu)
         at = 2 * n_t + others
         residual[at] -= share @ jump[pivots]

@@ -78,7 +78,7 @@ def _plain(name: str, values: ArrayLike) -> Array:
     except (TypeError, ValueError, OverflowError):
         raise InvalidValueError(name, values, 'a list of numbers') from None
     if given.ndim != 1:
-        raise InvalidSizeError(name, given.shape, 'a list of numbers')
+        raise InvalidSizeError(name, f'an array of {given.ndim} axes', 'a list of numbers')
     given.setflags(write=False)
     return given
 

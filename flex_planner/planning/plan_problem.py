@@ -22,7 +22,12 @@ from flex_planner.planning.strategies.initial_guesses import WARM_START
 from flex_planner.planning.strategies.price_continuation import free_duration
 from flex_planner.planning.strategies.strategy import Attempt, Strategy
 from flex_planner.planning.strategies.try_strategies import TriedStrategy, try_strategies
-from flex_planner.planning.strategies.via_times import choose_via_times, free_via_times
+from flex_planner.planning.strategies.via_times import (
+    choose_via_times,
+    free_via_times,
+    move_free_via_points,
+    TimedMotion,
+)
 from flex_planner.planning.verdict import judge
 from flex_planner.planning.warnings import find_arm_warnings
 
@@ -33,6 +38,7 @@ STOP_STATUS = {StopReason.TIMEOUT: PlanStatus.TIMEOUT, StopReason.CANCELED: Plan
 _REFINEMENTS = 2
 _REFINEMENT_FACTOR = 10.0
 _STRICTER = 100.0
+_MOVED = 'homotopy in via points at free times'
 # longer guesses of a free duration
 _GUESSES = (2.0, 4.0, 8.0)
 
@@ -62,8 +68,10 @@ def plan_problem(problem: MotionProblem, solver: Solver,
     try:
         if problem.task.time_weight:
             problem, strategy, attempt = _solve_in_any_time(problem, solver, strategies, tried)
+        elif free_times(problem.task.via_points):
+            problem, strategy, attempt = _solve_at_via_times(problem, solver, strategies, tried)
         else:
-            problem, strategy, attempt = _solve_with_via_points(problem, solver, strategies, tried)
+            strategy, attempt = try_strategies(problem, solver, strategies, tried)
         plan = _conclude(problem, strategy, attempt, solver)
         if (effort.explores and strategy != WARM_START and plan.solution is not None
                 and not problem.junctions.size  # kinds are looked for without via points
@@ -79,18 +87,45 @@ def plan_problem(problem: MotionProblem, solver: Solver,
                    tried=tuple(tried), planning_time=solver.monitor.elapsed)
 
 
-def _solve_with_via_points(
+def _solve_at_via_times(
         problem: MotionProblem, solver: Solver, strategies: Sequence[Strategy],
         tried: list[TriedStrategy]) -> tuple[MotionProblem, str, Attempt]:
-    """Solve a task; free times of its via points are found once there is a motion."""
-    free = free_times(problem.task.via_points)
-    if free and not any(strategy.name == WARM_START for strategy in strategies):
-        problem = choose_via_times(problem, solver)
-    strategy, attempt = try_strategies(problem, solver, strategies, tried)
-    if free and attempt.result.converged:
-        problem, result = free_via_times(problem, attempt.result, solver)
-        attempt = replace(attempt, result=result)
-    return problem, strategy, attempt
+    """
+    Solve a task whose via points have free times: at times that are near, then at the best.
+
+    Where no quick strategy leads to a motion at such times they may be too demanding; then via
+    points are moved with free times.
+
+    """
+    warm = [strategy for strategy in strategies if strategy.name == WARM_START]
+    near = TimedMotion(problem, CollocationResult.failed(problem.straight_line(
+        solver.settings.intervals, solver.settings.rule), 'not looked for'))
+    if not warm:
+        solver.monitor.phase = 'motion without via points'
+        near = choose_via_times(problem, solver)
+    quick = [strategy for strategy in strategies if strategy.quick] or strategies
+    name, attempt = try_strategies(near.problem, solver, quick, tried)
+    if attempt.result.converged:
+        solver.monitor.phase = 'times of via points freed'
+        found = free_via_times(near.problem, attempt.result, solver)
+        if found.result.converged or found.result.status in INTERRUPTED_STATUS:
+            return found.problem, name, Attempt(result=found.result)
+    if warm:
+        near = choose_via_times(problem, solver)
+    solver.monitor.phase = _MOVED
+    moved = move_free_via_points(near, solver)
+    if moved.result.converged or moved.result.status in INTERRUPTED_STATUS:
+        return moved.problem, _MOVED, Attempt(result=moved.result)
+    slow = [strategy for strategy in strategies if strategy not in quick]
+    if attempt.result.converged or not slow:
+        return near.problem, name, Attempt(result=moved.result)
+    names, failure = f'{name}, {_MOVED}', f'{attempt.result.message}; {moved.result.message}'
+    name, attempt = try_strategies(near.problem, solver, slow, tried)
+    if attempt.result.converged:
+        found = free_via_times(near.problem, attempt.result, solver)
+        return found.problem, name, Attempt(result=found.result)
+    return near.problem, f'{names}, {name}', replace(attempt, result=replace(
+        attempt.result, message=f'{failure}; {attempt.result.message}'))
 
 
 def _look_for_cheaper(plan: Plan, attempt: Attempt, solver: Solver,

@@ -29,6 +29,7 @@ EXPECTED = {
     'map_the_payload.py': ('49 solved', '5.85    6.18', 'from the map: '),
     'minimum_time.py': ('shortest time with 1 kg: 0.642', 'in 1.00 s: 5.85'),
     'minimum_vibration.py': ('minimum vibration: ',),
+    'pass_via_points.py': ('passed at 0.5 s: J = 1.3222', 'passed when it is best: J = 0.9358'),
     'plan_again.py': ('the tip rests at (0.7000, -0.4000) m', 'from the first plan'),
     'plan_a_path.py': ('solved and certified by a cold start', 'J = 0.647'),
     'replay_and_report.py': ('/flex_planner/motion_task', 'the check of the recording passed'),
