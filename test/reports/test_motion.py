@@ -72,5 +72,5 @@ def test_motor_that_can_hold_no_more_is_told(rigid_arm: Arm) -> None:
 def test_motor_that_never_is_on_its_limit_limits_nothing(rigid_arm: Arm, shares: list[float],
                                                          row: str | None) -> None:
     found = search(rigid_arm, status=PlanStatus.TIMEOUT, payload=0.1, limiting_joint=0,
-                   plan=Mock(saturation=shares, solution=None))
+                   plan=Mock(saturation=shares, solution=None, warnings=()))
     assert dict(payload_rows(found)).get('limited by') == row
