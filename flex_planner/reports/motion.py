@@ -119,7 +119,8 @@ def kind_rows(kinds: Sequence[KindOfMotion], starts: int, before: str, after: st
         return []
     rows = [('kinds of motion', f'{len(kinds)} found from {starts} starts')]
     return rows + [(f'  kind {i}', f'{before}{kind.value:.6g}{after}: {kind.sentence} (met '
-                                   f'{kind.met} times)') for i, kind in enumerate(kinds, 1)]
+                                   f'{"once" if kind.met == 1 else f"{kind.met} times"})')
+                   for i, kind in enumerate(kinds, 1)]
 
 
 def _saturation(plan: Plan) -> str:
@@ -164,7 +165,7 @@ def payload_rows(found: MaxPayload) -> list[Row]:
     rows = [('status', found.status.value), ('method', found.method.value),
             planning_row(found.planning_time, f'{found.iterations} iterations'),
             ('largest payload', _bracket(found))]
-    if found.limiting_joint is not None:
+    if found.limiting_joint is not None and _limiting_share(found) > 0:
         rows.append(('limited by', _limit(found)))
     if np.isfinite(found.proved_upper):
         rows.append(('proved', f'no motion carries more than {found.proved_upper:.6g} kg '
@@ -191,10 +192,9 @@ def _bracket(found: MaxPayload) -> str:
 def _limit(found: MaxPayload) -> str:
     """Return the motor that limits the payload."""
     assert found.limiting_joint is not None
-    if found.held or found.plan is None:
-        reason = 'which can hold no more at the goal'
-    else:
-        reason = f'on its limit for {found.plan.saturation[found.limiting_joint]:.1%} of the time'
+    share = _limiting_share(found)
+    reason = ('which can hold no more at the goal' if np.isinf(share) else
+              f'on its limit for {share:.1%} of the time')
     return f'the motor of joint {found.limiting_joint + 1}, {reason}'
 
 
@@ -211,3 +211,11 @@ def search_table(found: MaxPayload) -> str:
             [str(i), f'{trial.payload:.6f}', f'{trial.step:.6f}', 'yes' if trial.solved else 'no',
              f'{trial.boundary_error:.1e}'] for i, trial in enumerate(found.trials, 1)])
     return ''
+
+
+def _limiting_share(found: MaxPayload) -> float:
+    """Return for which share of the time the limiting motor is on its limit; inf if it holds."""
+    assert found.limiting_joint is not None
+    if found.held or found.plan is None:
+        return np.inf
+    return float(found.plan.saturation[found.limiting_joint])
