@@ -30,6 +30,7 @@ from flex_planner.ros.messages.plans import (
     report_from_plan,
     report_trajectory,
 )
+from flex_planner.ros.messages.robustness import enter_robustness
 from flex_planner.ros.planner.outcome import Outcome
 from flex_planner.ros.planner.recorder import OutcomeRecorder
 from flex_planner.ros.planner.request_state import RequestState
@@ -108,6 +109,8 @@ def task_message(request: Request) -> MotionTask:
         allow_large_bending=task.allow_large_bending, allowed_planning_time=request.time_limit)
     for name in OBJECTIVE_FIELDS if request.objectives else ():
         setattr(message, name, getattr(request.objectives, name).tolist())
+    if request.objectives:
+        enter_robustness(message, request.objectives.robustness)
     _fill_start(message, task)
     if task.goal_point.size:
         message.goal_point = _point(task.goal_point)
