@@ -83,9 +83,9 @@ def test_no_arm_of_the_box_is_much_worse_than_those_looked_at(
     errors = np.random.default_rng(20).uniform(-0.1, 0.1, (200 if name == 'clamped' else 60, 2))
     residuals = CarriedOut(found, DifferingArms(found, search.robustness),
                            Monitor()).residuals(errors)
-    # the slow vibration of ei50 comes to more than a whole turn between the corners: arms
-    # between them are looked at, too, and the worst may lie next to one of these
-    assert residuals.max() <= search.residual * (1.0 if name == 'clamped' else 1.05)
+    # the slow vibration of ei50 makes two turns more at one corner than at another: these alone
+    # are not enough there
+    assert residuals.max() <= search.residual
 
 
 def test_plan_that_forgives_enough_is_left_as_it_is(clamped_plan: Plan,
