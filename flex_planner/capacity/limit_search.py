@@ -97,6 +97,11 @@ class LimitSearch:
         self.extrapolated = self.warm = False
 
     @property
+    def solver(self) -> Solver:
+        """Return the solver."""
+        return self._solver
+
+    @property
     def weighted(self) -> bool:
         """Return whether the task has weights besides those of effort."""
         return has_weights(self._problem)

@@ -89,7 +89,8 @@ def find_max_payload(task: Task, *, model: ArmModel | None = None, solver: Solve
     ------
     InvalidTaskError
         If no motor has a limit, if the goal is the start, if the duration is free or absurdly
-        short, or if the arm need not come to rest at the goal.
+        short, if the arm need not come to rest at the goal, or if the incremental method is to
+        keep limits on the way.
     InvalidValueError
         If accuracy or step breaks its bound.
 
@@ -100,6 +101,10 @@ def find_max_payload(task: Task, *, model: ArmModel | None = None, solver: Solve
     effort = SearchEffort.of(search)
     helper_processes()  # what the environment says is refused before anything is solved
     _check(task)
+    if task.path_constraints and method is PayloadMethod.INCREMENTAL:
+        raise InvalidTaskError('path_constraints are given, but must be left out for the '
+                               'incremental method: it knows only motions that no limit on the '
+                               'way bends. The direct method keeps them')
     model = ArmModel.for_arm(task.arm, model)  # before a clock starts
     solver = (solver or Solver()).watched_by(monitor)
     began = solver.monitor.iteration, solver.monitor.elapsed

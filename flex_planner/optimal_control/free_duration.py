@@ -57,7 +57,9 @@ class FreeDurationProblem:
         return append_zeros(duration * rate, 1), jacobian
 
     def compiled_rate(self) -> CompiledRate | None:
-        """Return both as machine code, None without a compiler."""
+        """Return both as machine code, None without a compiler or with limits on the way."""
+        if self.motion.compiled_rate() is None:
+            return None
         return self.motion.model.compiled_rate('free_duration', self.motion.p)
 
     def switches(self, t: Array, z: Array) -> Array:
@@ -74,6 +76,7 @@ class FreeDurationProblem:
         residual, rows = self.motion.right(z[:-1])
         point = z[None, :-1]
         hamiltonian = self.motion.model.controls(point, self.motion.p).hamiltonian
+        hamiltonian = hamiltonian + self.motion.barrier_rate(point)
         rate = self.motion.rate(np.zeros(1), point)[0]
         half = rate.size // 2
         gradient = np.concatenate([-rate[half:], rate[:half], [0.0]])

@@ -110,6 +110,10 @@ class MotionProblem:
         """Return the final conditions of eq. (16), or transversality of eq. (6)."""
         return self.ends.right(z)
 
+    def barrier_rate(self, z: Array) -> Array:
+        """Return what a barrier adds to L and H, shape (k,): nothing here."""
+        return np.zeros(len(z))
+
     def target_state(self, end: Array) -> Array:
         """Return the state (2 n_t,) that a motion ending in `end` is to reach."""
         return self.ends.target_state(end)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, TYPE_CHECKING
 
@@ -10,6 +11,7 @@ from flex_planner.arms.inverse_kinematics import check_angle_limits
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.validation import Array, number, vector
 from flex_planner.optimal_control.ends_at_points import ends_at_points, MAX_COORDINATE
+from flex_planner.optimal_control.path_constraints.path_constraint import PathConstraint
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -70,6 +72,9 @@ class Task:
     allow_large_bending : bool
         Whether a plan may bend links by more than 0.3 of their length, though they are linear
         beams.
+    path_constraints : tuple of PathConstraint
+        Limits that hold on the whole way, besides those of the arm; see
+        `optimal_control.path_constraints`.
 
     Raises
     ------
@@ -97,6 +102,7 @@ class Task:
     time_weight: float = 0.0
     tolerance: float = 1e-3
     allow_large_bending: bool = False
+    path_constraints: tuple[PathConstraint, ...] = ()
 
     if TYPE_CHECKING:
         # arrays are made of anything like one; type checkers would insist on arrays
@@ -109,7 +115,8 @@ class Task:
                 start_point: ArrayLike = ..., goal_point: ArrayLike = ...,
                 goal_position_weights: ArrayLike = ..., goal_velocity_weights: ArrayLike = ...,
                 time_weight: float = ..., tolerance: float = ...,
-                allow_large_bending: bool = ...) -> None:
+                allow_large_bending: bool = ...,
+                path_constraints: Sequence[PathConstraint] = ...) -> None:
             """Accept lists where arrays are kept."""
 
     @classmethod
@@ -197,6 +204,7 @@ class Task:
         for name in ('goal_position_weights', 'goal_velocity_weights'):
             self._set(name, _goal_weights(name, getattr(self, name), n, n_t))
         self._set_bending()
+        self._set_constraints()
 
     @property
     def ends_at_rest(self) -> bool:
@@ -223,6 +231,16 @@ class Task:
         if bending.size and self.start_point.size:
             raise InvalidValueError(name, 'given', 'left out where the start is a point: there '
                                     'the arm rests')
+
+    def _set_constraints(self) -> None:
+        """Check the limits on the way."""
+        given = tuple(self.path_constraints)
+        for i, one in enumerate(given):
+            name = f'path_constraints[{i}]'
+            if not isinstance(one, PathConstraint):
+                raise InvalidValueError(name, one, 'a PathConstraint, such as KeepOut')
+            one.check(name, self.arm)
+        object.__setattr__(self, 'path_constraints', given)
 
     def _set(self, name: str, value: Array) -> None:
         object.__setattr__(self, name, value)

@@ -12,6 +12,7 @@ from flex_planner.dynamics.integration import integrate
 from flex_planner.dynamics.statics import residual_vibration
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.planned_torque import PlannedTorque
+from flex_planner.planning.constraint_margins import smallest_slack
 import numpy as np
 
 
@@ -37,6 +38,10 @@ class Certificate:
         Estimated largest error of states and costates at the nodes of the mesh, relative to
         the largest value of each. Of a plan that starts from another one it may be carried over,
         at twice its size or more, see `collocation.restart`.
+    limit_slack : float
+        Smallest slack of all limits on the way, at the nodes of the mesh in the re-simulation, as
+        a share of the limit's scale; ``inf`` without limits. `Plan.constraints` has those of the
+        motion as it is planned, between the nodes, too.
 
     """
 
@@ -47,6 +52,7 @@ class Certificate:
     residual_vibration: float = np.inf
     state_error: float = np.inf
     costate_error: float = np.inf
+    limit_slack: float = np.inf
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,7 +95,8 @@ def certify(problem: MotionProblem, result: CollocationResult, monitor: Monitor,
     """
     if not np.isclose(result.solution.mesh[-1], problem.task.duration, rtol=1e-12):
         raise ValueError('the solution does not last as long as its task')
-    final, reached = simulate_to_goal(problem, result.solution, monitor, rtol)
+    states, reached = simulate_motion(problem, result.solution, monitor, rtol)
+    final = states[-1]
     if not np.isfinite(final).all():
         return Certificate(collocation_residual=result.residual)
     arm, n_t = problem.model.arm, problem.model.arm.n_coordinates
@@ -104,7 +111,8 @@ def certify(problem: MotionProblem, result: CollocationResult, monitor: Monitor,
         residual_vibration=residual_vibration(problem.model, _at_rest(problem) + miss,
                                               problem.goal[:n_t], problem.parameters),
         state_error=float(result.errors[:2 * n_t].max()),
-        costate_error=float(result.errors[2 * n_t:].max()))
+        costate_error=float(result.errors[2 * n_t:].max()),
+        limit_slack=smallest_slack(problem, states))
 
 
 def simulate_to_goal(problem: MotionProblem, solution: CollocationSolution, monitor: Monitor,
@@ -118,9 +126,24 @@ def simulate_to_goal(problem: MotionProblem, solution: CollocationSolution, moni
         If the monitor stopped it.
 
     """
+    states, reached = simulate_motion(problem, solution, monitor, rtol)
+    return states[-1], reached
+
+
+def simulate_motion(problem: MotionProblem, solution: CollocationSolution, monitor: Monitor,
+                    rtol: float) -> tuple[Array, Array]:
+    """
+    Return the states (k, 2 n_t) through which the planned torque leads, and where it should.
+
+    Raises
+    ------
+    StoppedError
+        If the monitor stopped it.
+
+    """
     states = integrate(problem.model, problem.parameters.physical, problem.start,
                        PlannedTorque.of(problem, solution), monitor, rtol=rtol, atol=rtol / 100)
-    return states[-1], problem.target_state(solution.nodes[-1, :problem.goal.size])
+    return states, problem.target_state(solution.nodes[-1, :problem.goal.size])
 
 
 def _at_rest(problem: MotionProblem) -> Array:
@@ -139,4 +162,4 @@ def hamiltonian_drift(problem: MotionProblem, solution: CollocationSolution) -> 
     size = max(float(np.max(controls.cost_rate)), float(np.max(powers)), np.finfo(float).tiny)
     rates = problem.hamiltonian_rate(times, z)
     due = np.append(0.0, np.cumsum((rates[1:] + rates[:-1]) / 2 * np.diff(times)))
-    return float(np.ptp(controls.hamiltonian - due)) / size
+    return float(np.ptp(controls.hamiltonian + problem.barrier_rate(z) - due)) / size

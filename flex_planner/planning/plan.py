@@ -17,12 +17,26 @@ from flex_planner.collocation import CollocationSolution, GaussRule
 from flex_planner.control.joint_controller import EffortHold, Gains, JointController
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.boundary_conditions import BoundaryConditions
+from flex_planner.optimal_control.constrained_motion import ConstrainedMotion
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.parameters import Parameters
+from flex_planner.optimal_control.path_constraints import (
+    BendingMoment,
+    Capsule,
+    Circle,
+    Deflection,
+    HalfPlane,
+    JointRange,
+    JointSpeed,
+    KeepOut,
+    PathSlacks,
+    SelfClearance,
+)
 from flex_planner.optimal_control.task import Task
 from flex_planner.optimal_control.torque_limits import TorqueLimits
 from flex_planner.optimal_control.torque_offset import OffsetProblem, TorqueOffset
 from flex_planner.planning.certificate import Certificate
+from flex_planner.planning.constraint_margins import ConstraintMargin
 from flex_planner.planning.kinds.clusters import KindOfMotion
 from flex_planner.planning.kinds.explorer import ExploredMotion
 from flex_planner.planning.objectives import (
@@ -126,6 +140,12 @@ class Plan:
         When a motor reaches or leaves its limit [s].
     saturation : numpy.ndarray, shape (n,)
         Share of the time that each motor spends on its limit.
+    constraints : tuple of ConstraintMargin
+        How near the motion comes to each limit on the way; empty without limits or solution.
+    barrier_gap : float
+        Number of slacks times mu times duration, where limits bent the motion: by at most so much
+        J is above the least where the task is convex, which motions of arms are not; where it was
+        measured, J was nearer by far.
     kinds : tuple of KindOfMotion
         Kinds of motion that were met, at most four, that of the plan first; values of the others
         are of the arm made rigid.
@@ -156,6 +176,8 @@ class Plan:
     energy: float = np.inf
     switching_times: Array = field(default_factory=lambda: np.zeros(0))
     saturation: Array = field(default_factory=lambda: np.zeros(0))
+    constraints: tuple[ConstraintMargin, ...] = ()
+    barrier_gap: float = 0.0
     kinds: tuple[KindOfMotion, ...] = ()
     starts: int = 1
     warnings: tuple[PlanWarning, ...] = ()
@@ -288,7 +310,9 @@ class Plan:
 _SAVED = (Plan, PlanStatus, Certificate, Task, Arm, Link, BeamSection, Joint, Elasticity, Motor,
           Node, ArmModel, MotionProblem, BoundaryConditions, Parameters, CollocationSolution,
           GaussRule, ObjectiveSearch, Objectives, Objective, WeightTrial, Margin, KindOfMotion,
-          ExploredMotion, PlanWarning, WarningKind, TriedStrategy, OffsetProblem, TorqueOffset,
+          ExploredMotion, PlanWarning, WarningKind, TriedStrategy, ConstraintMargin,
+          ConstrainedMotion, PathSlacks, JointRange, JointSpeed, KeepOut, Circle, Capsule,
+          HalfPlane, SelfClearance, BendingMoment, Deflection, OffsetProblem, TorqueOffset,
           Robustness, RobustSearch, RobustTrial, JointController, Gains, EffortHold)
 
 

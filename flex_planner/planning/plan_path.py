@@ -17,6 +17,7 @@ from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import integer
 from flex_planner.collocation import CollocationSolution, KnownSolution, Solver
 from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.constrained_motion import ConstrainedMotion
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.kinds.clusters import KindOfMotion, MOST_KINDS
@@ -25,6 +26,7 @@ from flex_planner.planning.kinds.kinds_strategy import as_guess
 from flex_planner.planning.objectives import Objectives
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_problem import plan_problem
+from flex_planner.planning.plan_within_limits import check_ends, keep_limits, plan_again_within
 from flex_planner.planning.proofs import (
     check_duration,
     find_doubt,
@@ -38,7 +40,7 @@ from flex_planner.planning.strategies.catalogue import CATALOGUE
 from flex_planner.planning.strategies.initial_guesses import restart, warm_start
 from flex_planner.planning.strategies.strategy import Strategy
 from flex_planner.planning.warnings import find_arm_warnings
-from flex_planner.planning.weight_search import adapt_weights
+from flex_planner.planning.weight_search import adapt_weights, check_objectives
 import numpy as np
 
 
@@ -113,7 +115,11 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
     doubt = find_doubt(problem)
     if doubt is not None:
         return _not_found(problem, doubt)
-    plan = _plan_as_rigid(problem, solver, start_from, objectives, strategies, effort)
+    broken = check_ends(problem)
+    if broken:
+        return _not_possible(problem, broken)
+    plan = (_plan_as_rigid(problem, solver, start_from, objectives, strategies, effort)
+            or _plan_again(problem, solver, start_from, objectives))
     if plan is not None:
         return _forgive(plan, objectives, solver)
     plan = plan_problem(problem, solver, (*_given(start_from, problem, solver), *strategies),
@@ -122,16 +128,17 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
         proof = find_proof(problem, thorough=True)
         return plan if proof is None else replace(
             plan, status=PlanStatus.INFEASIBLE, message=str(proof))
-    # weights that meet an objective may well bring a motion back within its limits
-    if objectives is None or not plan.certified:
-        return plan
-    return _forgive(adapt_weights(plan, objectives, solver), objectives, solver)
+    return _forgive(_keep(plan, solver, objectives, effort), objectives, solver)
 
 
 def _forgive(plan: Plan, objectives: Objectives | None, solver: Solver) -> Plan:
     """Return the plan that forgives errors of the model, if that is asked and it can be made."""
     if objectives is None or objectives.robustness is None or not plan.certified:
         return plan
+    if isinstance(plan.problem, ConstrainedMotion):
+        return replace(plan, status=PlanStatus.OBJECTIVE_NOT_MET, message=(
+            f'{PlanStatus.OBJECTIVE_NOT_MET.value}; max_residual is given, but limits on the way '
+            'bend the motion, and such a motion cannot be made to forgive errors of the model'))
     return make_robust(plan, objectives, solver)
 
 
@@ -167,6 +174,39 @@ def plan_kind(task: Task, number: int, **options: Any) -> Plan:
     plan = plan_path(task, **{**options, 'start_from': chosen})
     others = tuple(kind for kind in best.kinds if kind is not chosen)
     return replace(plan, kinds=(*plan.kinds[:1], *others), starts=best.starts)
+
+
+def _keep(plan: Plan, solver: Solver, objectives: Objectives | None,
+          effort: SearchEffort) -> Plan:
+    """Return a plan that meets its objectives and keeps its limits on the way."""
+    # weights that meet an objective may well bring a motion back within its limits
+    if objectives is not None and plan.certified:
+        plan = adapt_weights(plan, objectives, solver)
+    within = keep_limits(plan, solver, effort)
+    if within is plan or objectives is None:
+        return within
+    return check_objectives(within, plan.objectives, objectives)
+
+
+def _plan_again(problem: MotionProblem, solver: Solver,
+                start: Plan | KindOfMotion | CollocationSolution | None,
+                objectives: Objectives | None) -> Plan | None:
+    """Return the plan from a motion that limits on the way have bent; None from another one."""
+    if isinstance(start, KindOfMotion):
+        start_problem, solution = start.motion.problem, start.motion.solution
+    elif isinstance(start, Plan) and start.solution is not None:
+        start_problem, solution = start.problem, start.solution
+    else:
+        return None
+    if objectives is not None or not isinstance(start_problem, ConstrainedMotion):
+        return None
+    return plan_again_within(problem, solution, solver)
+
+
+def _not_possible(problem: MotionProblem, why: str) -> Plan:
+    """Return the plan of a task whose ends break a limit on the way."""
+    return Plan(task=problem.task, status=PlanStatus.INFEASIBLE, message=why, strategy='',
+                problem=problem, solution=None, warnings=find_arm_warnings(problem.model.arm))
 
 
 def _impossible(problem: MotionProblem, proof: Proof) -> Plan:

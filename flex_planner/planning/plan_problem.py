@@ -89,14 +89,14 @@ def _look_for_cheaper(plan: Plan, attempt: Attempt, solver: Solver,
     if met.result is attempt.result:
         plan = replace(plan, kinds=met.kinds[:MOST_KINDS], starts=met.starts)
         return replace(plan, message=describe_choice(plan)) if plan.solved else plan
-    other = _conclude_in_time(cheapest.problem, plan.strategy, met, solver)
+    other = conclude(cheapest.problem, plan.strategy, met, solver)
     if other.status is PlanStatus.CANCELED:
         return other
     better = other.solved > plan.solved or other.cost < plan.cost
     return other if better and other.solved >= plan.solved else plan
 
 
-def _conclude_in_time(problem: MotionProblem, strategy: str, attempt: Attempt,
+def conclude(problem: MotionProblem, strategy: str, attempt: Attempt,
                       solver: Solver) -> Plan:
     """Return the plan of another motion of the same task, in the time that is best for it."""
     if problem.task.time_weight:

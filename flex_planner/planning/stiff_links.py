@@ -141,6 +141,8 @@ class StiffLinks:
         task = self._problem.task
         asked = [getattr(task, name)[~self._kept] for name in _ENTRIES]
         hard = all(np.isinf(values).all() for values in asked[4:])
+        if any(one.bends for one in task.path_constraints):
+            return False
         return hard and not (np.any(asked[:4]) or task.start_modal_displacements.size)
 
     def _problem_of(self, plan: Plan) -> MotionProblem:
