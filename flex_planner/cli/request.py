@@ -30,11 +30,13 @@ from flex_planner.cli.options import (
     positions,
 )
 from flex_planner.cli.via_options import add_via_points, via_points
+from flex_planner.control.joint_controller import JointController
 from flex_planner.optimal_control.ends_at_points import ends_at_points
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.objectives import Objectives
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.point_times import MAX_SAMPLES
+from flex_planner.planning.robust.objective import Robustness
 from flex_planner.planning.sampling import SamplingSettings
 import numpy as np
 
@@ -91,9 +93,10 @@ class Request:
                 payload_mass=options.payload_mass, payload_inertia=options.payload_inertia,
                 tolerance=options.tolerance, allow_large_bending=options.allow_large_bending,
                 via_points=via_points(options.via_points, arm), **_weights(options, arm))
-            objectives = _objectives(options, task)
+            sampled = sampling_settings(options, arm)
+            objectives = _objectives(options, task, sampled.controller)
         return cls(task=task, elbow=options.elbow, time_limit=limit,
-                   objectives=objectives, sampled=sampling_settings(options, arm))
+                   objectives=objectives, sampled=sampled)
 
     @property
     def sampling(self) -> SamplingSettings:
@@ -166,6 +169,12 @@ def add_objectives(parser: argparse.ArgumentParser) -> None:
             ('modal-rates', 'M/S', 'modal rates, kept by velocity weights')):
         parser.add_argument(f'--max-{name}', metavar=f'{unit},{unit},...',
                             help=f'limits of the {what} that are searched for; inf for no limit')
+    parser.add_argument('--max-residual', type=number_argument, metavar='M',
+                        help='largest residual bending, peak to peak in the second after the '
+                        'arrival, of arms that differ from the model as --robust says [m]')
+    parser.add_argument('--robust', metavar='STIFFNESS,PAYLOAD',
+                        help='shares by which stiffness and payload may differ from the model, '
+                        'up and down (default: 0.1,0.1 with --max-residual)')
 
 
 @contextmanager
@@ -238,17 +247,38 @@ def _say_end(task: Task, name: str) -> str:
     return f'({", ".join(f"{value:.6g}" for value in values)}) {unit}'
 
 
-def _objectives(options: argparse.Namespace, task: Task) -> Objectives | None:
+def _objectives(options: argparse.Namespace, task: Task,
+                controller: JointController | None) -> Objectives | None:
     """Return the objectives that are given."""
     given: dict[str, Any] = {
         name: numbers(f'--{name.replace("_", "-")}', value, finite=False)
         for name in ('max_joint_speeds', 'max_torque_shares', 'max_modal_rates')
         if (value := getattr(options, name, None)) is not None}
-    if not given:
+    robustness = _robustness(options, controller)
+    if not given and robustness is None:
         return None
-    objectives = Objectives(**given)
+    objectives = Objectives(**given, robustness=robustness)
     objectives.check(task)
     return objectives
+
+
+def _robustness(options: argparse.Namespace,
+                controller: JointController | None) -> Robustness | None:
+    """Return which errors of the model the motion must forgive, None if none are given."""
+    limit, text = (getattr(options, name, None) for name in ('max_residual', 'robust'))
+    if limit is None:
+        if text is not None:
+            raise InvalidTaskError('--robust is given without --max-residual, which says how much '
+                                   'vibration may be left')
+        return None
+    stiffness, payload = (0.1, 0.1) if text is None else numbers('--robust', text, 2)
+    try:
+        return Robustness(max_residual=limit, stiffness_error=float(stiffness),
+                          payload_error=float(payload), controller=controller)
+    except InvalidValueError as error:
+        if error.field == 'max_residual':
+            raise
+        raise type(error)(f'--robust, {error.field}', error.value, error.bound) from None
 
 
 def _weights(options: argparse.Namespace, arm: Arm) -> dict[str, Any]:

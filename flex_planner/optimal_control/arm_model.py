@@ -177,6 +177,14 @@ class ArmModel(ArmDynamics):
             content_key(key, 'barrier', 'caps' if has_caps(self.arm) else ''),
             partial(_build_barrier, self.arm), monitor)
 
+    def offset_optimality(self, z: Array, offset: Array, p: Array) -> Array:
+        """Return z' with effort measured from offsets (k, n), shape (k, 4 n_t)."""
+        return self.offset_function('offset_optimality')(z, offset, p)[0]
+
+    def offset_controls(self, z: Array, offset: Array, p: Array) -> Controls:
+        """Return `controls` with effort measured from offsets (k, n): in H, not in L."""
+        return Controls.of(self.offset_function('offset_control')(z, offset, p))
+
     def payload_sensitivity(self, z: Array, p: Array) -> tuple[Array, Array, Array]:
         """Return dz'/dm_p (k, 4 n_t), dH/dm_p and d2H/dm_p2 (k,)."""
         rate, share, bend = self._load_optimality('payload_sensitivity')(z, p)

@@ -98,7 +98,7 @@ class OffsetProblem(MotionProblem):
 
     def rate(self, t: Array, z: Array) -> Array:
         """Return z'."""
-        return self.model.offset_function('offset_optimality')(z, self.offset(t), self.p)[0]
+        return self.model.offset_optimality(z, self.offset(t), self.p)
 
     def rate_jacobian(self, t: Array, z: Array) -> tuple[Array, Array]:
         """Return z' and its Jacobian."""
@@ -108,8 +108,7 @@ class OffsetProblem(MotionProblem):
 
     def controls(self, t: Array, z: Array) -> Controls:
         """Return torque, cost without the offset, and H with it."""
-        return Controls.of(self.model.offset_function('offset_control')(z, self.offset(t),
-                                                                        self.p))
+        return self.model.offset_controls(z, self.offset(t), self.p)
 
     def hamiltonian_rate(self, t: Array, z: Array) -> Array:
         """Return dH/dt, which the offset makes: -w'^T R u, shape (k,)."""

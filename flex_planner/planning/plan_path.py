@@ -129,7 +129,7 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
         proof = find_proof(problem, thorough=True)
         return plan if proof is None else replace(
             plan, status=PlanStatus.INFEASIBLE, message=str(proof))
-    return _keep(plan, solver, objectives, effort)
+    return _forgive(_keep(plan, solver, objectives, effort), objectives, solver)
 
 
 def _known_times(task: Task,
@@ -149,11 +149,9 @@ def _forgive(plan: Plan, objectives: Objectives | None, solver: Solver) -> Plan:
     if objectives is None or objectives.robustness is None or not plan.certified:
         return plan
     if isinstance(plan.problem, ConstrainedMotion):
-        reason = ('its limits on the way bend this motion, and motions that forgive errors of '
-                  'the model are not looked for within them')
-        return plan if not plan.solved else replace(
-            plan, status=PlanStatus.OBJECTIVE_NOT_MET,
-            message=f'{PlanStatus.OBJECTIVE_NOT_MET.value}; {reason}')
+        return replace(plan, status=PlanStatus.OBJECTIVE_NOT_MET, message=(
+            f'{PlanStatus.OBJECTIVE_NOT_MET.value}; max_residual is given, but limits on the way '
+            'bend the motion, and such a motion cannot be made to forgive errors of the model'))
     return make_robust(plan, objectives, solver)
 
 
@@ -198,9 +196,9 @@ def _keep(plan: Plan, solver: Solver, objectives: Objectives | None,
     if objectives is not None and plan.certified:
         plan = adapt_weights(plan, objectives, solver)
     within = keep_limits(plan, solver, effort)
-    if within is not plan and objectives is not None:
-        within = check_objectives(within, plan.objectives, objectives)
-    return _forgive(within, objectives, solver)
+    if within is plan or objectives is None:
+        return within
+    return check_objectives(within, plan.objectives, objectives)
 
 
 def _plan_again(problem: MotionProblem, solver: Solver,

@@ -140,7 +140,7 @@ def warning_rows(warnings: Sequence[PlanWarning]) -> list[Row]:
 def objective_rows(plan: Plan) -> list[Row]:
     """Return the weights that meet the objectives of a plan; empty if it has none."""
     search = plan.objectives
-    if search is None:
+    if search is None or not search.objectives.limited(plan.arm):
         return []
     if not search.trials:
         return [('objectives', 'met with the weights of the task')]

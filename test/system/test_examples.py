@@ -25,6 +25,7 @@ EXPECTED = {
     'call_the_node.py': ('service: J = 0.6', 'action: canceled'),
     'controller.py': ('followed: at most 0.',),
     'find_the_payload.py': ('between 5.85', 'dJ/dm_p'),
+    'forgiving_plans.py': ('least effort: 3.1', 'forgiving:    1.6'),
     'keep_a_speed.py': ('w_2 = 4.2', 'an objective cannot be met'),
     'map_the_payload.py': ('49 solved', '5.85    6.18', 'from the map: '),
     'minimum_time.py': ('shortest time with 1 kg: 0.642', 'in 1.00 s: 5.85'),

@@ -39,6 +39,8 @@ class DifferingArms:
     ----------
     controller : JointController
         Of all of them.
+    nominal : Execution
+        By the arm of the model.
     weighed, looked_at : numpy.ndarray, shape (k, 2)
         Errors of stiffness and payload of those that are weighed, and of those that the result is
         judged by.
@@ -49,20 +51,20 @@ class DifferingArms:
                  dynamics: ArmDynamics | None = None) -> None:
         self.controller = robustness.controller or JointController(
             gains=default_gains(plan.model))
-        self._nominal = Execution.of(plan, self.controller)
-        self._dynamics = dynamics or self._nominal.dynamics
+        self.nominal = Execution.of(plan, self.controller)
+        self._dynamics = dynamics or self.nominal.dynamics
         self._goal = plan.problem.goal[:plan.arm.n_joints]
         self._hold = plan.problem.holding_torque
-        self.weighed = weighed_errors(robustness, self._nominal)
-        self.looked_at = weighed_errors(robustness, self._nominal, finely=True)
+        self.weighed = weighed_errors(robustness, self.nominal)
+        self.looked_at = weighed_errors(robustness, self.nominal, finely=True)
         self._arms = dict[Errors, tuple[Execution, Ringing] | None]()
 
     def arm(self, errors: Errors) -> tuple[Execution, Ringing] | None:
         """Return an arm and how it rings at the goal; None if it buckles."""
         if errors not in self._arms:
-            parameters = differing_parameters(self._nominal.parameters, *errors)
+            parameters = differing_parameters(self.nominal.parameters, *errors)
             try:
-                execution = other_execution(self._nominal, self._dynamics, parameters)
+                execution = other_execution(self.nominal, self._dynamics, parameters)
                 self._arms[errors] = execution, Ringing.of(execution, self._goal, self._hold)
             except NoEquilibriumError:
                 self._arms[errors] = None

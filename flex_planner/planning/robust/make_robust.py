@@ -13,7 +13,8 @@ from dataclasses import replace
 
 from flex_planner.base.progress import StoppedError
 from flex_planner.collocation import Solver
-from flex_planner.planning.execution import describe_controller
+from flex_planner.control.feedback_stability import feedback_growth
+from flex_planner.planning.execution import describe_controller, unstable_feedback, UNSTABLE_GROWTH
 from flex_planner.planning.objectives import Objectives, ObjectiveSearch
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_problem import STOP_STATUS
@@ -30,6 +31,8 @@ _AIM = 0.98
 # by which share of it effort may grow in one trial: further off nothing is linear
 _GROWTH = 0.06
 _MOST_TRIALS, _MOST_FAILURES, _GAIN = 10, 3, 0.98
+# along the motion, at which the stability of the PD is looked at
+_POSTURES = 5
 # of the residual of the plain plan: above it a plan has hardly helped
 _HARDLY = 0.9
 
@@ -93,11 +96,15 @@ class _Search:
     def __init__(self, plan: Plan, robustness: Robustness, solver: Solver) -> None:
         self._robustness, self._solver = robustness, solver
         self._arms, self._trials = DifferingArms(plan, robustness), list[RobustTrial]()
+        postures = plan.uniform_samples(_POSTURES).coordinates[:, :plan.arm.n_joints]
+        self._growth = feedback_growth(self._arms.nominal.arm, postures)
         self._plain = self._best = WeighedPlan.plain(plan, self._arms, solver)
         self._note(self._best)
 
     def run(self) -> None:
         """Try until the arms forgive enough, those that are not weighed included."""
+        if self._growth > UNSTABLE_GROWTH:  # no motion would help
+            return
         for _ in range(_MOST_FAILURES):
             if self._best.residual > self._limit and not self._improve():
                 return
@@ -193,6 +200,8 @@ class _Search:
         sentence = (f'residual bending of the arms that differ from the model is {worst:.3g} m, '
                     f'but must be <= {limit:.3g} m')
         controller = describe_controller(self._arms.controller)
+        if self._growth > UNSTABLE_GROWTH:
+            return f'{sentence}; {unstable_feedback(self._arms.controller, self._growth)}'
         if not np.isfinite(worst):
             return f'{sentence}: under the controller ({controller}) an arm runs away'
         if self._best.residual > _HARDLY * plain:

@@ -72,7 +72,7 @@ class WeighedPlan:
 
     def solve(self, step: OffsetStep, weight: float, solver: Solver) -> WeighedPlan | None:
         """
-        Return the plan with another weight; None where that is not solved or certified.
+        Return the plan with another weight; None where it is not solved, or the arm may not do it.
 
         Raises
         ------
@@ -86,7 +86,7 @@ class WeighedPlan:
                                 offset)
         found = plan_problem(problem, solver, (warm_start(self.plan.solution, 'robust'),))
         solver.monitor.check()
-        if not found.certified:
+        if not found.certified or (self.plan.solved and not found.solved):
             return None
         return WeighedPlan(plan=found, offset=offset, weight=weight, arms=self.arms,
                            carried_out=CarriedOut(found, self.arms, solver.monitor))

@@ -27,6 +27,7 @@ from flex_planner.reports.recording.execution import (
     recorded_execution,
 )
 from flex_planner.reports.recording.findings import CheckLimits, Finding, MotionCheck
+from flex_planner.reports.recording.forgiveness import recorded_offset
 from flex_planner.reports.recording.optimality import optimality_findings
 import numpy as np
 
@@ -81,7 +82,7 @@ def check_motion(request: RecordedRequest, model: ArmModel | None = None,
         *optimality_findings(model, motion, parameters, limits, effort_delay(request),
                              efforts_settled(request, motion),
                              float(request.report.torque_interpolation_error),
-                             _given_via_times(request, motion))))
+                              _given_via_times(request, motion), recorded_offset(request))))
 
 
 def _states(execution: Execution, motion: RecordedMotion, monitor: Monitor | None) -> Array:

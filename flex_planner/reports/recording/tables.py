@@ -14,6 +14,7 @@ from flex_planner.reports.recording.arm_tables import arm_tables
 from flex_planner.reports.recording.contents import RecordedRequest
 from flex_planner.reports.recording.execution import recorded_execution, recorded_robustness
 from flex_planner.reports.recording.findings import MotionCheck
+from flex_planner.reports.recording.forgiveness import forgiveness_tables
 from flex_planner.reports.recording.frequencies import NaturalFrequencies
 from flex_planner.reports.recording.report_table import Cells, ReportTable
 import numpy as np
@@ -42,6 +43,7 @@ def tables(request: RecordedRequest, check: MotionCheck | None = None,
     found = [_task(request), _outcome(request), *_kinds(request), *_warnings(request.report)]
     if request.solved:
         found += [_certificate(request), *_execution(request)]
+    found += forgiveness_tables(request)
     if check is not None:
         found.append(check_table(check))
     if request.motion is not None:
