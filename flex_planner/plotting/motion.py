@@ -12,10 +12,18 @@ from flex_planner.arms.planar_only import require_planar
 from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.base.colours import ARM, ASIDE, CARRIED_OUT, coordinate_colour, PLANNED
 from flex_planner.base.validation import Array
+from flex_planner.optimal_control.path_constraints import limits_of_arm, PathConstraint
 from flex_planner.optimal_control.torque_limits import TorqueLimits
+from flex_planner.planning.constraint_margins import ConstraintMargin
 from flex_planner.planning.plan import Plan
 from flex_planner.plotting.curves import draw_columns, limits_beside, settle_limits
 from flex_planner.plotting.figures import explain_lines, finish, Picture, plain, say
+from flex_planner.plotting.limits import (
+    draw_angle_limits,
+    draw_keep_outs,
+    draw_speed_limits,
+    shade_active,
+)
 from flex_planner.plotting.spatial_motion import draw_path_in_space, label, position_scale
 from matplotlib.axes import Axes
 import numpy as np
@@ -50,6 +58,10 @@ class Motion:
         [m].
     joint_names : sequence of str
         For the legends; empty for numbers.
+    constraints : tuple of PathConstraint
+        Limits on the way, those of the arm included.
+    margins : tuple of ConstraintMargin
+        How near the motion comes to them.
 
     """
 
@@ -60,6 +72,8 @@ class Motion:
     torques: Array
     tip: Array
     joint_names: Sequence[str] = ()
+    constraints: tuple[PathConstraint, ...] = ()
+    margins: tuple[ConstraintMargin, ...] = ()
 
     @classmethod
     def of(cls, plan: Plan, joint_names: Sequence[str] = (), count: int = _SAMPLES) -> Motion:
@@ -67,7 +81,8 @@ class Motion:
         samples = plan.uniform_samples(count)
         return cls(arm=plan.arm, times=samples.times, coordinates=samples.coordinates,
                    rates=samples.rates, torques=samples.torques, tip=samples.tip,
-                   joint_names=joint_names)
+                   joint_names=joint_names, margins=plan.constraints,
+                   constraints=(*limits_of_arm(plan.arm), *plan.task.path_constraints))
 
     @property
     def names(self) -> list[str]:
@@ -145,6 +160,8 @@ def draw_angles(axes: Axes, motion: Motion, execution: Execution | None = None) 
     _draw_joints(axes, motion, scale * motion.coordinates[:, :n], execution,
                  scale * execution.positions if execution else None)
     settle_limits(axes, _LEAST_ANGLE)
+    draw_angle_limits(axes, motion.constraints, position_scale(motion.arm))
+    shade_active(axes, motion.margins)
     finish(axes, 'joint angles', label(motion.arm, 'angle [deg]', 'way [mm]'))
 
 
@@ -153,6 +170,8 @@ def draw_speeds(axes: Axes, motion: Motion, execution: Execution | None = None) 
     _draw_joints(axes, motion, motion.rates[:, :motion.arm.n_joints], execution,
                  execution.speeds if execution else None)
     settle_limits(axes, _LEAST_SPEED)
+    draw_speed_limits(axes, motion.constraints)
+    shade_active(axes, motion.margins)
     finish(axes, 'joint speeds', label(motion.arm, 'speed [rad/s]', '[m/s]'))
 
 
@@ -166,6 +185,7 @@ def draw_torques(axes: Axes, motion: Motion, execution: Execution | None = None)
     low, high = limits_beside(np.concatenate(shown), bounds, _LEAST_TORQUE)
     _draw_bounds(axes, motion, bounds, (low, high))
     axes.set_ylim(low, high)
+    shade_active(axes, motion.margins)
     axes.ticklabel_format(axis='y', useOffset=False)
     finish(axes, 'motor torques and their bounds',
            label(motion.arm, 'torque [N m]', 'force [N]'))
@@ -213,6 +233,7 @@ def draw_tip(axes: Axes, motion: Motion, execution: Execution | None = None) -> 
     """
     require_planar(motion.arm, 'diagrams of the plane')
     last = motion.times.size - 1
+    draw_keep_outs(axes, motion.constraints, motion.arm.reach)
     for k in np.linspace(0, last, _POSTURES).astype(int):
         points = link_points(motion.arm, motion.coordinates[k], _STATIONS).reshape(-1, 2)
         axes.plot(*points.T, color=ARM, linewidth=2.5 if k in (0, last) else 1)
@@ -235,6 +256,7 @@ def draw_modes(axes: Axes, motion: Motion) -> None:
                      [name.replace('_', ', ') for name in arm.passive_names],
                      [coordinate_colour(n + j) for j in range(arm.n_passive)])
         settle_limits(axes, _LEAST_BENDING)
+        shade_active(axes, motion.margins)
     else:
         say(axes, 'rigid links')
     twists = any('twist' in name for name in arm.passive_names)

@@ -20,10 +20,10 @@ def faulty_plan(task: Task, number: int, **options: Any) -> Plan:
     return plan_kind(task, number, **options)
 
 
-def faulty_markers(arm: Any, reference: SampledPlan, frame: str) -> Any:
+def faulty_markers(arm: Any, reference: SampledPlan, frame: str, *rest: Any) -> Any:
     if reference.times_ns[-1] > 1.5e9:
         raise KeyError('while publishing')
-    return motion_markers(arm, reference, frame)
+    return motion_markers(arm, reference, frame, *rest)
 
 
 if __name__ == '__main__':

@@ -33,6 +33,7 @@ EXPECTED = {
     'pass_via_points.py': ('passed at 0.5 s: J = 1.3222', 'passed when it is best: J = 0.9358'),
     'plan_again.py': ('the tip rests at (0.7000, -0.4000) m', 'from the first plan'),
     'plan_a_path.py': ('solved and certified by a cold start', 'J = 0.647'),
+    'post_in_the_way.py': ('post J = 0.8185', '0.45 N m J = 0.651', 'round the post: 5.60'),
     'replay_and_report.py': ('/flex_planner/motion_task', 'the check of the recording passed'),
     'your_own_urdf.py': ('link forearm was merged with gripper', 'solved and certified'),
     'your_own_arm.py': ('dampingratio', 'joints locked: 2.803', 'solved and certified'),

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import link_points
 from flex_planner.base.validation import Array
+from flex_planner.optimal_control.path_constraints import PathConstraint
+from flex_planner.planning.region_outlines import find_keep_outs, outline_region
 from flex_planner.planning.sampling import SampledPlan
 from geometry_msgs.msg import Point
 import numpy as np
@@ -17,12 +21,13 @@ _LONGEST_PATH = 500  # points
 _LINK, _PATH, _START, _GOAL = (0.2, 0.4, 0.8), (0.9, 0.5, 0.1), (0.2, 0.7, 0.2), (0.8, 0.2, 0.2)
 
 
-def motion_markers(arm: Arm, reference: SampledPlan, frame: str) -> MarkerArray:
+def motion_markers(arm: Arm, reference: SampledPlan, frame: str,
+                   constraints: Sequence[PathConstraint] = ()) -> MarkerArray:
     """
     Return the bent links at nine instants, the later the less transparent, and the tip's path.
 
-    Namespaces: ``links``, ``tip_path``, ``start`` and ``goal``. What a plan before has left is
-    deleted first.
+    Namespaces: ``links``, ``tip_path``, ``start``, ``goal`` and ``keep_out``. What a plan before
+    has left is deleted first.
 
     Parameters
     ----------
@@ -32,6 +37,8 @@ def motion_markers(arm: Arm, reference: SampledPlan, frame: str) -> MarkerArray:
         Samples of the plan.
     frame : str
         Of the base.
+    constraints : sequence of PathConstraint
+        Of the task: the outlines of regions that are kept free are shown.
 
     """
     times, tip, width = reference.times_ns, reference.samples.tip, _reach(arm) / 100
@@ -46,6 +53,8 @@ def motion_markers(arm: Arm, reference: SampledPlan, frame: str) -> MarkerArray:
     markers += [_line('tip_path', 0, tip[steps], (*_PATH, 1.0), width / 2),
                 _ball('start', tip[0], (*_START, 1.0), 3 * width),
                 _ball('goal', tip[-1], (*_GOAL, 1.0), 3 * width)]
+    markers += [_line('keep_out', i, outline_region(one.region, _reach(arm)), (*_GOAL, 1.0),
+                      width) for i, one in enumerate(find_keep_outs(constraints))]
     for marker in markers:
         marker.header.frame_id = frame
     return MarkerArray(markers=markers)

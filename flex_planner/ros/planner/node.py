@@ -191,7 +191,8 @@ class PlannerNode(Node):  # type: ignore[misc]
         plan, reference = outcome.plan, outcome.reference
         if plan is None or reference is None:
             return
-        markers = motion_markers(plan.arm, reference, settings.base_frame)
+        markers = motion_markers(plan.arm, reference, settings.base_frame,
+                                 plan.task.path_constraints)
         self._joints.publish(outcome.trajectory.joint_trajectory)
         self._flexible.publish(outcome.trajectory)
         self._markers.publish(markers)
