@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from flex_planner.arms.joint_units import units_of
 from flex_planner.arms.kinematics import link_deflections
 from flex_planner.base.errors import InvalidTaskError, NoEquilibriumError
 from flex_planner.base.validation import Array
@@ -55,9 +56,12 @@ def equilibrium(dynamics: ArmDynamics, positions: Array,
             if np.linalg.eigvalsh(stiffness[0, n:, n:])[0] <= 0:
                 break  # balanced, but it would buckle
             return q, dynamics.static_forces(q[None], p)[0][0, :n]
-    degrees = ', '.join(f'{angle:.4g}' for angle in np.degrees(positions))
+    units = [units_of(joint) for joint in dynamics.arm.joints]
+    shown = ', '.join(f'{unit.scale * value:.4g}'
+                      for unit, value in zip(units, positions, strict=True))
+    unit = ', '.join(dict.fromkeys(unit.position for unit in units))
     raise NoEquilibriumError('no static equilibrium was found at joint angles '
-                             f'({degrees}) deg: the links are too soft for their load')
+                             f'({shown}) {unit}: the links are too soft for their load')
 
 
 def natural_modes(dynamics: ArmDynamics, coordinates: Array, parameters: PhysicalParameters, *,
