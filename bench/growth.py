@@ -92,7 +92,7 @@ def shares(payload: float = 1.0, repeats: int = 15) -> dict[str, float]:
     problem = paper_problem(payload)
     result = cold_start(problem, Solver()).result
     solution = result.solution.on_mesh(result.solution.mesh, SolverSettings().rule)
-    _, mean = linearise(problem, solution, Monitor())
+    _, mean, _ = linearise(problem, solution, Monitor())
     system = factorise(problem, solution, mean)
     residual = collocation_residual(problem, solution)
     parts: dict[str, Callable[[], object]] = {

@@ -66,8 +66,8 @@ def _wholes(identifier: str) -> tuple[str, str]:
 def failed_compilations_are_forgotten() -> Iterator[None]:
     """Let what one test could not compile be compiled by the next; what is there is read again."""
     yield
-    for load in (core._load_core, compiled_integration._load):
-        load.cache_clear()
+    core.LOADED.clear()
+    compiled_integration._load.cache_clear()
 
 
 @pytest.fixture(scope='session')

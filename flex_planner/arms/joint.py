@@ -36,7 +36,7 @@ class Motor:
         > 0 [N m]; infinite for none, which is what eq. (15) says. By default `stall_torque`.
     max_speed : float
         Largest speed of the joint in either direction, of a gear or a bearing for example, > 0
-        [rad/s]; infinite for none. It is checked in every plan, but does not bend the motion.
+        [rad/s]; infinite for none. Plans keep it at every moment.
     gear_ratio : float
         Turns of the rotor for one of the joint, > 0. Torques and speeds are after the gear.
     rotor_inertia : float

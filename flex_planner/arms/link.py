@@ -84,6 +84,8 @@ class Link:
         the sections.
     family_assumed : bool
         Whether nobody said which family the modes are of.
+    allowable_moment : float
+        Largest bending moment of a link with modes on the way, > 0 [N m]; infinite for no limit.
 
     Raises
     ------
@@ -104,6 +106,7 @@ class Link:
     center_of_mass: tuple[float, float] | None = None
     inertia: float | None = None
     family_assumed: bool = False
+    allowable_moment: float = math.inf
 
     def __post_init__(self) -> None:
         check_quantity('length', self.length, 'length', above=0)
@@ -114,6 +117,10 @@ class Link:
         if self.mode_family not in list(FAMILIES):
             raise InvalidValueError('mode_family', self.mode_family,
                                     one_of(self.mode_family, FAMILIES))
+        number('allowable_moment', self.allowable_moment, above=0, infinite=True, unit='N m')
+        if not self.modes and math.isfinite(self.allowable_moment):
+            raise InvalidValueError('allowable_moment', self.allowable_moment, 'left out for a '
+                                    'link without modes, whose bending nothing tells')
         self._check_load()
         self._check_damping()
         self._check_sections()
@@ -241,7 +248,8 @@ class Link:
         given = self.damping_ratio
         if isinstance(given, tuple):
             given = (given + given[-1:] * count)[:count] or 0.0
-        return replace(self, modes=count, damping_ratio=given)
+        allowed = self.allowable_moment if count else math.inf
+        return replace(self, modes=count, damping_ratio=given, allowable_moment=allowed)
 
     def with_more_modes(self, more: int) -> Link:
         """Return the same link with so many modes more, or as many as there can be."""

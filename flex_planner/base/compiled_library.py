@@ -24,6 +24,7 @@ from flex_planner.base.library_cache import (
     warn_once,
 )
 from flex_planner.base.paths import PathError
+from flex_planner.base.progress import Monitor
 
 Loaded = TypeVar('Loaded')
 
@@ -59,7 +60,8 @@ def find_library(key: str, load: Callable[[Path, dict[str, Any]], Loaded]) -> Lo
 
 
 def build_library(key: str, source: str, load: Callable[[Path], Loaded], *,
-                  record: Mapping[str, Any], options: tuple[str, ...] = ()) -> Loaded:
+                  record: Mapping[str, Any], options: tuple[str, ...] = (),
+                  monitor: Monitor | None = None) -> Loaded:
     """
     Compile, load and keep a library: in a temporary folder if the cache folder is of no use.
 
@@ -75,18 +77,22 @@ def build_library(key: str, source: str, load: Callable[[Path], Loaded], *,
         What is to be known of its functions when it is found again.
     options : tuple of str
         Of the compiler.
+    monitor : Monitor, optional
+        May stop the compiler.
 
     Raises
     ------
     CompilerError
         If it works in neither folder.
+    StoppedError
+        If the monitor stopped it.
 
     """
     compiler, reason = find_compiler(), ''
     for folder in build_folders():
         try:
             with scratch_folder(folder) as scratch:
-                library = compile_library(compiler, source, Path(scratch), options)
+                library = compile_library(compiler, source, Path(scratch), options, monitor)
                 # loaded before it is kept: then nobody can remove it in between
                 loaded = load(library)
                 _keep(key, library, dict(record), reason)

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 import os
 from pathlib import Path
 import shlex
 import shutil
+import signal
 import subprocess
 
 from flex_planner.base.errors import FlexPlannerError
+from flex_planner.base.progress import Monitor
 
 FLAGS = ('-march=native', '-fPIC', '-shared')
 _SHOWN = 300  # characters of what a compiler says
+_OFTEN = 0.01  # [s], between two looks at who watches it
 
 
 class CompilerError(FlexPlannerError):
@@ -35,7 +39,7 @@ def find_compiler() -> list[str]:
 
 
 def compile_library(compiler: list[str], source: str, folder: Path,
-                    options: tuple[str, ...] = ()) -> Path:
+                    options: tuple[str, ...] = (), monitor: Monitor | None = None) -> Path:
     """
     Return the shared library that a compiler makes of C source in a folder.
 
@@ -49,9 +53,13 @@ def compile_library(compiler: list[str], source: str, folder: Path,
         Where it and the library are written.
     options : tuple of str
         Of the compiler, besides `FLAGS`.
+    monitor : Monitor, optional
+        Asked meanwhile; it may end the compiler.
 
     Raises
     ------
+    StoppedError
+        If the monitor stopped it.
     CompilerError
         If it fails, with what it says.
     OSError
@@ -61,17 +69,35 @@ def compile_library(compiler: list[str], source: str, folder: Path,
     code, library = folder / 'functions.c', folder / 'functions.so'
     code.write_text(source)
     try:
-        done = subprocess.run([*compiler, *FLAGS, *options, str(code), '-o', str(library), '-lm'],
-                              stdin=subprocess.DEVNULL, capture_output=True, text=True,
-                              errors='replace')
+        failed, errors = _run([*compiler, *FLAGS, *options, str(code), '-o', str(library), '-lm'],
+                              monitor or Monitor())
     except OSError as error:
         raise CompilerError(f'{compiler[0]} cannot be run: {error.strerror or error}') from None
-    if done.returncode or not library.is_file():
+    if failed or not library.is_file():
         # without the folder, which has another name each time
-        said = ' '.join(done.stderr.replace(f'{folder}/', '').split())[:_SHOWN]
-        said = said or f'exit code {done.returncode}'
+        said = ' '.join(errors.replace(f'{folder}/', '').split())[:_SHOWN]
+        said = said or f'exit code {failed}'
         raise CompilerError(f'{compiler[0]} failed: {said}')
     return library
+
+
+def _run(command: list[str], monitor: Monitor) -> tuple[int, str]:
+    """Return the exit code of a compiler and what it says; it ends early with all its parts."""
+    process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                               stderr=subprocess.PIPE, text=True, errors='replace',
+                               start_new_session=True)
+    with process:
+        try:
+            while True:
+                with suppress(subprocess.TimeoutExpired):
+                    errors = process.communicate(timeout=_OFTEN)[1]
+                    return process.returncode, errors
+                monitor.check()
+        except BaseException:
+            # asked to, it removes its files; there is nobody to ask once it has ended
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGTERM)
+            raise
 
 
 def _words(command: str) -> list[str]:

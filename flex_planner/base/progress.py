@@ -103,6 +103,11 @@ class Monitor:
         if reason is not None:
             raise StoppedError(reason)
 
+    def announce(self, phase: str) -> None:
+        """Report that something begins which has no iterations; the phase goes on after it."""
+        self.report(Progress(phase=phase, iteration=self.iteration, residual=math.inf,
+                             intervals=0, payload=self.payload))
+
     def step(self, residual: float, intervals: int) -> None:
         """Count and report an iteration."""
         self.iteration += 1

@@ -122,7 +122,7 @@ def extrapolate_extremal(parameter: FreeParameter, problem: MotionProblem,
         Of the extremal.
 
     """
-    if neighbours.extremals is None:
+    if neighbours.extremals is None or problem.junctions.size:
         return None
     (before, here), ratio = neighbours.extremals, neighbours.ratio
     if not before.result.solution.nodes.shape[1] == here.problem.size == problem.size:

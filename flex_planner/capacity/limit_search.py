@@ -97,6 +97,11 @@ class LimitSearch:
         self.extrapolated = self.warm = False
 
     @property
+    def solver(self) -> Solver:
+        """Return the solver."""
+        return self._solver
+
+    @property
     def weighted(self) -> bool:
         """Return whether the task has weights besides those of effort."""
         return has_weights(self._problem)
@@ -254,6 +259,8 @@ class LimitSearch:
 
     def _find_kinds(self, bare: MotionProblem) -> tuple[MotionProblem, list[KindOfMotion]]:
         """Note all kinds of motion; return those of the best way round to the goal."""
+        if bare.junctions.size:  # paths are looked for without via points
+            return bare, []
         unknown, solver = self._parameter.unknown, self._solver
         ways = other_windings(bare) if self._effort.explores else []
         self.starts = self._effort.starts + _OTHER_WAY * len(ways)

@@ -26,6 +26,7 @@ from flex_planner.collocation import Solver
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
 from flex_planner.optimal_control.task import MAX_PAYLOAD, Task
+from flex_planner.optimal_control.via_points import free_times
 from flex_planner.planning.kinds.effort import SearchEffort
 from flex_planner.planning.plan import PlanStatus
 from flex_planner.planning.proofs import (
@@ -89,7 +90,8 @@ def find_max_payload(task: Task, *, model: ArmModel | None = None, solver: Solve
     ------
     InvalidTaskError
         If no motor has a limit, if the goal is the start, if the duration is free or absurdly
-        short, or if the arm need not come to rest at the goal.
+        short, if the arm need not come to rest at the goal, if a via point has no time, or if the
+        incremental method is to keep limits on the way.
     InvalidValueError
         If accuracy or step breaks its bound.
 
@@ -100,6 +102,10 @@ def find_max_payload(task: Task, *, model: ArmModel | None = None, solver: Solve
     effort = SearchEffort.of(search)
     helper_processes()  # what the environment says is refused before anything is solved
     _check(task)
+    if task.path_constraints and method is PayloadMethod.INCREMENTAL:
+        raise InvalidTaskError('path_constraints are given, but must be left out for the '
+                               'incremental method: it knows only motions that no limit on the '
+                               'way bends. The direct method keeps them')
     model = ArmModel.for_arm(task.arm, model)  # before a clock starts
     solver = (solver or Solver()).watched_by(monitor)
     began = solver.monitor.iteration, solver.monitor.elapsed
@@ -142,7 +148,10 @@ def _check(task: Task) -> None:
     if task.time_weight:
         raise InvalidTaskError(f'time_weight is {task.time_weight:g}, but must be 0: the largest '
                                'payload is that of a given duration')
-    if not task.arm.gravity.any() and stays(task):
+    if free_times(task.via_points):
+        raise InvalidTaskError('a via point has no time, but must have one: the largest payload '
+                               'is that of via points at given times')
+    if not (task.arm.gravity.any() or task.via_points) and stays(task):
         raise InvalidTaskError('goal_positions are start_positions: no payload is too large for '
                                'an arm that stays where it is')
     if not task.ends_at_rest:

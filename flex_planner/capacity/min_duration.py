@@ -19,6 +19,7 @@ from flex_planner.capacity.limit_search import LimitSearch
 from flex_planner.capacity.max_payload import find_max_payload, stays
 from flex_planner.capacity.results import describe_kinds, MaxPayload, MinDuration, say_lost_weights
 from flex_planner.capacity.rigid_search import search_as_rigid
+from flex_planner.capacity.within_limits import hurry_within_limits
 from flex_planner.collocation import Solver
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
@@ -66,7 +67,8 @@ def find_min_duration(task: Task, *, model: ArmModel | None = None,
     Raises
     ------
     InvalidTaskError
-        If a motor has no limit, or if the arm need not come to rest at the goal.
+        If a motor has no limit, if the arm need not come to rest at the goal, or if there are via
+        points.
     InvalidValueError
         If the accuracy breaks its bound.
 
@@ -77,6 +79,9 @@ def find_min_duration(task: Task, *, model: ArmModel | None = None,
     if not np.isfinite([joint.motor.standstill_torque for joint in task.arm.joints]).all():
         raise InvalidTaskError('a motor of the arm has no stall torque, so no duration is the '
                                'shortest')
+    if task.via_points:
+        raise InvalidTaskError('via_points must be empty: the shortest duration is that of a '
+                               'motion without via points')
     if not task.ends_at_rest:
         raise InvalidTaskError('the shortest duration is that of a motion which ends at rest')
     if stays(task):
@@ -100,7 +105,7 @@ def find_min_duration(task: Task, *, model: ArmModel | None = None,
         near=start_from)
     limits = LimitSearch(DURATION, problem, solver, accuracy, effort)
     try:
-        found = _search(task, limits, neighbours)
+        found = _search(task, limits, neighbours, accuracy)
     except StoppedError as error:
         found = _certified_so_far(limits, _result(task, limits, STOP_STATUS[error.reason],
                                                   str(error)))
@@ -112,7 +117,8 @@ def find_min_duration(task: Task, *, model: ArmModel | None = None,
                    planning_time=solver.monitor.elapsed - began[1])
 
 
-def _search(task: Task, search: LimitSearch, neighbours: Neighbours) -> MinDuration:
+def _search(task: Task, search: LimitSearch, neighbours: Neighbours,
+            accuracy: float) -> MinDuration:
     """Follow the price of time to the limit, then plan there."""
     point = None if neighbours.near is None else neighbours.near.restart_point
     failure = search.follow_price(None if point is None else SearchStart.of(point), neighbours)
@@ -122,6 +128,10 @@ def _search(task: Task, search: LimitSearch, neighbours: Neighbours) -> MinDurat
     lower = max(0.0, last.value - last.gap)
     found = replace(_result(task, search, plan.status, plan.message), plan=plan,
                     duration=last.value if plan.solved else np.inf, local_lower=lower)
+    if plan.status is PlanStatus.LIMIT_VIOLATED:
+        within = hurry_within_limits(task, search.solver, accuracy, found)
+        if within is not None:
+            return within
     if not plan.solved:
         return _certified_so_far(search, found)
     if not search.is_near:

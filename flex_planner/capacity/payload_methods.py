@@ -16,6 +16,7 @@ from flex_planner.capacity.extrapolation import Neighbours
 from flex_planner.capacity.limit_search import LimitSearch, plan_near
 from flex_planner.capacity.payload_outcome import describe, with_bound
 from flex_planner.capacity.results import MaxPayload, PayloadFront, PayloadMethod, say_lost_weights
+from flex_planner.capacity.within_limits import carry_within_limits
 from flex_planner.collocation import Solver
 from flex_planner.optimal_control.holding import holding_limit
 from flex_planner.optimal_control.motion_problem import MotionProblem
@@ -50,7 +51,7 @@ def search_directly(problem: MotionProblem, solver: Solver, accuracy: float,
             _hold_at_once(problem, solver) or _carry_the_most(problem, solver))
         if held is not None and not held.held:
             return with_bound(held, problem)
-        found = held or _follow(search, problem, solver, start)
+        found = held or _follow(search, problem, solver, start, accuracy)
     except StoppedError as error:
         found = _certified_so_far(search, _result(
             search, problem, STOP_STATUS[error.reason], str(error)))
@@ -61,7 +62,8 @@ def search_directly(problem: MotionProblem, solver: Solver, accuracy: float,
 
 
 def _follow(search: LimitSearch, problem: MotionProblem, solver: Solver,
-            start: MaxPayload | SearchStart | Neighbours | None) -> MaxPayload:
+            start: MaxPayload | SearchStart | Neighbours | None,
+            accuracy: float) -> MaxPayload:
     """Follow the price, plan at its end, and see whether the goal can be held with more."""
     neighbours = start if isinstance(start, Neighbours) else Neighbours()
     failure = search.follow_price(_start(start), neighbours)
@@ -73,6 +75,10 @@ def _follow(search: LimitSearch, problem: MotionProblem, solver: Solver,
     found = replace(_result(search, problem, plan.status, plan.message), plan=plan,
                     payload=last.value if plan.solved else 0.0,
                     local_upper=last.value + last.gap)
+    if plan.status is PlanStatus.LIMIT_VIOLATED:
+        within = carry_within_limits(problem, solver, accuracy, found)
+        if within is not None:
+            return within
     held = None if near else _hold(problem, search, found, solver)
     if held is not None or not plan.solved:
         return _certified_so_far(search, held or found)

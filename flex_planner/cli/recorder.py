@@ -30,6 +30,8 @@ from flex_planner.ros.messages.plans import (
     report_from_plan,
     report_trajectory,
 )
+from flex_planner.ros.messages.robustness import enter_robustness
+from flex_planner.ros.messages.via_points import fill_via_points
 from flex_planner.ros.planner.outcome import Outcome
 from flex_planner.ros.planner.recorder import OutcomeRecorder
 from flex_planner.ros.planner.request_state import RequestState
@@ -108,7 +110,10 @@ def task_message(request: Request) -> MotionTask:
         allow_large_bending=task.allow_large_bending, allowed_planning_time=request.time_limit)
     for name in OBJECTIVE_FIELDS if request.objectives else ():
         setattr(message, name, getattr(request.objectives, name).tolist())
+    if request.objectives:
+        enter_robustness(message, request.objectives.robustness)
     _fill_start(message, task)
+    fill_via_points(message, task)
     if task.goal_point.size:
         message.goal_point = _point(task.goal_point)
         message.space = (MotionTask.CARTESIAN if task.start_point.size

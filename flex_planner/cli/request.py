@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+import re
 from typing import Any
 
 from flex_planner.arms.arm import Arm
@@ -17,7 +18,7 @@ from flex_planner.base.errors import (
     SingularError,
     UnreachableError,
 )
-from flex_planner.base.sentences import say_reason
+from flex_planner.base.sentences import count_of, say_reason
 from flex_planner.base.validation import Array, number
 from flex_planner.capacity.results import MaxPayload
 from flex_planner.cli.controller_options import sampling_settings
@@ -28,11 +29,14 @@ from flex_planner.cli.options import (
     numbers,
     positions,
 )
+from flex_planner.cli.via_options import add_via_points, via_points
+from flex_planner.control.joint_controller import JointController
 from flex_planner.optimal_control.ends_at_points import ends_at_points
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.objectives import Objectives
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.point_times import MAX_SAMPLES
+from flex_planner.planning.robust.objective import Robustness
 from flex_planner.planning.sampling import SamplingSettings
 import numpy as np
 
@@ -88,10 +92,11 @@ class Request:
                 arm=arm, **_ends(options, arm), **_start(options, arm), duration=options.duration,
                 payload_mass=options.payload_mass, payload_inertia=options.payload_inertia,
                 tolerance=options.tolerance, allow_large_bending=options.allow_large_bending,
-                **_weights(options, arm))
-            objectives = _objectives(options, task)
+                via_points=via_points(options.via_points, arm), **_weights(options, arm))
+            sampled = sampling_settings(options, arm)
+            objectives = _objectives(options, task, sampled.controller)
         return cls(task=task, elbow=options.elbow, time_limit=limit,
-                   objectives=objectives, sampled=sampling_settings(options, arm))
+                   objectives=objectives, sampled=sampled)
 
     @property
     def sampling(self) -> SamplingSettings:
@@ -102,7 +107,9 @@ class Request:
     def __str__(self) -> str:
         """Return the motion in words."""
         ends = ' to '.join(_say_end(self.task, name) for name in ('start', 'goal'))
-        return f'{ends} in {self.task.duration:g} s'
+        count = len(self.task.via_points)
+        via = f' by {count_of(count, "via point")}' if count else ''
+        return f'{ends}{via} in {self.task.duration:g} s'
 
 
 def say_failure(outcome: Plan | MaxPayload, time_limit: float) -> str:
@@ -126,6 +133,7 @@ def add_task(parser: argparse.ArgumentParser, payload: str) -> None:
         help='joint angles at the start, instead of a point')
     add('--to-angles', dest='goal_positions', metavar='DEG,DEG,...',
         help='joint angles at the goal')
+    add_via_points(parser)
     add('--start-velocities', metavar='V,V,...',
         help='velocities at the start, one per joint [rad/s] or one per coordinate, modes too '
         '[m/s] (default: zeros)')
@@ -161,6 +169,12 @@ def add_objectives(parser: argparse.ArgumentParser) -> None:
             ('modal-rates', 'M/S', 'modal rates, kept by velocity weights')):
         parser.add_argument(f'--max-{name}', metavar=f'{unit},{unit},...',
                             help=f'limits of the {what} that are searched for; inf for no limit')
+    parser.add_argument('--max-residual', type=number_argument, metavar='M',
+                        help='largest residual bending, peak to peak in the second after the '
+                        'arrival, of arms that differ from the model as --robust says [m]')
+    parser.add_argument('--robust', metavar='STIFFNESS,PAYLOAD',
+                        help='shares by which stiffness and payload may differ from the model, '
+                        'up and down (default: 0.1,0.1 with --max-residual)')
 
 
 @contextmanager
@@ -172,17 +186,29 @@ def translate_errors() -> Iterator[None]:
         raise type(error)(_option(error.field), error.value, error.bound) from None
     except (UnreachableError, SingularError) as error:
         name, _, reason = str(error).partition(': ')
-        raise type(error)(f'{_POINTS.get(name, name)}: {reason}') from None
+        raise type(error)(f'{_POINTS.get(name, _via_option(name))}: {reason}') from None
 
 
 def _option(field: str) -> str:
     """Return the option that a field comes from."""
+    if field.startswith('via_points'):
+        return _via_option(field)
     name, bracket, index = field.partition('[')
     if name.startswith('--'):
         return field
     if name in _ANGLES:
         return f'{_ANGLES[name]}{bracket}{index} in radians'
     return _RENAMED.get(name, f'--{name.replace("_", "-")}') + bracket + index
+
+
+def _via_option(field: str) -> str:
+    """Return which of the options for via points a field comes from."""
+    found = re.fullmatch(r'via_points\[(\d+)\](?:\.(\w+))?(.*)', field)
+    if found is None:
+        return field.replace('via_points', '--via and --via-angles')
+    number, name, entry = int(found[1]) + 1, found[2] or '', found[3]
+    part = {'positions': f', angles{entry} in radians', 'time': ', its time'}.get(name, '')
+    return f'via point {number} of --via and --via-angles{part}'
 
 
 def _ends(options: argparse.Namespace, arm: Arm) -> dict[str, Any]:
@@ -221,17 +247,38 @@ def _say_end(task: Task, name: str) -> str:
     return f'({", ".join(f"{value:.6g}" for value in values)}) {unit}'
 
 
-def _objectives(options: argparse.Namespace, task: Task) -> Objectives | None:
+def _objectives(options: argparse.Namespace, task: Task,
+                controller: JointController | None) -> Objectives | None:
     """Return the objectives that are given."""
     given: dict[str, Any] = {
         name: numbers(f'--{name.replace("_", "-")}', value, finite=False)
         for name in ('max_joint_speeds', 'max_torque_shares', 'max_modal_rates')
         if (value := getattr(options, name, None)) is not None}
-    if not given:
+    robustness = _robustness(options, controller)
+    if not given and robustness is None:
         return None
-    objectives = Objectives(**given)
+    objectives = Objectives(**given, robustness=robustness)
     objectives.check(task)
     return objectives
+
+
+def _robustness(options: argparse.Namespace,
+                controller: JointController | None) -> Robustness | None:
+    """Return which errors of the model the motion must forgive, None if none are given."""
+    limit, text = (getattr(options, name, None) for name in ('max_residual', 'robust'))
+    if limit is None:
+        if text is not None:
+            raise InvalidTaskError('--robust is given without --max-residual, which says how much '
+                                   'vibration may be left')
+        return None
+    stiffness, payload = (0.1, 0.1) if text is None else numbers('--robust', text, 2)
+    try:
+        return Robustness(max_residual=limit, stiffness_error=float(stiffness),
+                          payload_error=float(payload), controller=controller)
+    except InvalidValueError as error:
+        if error.field == 'max_residual':
+            raise
+        raise type(error)(f'--robust, {error.field}', error.value, error.bound) from None
 
 
 def _weights(options: argparse.Namespace, arm: Arm) -> dict[str, Any]:

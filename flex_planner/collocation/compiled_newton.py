@@ -12,6 +12,7 @@ from flex_planner.collocation.compiled_system import CompiledSystem, FAILURES, s
 from flex_planner.collocation.core import (
     Core,
     core_problem,
+    CoreJunctions,
     CoreNewton,
     CoreSizes,
     load_core,
@@ -19,6 +20,7 @@ from flex_planner.collocation.core import (
     REPORT,
     STOP,
 )
+from flex_planner.collocation.junctions import empty_rows, join_at
 from flex_planner.collocation.newton_outcome import (
     CORRECTION_NOT_FINITE,
     KEPT,
@@ -50,7 +52,7 @@ def solve_compiled(problem: BoundaryValueProblem, guess: CollocationSolution, to
         return None
     left = problem.left(guess.nodes[0])[0].size
     core = load_core(CoreSizes(problem.size, left, problem.explicit.size, guess.rule.stages,
-                               int(exact)))
+                               int(exact)), monitor)
     if core is None:
         return None
     run = _CompiledRun(core, problem, rate, guess, left, exact=exact)
@@ -87,6 +89,23 @@ class _Calls:
             return _STOPPED
         return _SOLVED
 
+    def junction(self, index: int, nodes: int, gap: int, rows: int | None) -> int:
+        """Evaluate the rows of a junction."""
+        size = self._problem.size
+        before, after = _view(nodes, 2 * size).reshape(2, size).copy()
+        try:
+            residual, found = join_at(self._problem, index, before, after)
+        except SingularSystemError as error:
+            self.error = error
+            return _REFUSED
+        except BaseException as error:
+            self.error = error
+            return _STOPPED
+        _view(gap, size)[:] = residual
+        if rows:
+            _view(rows, 2 * size * size)[:] = found.ravel()
+        return _SOLVED
+
     def stop(self) -> int:
         """Ask the monitor whether to stop."""
         return self._guard(self._monitor.check)
@@ -118,6 +137,7 @@ class _CompiledRun:
         self._parts = (guess.steps, np.empty((*blocks, size, size)), np.empty((left, size)),
                        np.empty((size - left, size)), np.empty(size), problem.explicit)
         self._factors, self._rate = core.allocate(count), rate
+        self._junctions = empty_rows(problem, guess)
 
     def solve(self, tolerance: float, max_iterations: int, monitor: Monitor) -> NewtonOutcome:
         """Iterate until it ends."""
@@ -132,7 +152,9 @@ class _CompiledRun:
         arrays['explicit'], arrays['implicit'] = split_indices(scale.size, explicit)
         run = CoreNewton(
             count=guess.intervals, most_iterations=max_iterations, tolerance=tolerance, kept=KEPT,
-            smallest_step=SMALLEST_STEP, problem=core_problem(self._rate, calls.ends),
+            smallest_step=SMALLEST_STEP,
+            problem=core_problem(self._rate, calls.ends, calls.junction),
+            junctions=CoreJunctions.of(self._junctions.intervals, self._junctions.rows),
             stop=STOP(calls.stop), report=REPORT(calls.report),
             **{name: array.ctypes.data for name, array in arrays.items()})
         outcome = self._core.solve_newton(ctypes.byref(run))
@@ -153,7 +175,8 @@ class _CompiledRun:
         elif outcome == _NOT_CONVERGED:
             message = f'not converged after {max_iterations} iterations'
         solution = CollocationSolution(guess.mesh, self._nodes, self._stages, guess.rule)
-        system = (CompiledSystem(self._core, guess.rule, self._parts, self._factors)
+        system = (CompiledSystem(self._core, guess.rule, self._parts, self._factors,
+                                 self._junctions)
                   if run.factorised else None)
         return NewtonOutcome(solution, outcome == _SOLVED, run.norm, run.iterations, system,
                              stopped, message, bool(run.coarse))

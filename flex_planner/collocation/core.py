@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 from flex_planner.base.compiled_library import build_library, content_key, find_library
 from flex_planner.base.compiler import CompilerError
 from flex_planner.base.library_cache import warn_once
+from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
 from flex_planner.collocation.gauss import ComplexArray, GaussRule
 from flex_planner.collocation.problem import CompiledRate
@@ -34,8 +35,10 @@ _OPTIONS = ('-O3', '-fno-math-errno', '-fno-trapping-math', *_VECTORS)
 
 
 _address, _number, _real = ctypes.c_void_p, ctypes.c_longlong, ctypes.c_double
-# functions that core.c calls: the boundary rows, who may stop it, and who hears of an iteration
+# functions that core.c calls: the boundary rows, those of a junction, who may stop it, and who
+# hears of an iteration
 BOUNDARY_ROWS = ctypes.CFUNCTYPE(ctypes.c_int, *[_address] * 6)
+JUNCTION_ROWS = ctypes.CFUNCTYPE(ctypes.c_int, _number, *[_address] * 3)
 STOP = ctypes.CFUNCTYPE(ctypes.c_int)
 REPORT = ctypes.CFUNCTYPE(None, _real)
 MOST_INPUTS = 8
@@ -45,7 +48,24 @@ class CoreProblem(ctypes.Structure):
     """`struct problem` of core.c."""
 
     _fields_ = [('rate', _address), ('rate_jacobian', _address), ('ends', BOUNDARY_ROWS),
-                ('shared', _address * MOST_INPUTS)]
+                ('junction', JUNCTION_ROWS), ('shared', _address * MOST_INPUTS)]
+
+
+class CoreJunctions(ctypes.Structure):
+    """`struct junctions` of core.c."""
+
+    _fields_ = [('count', _number), ('intervals', _address), ('rows', _address)]
+
+    @classmethod
+    def of(cls, intervals: Any, rows: Array) -> CoreJunctions:
+        """Return intervals (J,) and rows (J, m, 2 m), which must live as long."""
+        return cls(count=intervals.size, intervals=intervals.ctypes.data, rows=rows.ctypes.data)
+
+
+class CoreWatch(ctypes.Structure):
+    """`struct watch` of core.c."""
+
+    _fields_ = [('stop', STOP), ('asked', _real)]
 
 
 class CoreNewton(ctypes.Structure):
@@ -58,7 +78,8 @@ class CoreNewton(ctypes.Structure):
         ('problem', CoreProblem), ('stop', STOP), ('report', REPORT), ('nodes', _address),
         ('stages', _address), ('factorisation', _address), ('jacobians', _address),
         ('left_rows', _address), ('right_rows', _address), ('scale', _address),
-        ('norm', _real), ('iterations', _number), ('factorised', _number), ('coarse', _number)]
+        ('junctions', CoreJunctions), ('norm', _real), ('iterations', _number),
+        ('factorised', _number), ('coarse', _number)]
 
 
 class CoreSizes(NamedTuple):
@@ -109,7 +130,8 @@ class Core:
         self.factorisation_size.argtypes = (_number,)
         self.factorisation_size.restype = _number
         self.factorise_system = functions.factorise_system
-        self.factorise_system.argtypes = (_address, _number, *[_address] * 9)
+        self.factorise_system.argtypes = (
+            _address, _number, *[_address] * 8, ctypes.POINTER(CoreJunctions), _address)
         self.correct = functions.correct
         self.correct.argtypes = (_address, _number, *[_address] * 6)
         self.evaluate = functions.evaluate
@@ -122,11 +144,22 @@ class Core:
         return np.empty(self.factorisation_size(intervals), dtype=np.uint8)
 
 
-def load_core(sizes: CoreSizes) -> Core | None:
-    """Return the core for a size of problem, None if NumPy is to do without."""
+# cores by their sizes; None where there is no compiler
+LOADED: dict[CoreSizes, Core | None] = {}
+
+
+def load_core(sizes: CoreSizes, monitor: Monitor | None = None) -> Core | None:
+    """
+    Return the core for a size of problem, None if NumPy is to do without.
+
+    A monitor may stop its compilation, by a StoppedError.
+
+    """
     if os.environ.get(CORE_VARIABLE) == 'numpy':
         return None
-    return _load_core(sizes)
+    if sizes not in LOADED:
+        LOADED[sizes] = _load_core(sizes, monitor)
+    return LOADED[sizes]
 
 
 def prepare_core(size: int, left: int, explicit: int, stages: int) -> None:
@@ -141,28 +174,32 @@ def read_source() -> str:
                   _SOURCE.read_text())
 
 
-@cache
-def _load_core(sizes: CoreSizes) -> Core | None:
+def _load_core(sizes: CoreSizes, monitor: Monitor | None) -> Core | None:
+    """Return the core from the disk, or built and kept."""
     source = read_source()
     key = content_key(source, *_OPTIONS, *sizes.definitions)
     core = find_library(key, lambda library, record: Core(library))
     if core is not None:
         return core
+    if monitor is not None:
+        monitor.announce(f'compiling the solver for {sizes.size} unknowns')
     try:
         return build_library(key, source, Core, record={},
-                             options=(*_OPTIONS, *sizes.definitions))
+                             options=(*_OPTIONS, *sizes.definitions), monitor=monitor)
     except CompilerError as error:
         warn_once(f'{error}: NumPy solves the equations of a motion, some three times slower')
     return None
 
 
-def core_problem(rate: CompiledRate, ends: Callable[..., int] | None = None) -> CoreProblem:
+def core_problem(rate: CompiledRate, ends: Callable[..., int] | None = None,
+                 junction: Callable[..., int] | None = None) -> CoreProblem:
     """Return a problem as core.c knows it."""
     shared = [array.ctypes.data for array in rate.shared]
     addresses = (ctypes.c_void_p * MOST_INPUTS)(*shared)
     rows = BOUNDARY_ROWS(ends) if ends else BOUNDARY_ROWS()
+    inner = JUNCTION_ROWS(junction) if junction else JUNCTION_ROWS()
     return CoreProblem(rate=rate.rate, rate_jacobian=rate.rate_jacobian, ends=rows,
-                       shared=addresses)
+                       junction=inner, shared=addresses)
 
 
 @cache

@@ -8,6 +8,7 @@ from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
 from flex_planner.collocation.compiled_system import factorise_system
 from flex_planner.collocation.core import core_problem, CoreSizes, load_core, pack_rule
+from flex_planner.collocation.junctions import evaluate_junctions, JunctionRows, NO_JUNCTIONS
 from flex_planner.collocation.linear import LinearSystem, Residual
 from flex_planner.collocation.problem import (
     BoundaryValueProblem,
@@ -31,12 +32,13 @@ def magnitudes(problem: BoundaryValueProblem, solution: CollocationSolution) -> 
 def collocation_residual(problem: BoundaryValueProblem,
                          solution: CollocationSolution) -> Residual:
     """Return the residual of the collocation equations at a point."""
-    compiled = _compiled_residual(problem, solution)
-    if compiled is not None:
-        return compiled
-    values = solution.stage_values().reshape(-1, problem.size)
-    rate = problem.rate(solution.stage_times().ravel(), values)
-    return _residual(problem, solution, rate.reshape(solution.stages.shape))
+    residual = _compiled_residual(problem, solution)
+    if residual is None:
+        values = solution.stage_values().reshape(-1, problem.size)
+        rate = problem.rate(solution.stage_times().ravel(), values)
+        residual = _residual(problem, solution, rate.reshape(solution.stages.shape))
+    evaluate_junctions(problem, solution, residual.steps)
+    return residual
 
 
 def _compiled_residual(problem: BoundaryValueProblem,
@@ -68,9 +70,9 @@ def _residual(problem: BoundaryValueProblem, solution: CollocationSolution,
 
 
 def linearise(problem: BoundaryValueProblem, solution: CollocationSolution, monitor: Monitor,
-              *, exact: bool = False) -> tuple[Residual, Array]:
+              *, exact: bool = False) -> tuple[Residual, Array, JunctionRows]:
     """
-    Return the residual and the mean of dF/dz over each interval, (N, m, m).
+    Return the residual, the mean of dF/dz over each interval, (N, m, m), and junctions.
 
     If exact, it is dF/dz at every stage, (N, s, m, m).
 
@@ -98,12 +100,15 @@ def linearise(problem: BoundaryValueProblem, solution: CollocationSolution, moni
         jacobians[part] = found.reshape(jacobians[part].shape)
     if not (np.isfinite(rate).all() and np.isfinite(jacobians).all()):
         raise SingularSystemError(RATE_NOT_FINITE)
-    return _residual(problem, solution, rate), jacobians
+    residual = _residual(problem, solution, rate)
+    return residual, jacobians, evaluate_junctions(problem, solution, residual.steps)
 
 
 def factorise(problem: BoundaryValueProblem, solution: CollocationSolution,
-              jacobians: Array) -> LinearSystem:
-    """Return the linear system at a point, given its Jacobians."""
+              jacobians: Array, junctions: JunctionRows = NO_JUNCTIONS,
+              monitor: Monitor | None = None) -> LinearSystem:
+    """Return the linear system at a point, given its Jacobians and junctions."""
     return factorise_system(
         solution.rule, solution.steps, jacobians, problem.left(solution.nodes[0])[1],
-        problem.right(solution.nodes[-1])[1], magnitudes(problem, solution), problem.explicit)
+        problem.right(solution.nodes[-1])[1], magnitudes(problem, solution), problem.explicit,
+        junctions, monitor)

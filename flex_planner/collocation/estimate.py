@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
 from flex_planner.collocation.equations import collocation_residual, magnitudes
 from flex_planner.collocation.gauss import GaussRule
@@ -42,7 +43,7 @@ class Estimate:
 
 
 def estimate_error(problem: BoundaryValueProblem, solution: CollocationSolution,
-                   system: LinearSystem) -> Estimate:
+                   system: LinearSystem, monitor: Monitor | None = None) -> Estimate:
     """
     Compare with the Gauss rule of one stage more, by a few corrections towards it.
 
@@ -54,6 +55,13 @@ def estimate_error(problem: BoundaryValueProblem, solution: CollocationSolution,
         Of s stages; Newton's method has converged.
     system : LinearSystem
         Its linear system, or that of a point near it.
+    monitor : Monitor, optional
+        May stop it.
+
+    Raises
+    ------
+    StoppedError
+        If the monitor stopped it.
 
     """
     rule = GaussRule.of(solution.rule.stages + 1)
@@ -62,7 +70,7 @@ def estimate_error(problem: BoundaryValueProblem, solution: CollocationSolution,
     unknown = Estimate(np.full(problem.size, np.inf), solution)
     size = magnitudes(problem, solution)
     try:
-        finer = system.with_rule(rule)
+        finer = system.with_rule(rule, monitor)
         for _ in range(_CORRECTIONS):
             nodes, stages = finer.correction(collocation_residual(problem, better))
             better = CollocationSolution(solution.mesh, better.nodes + nodes,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from flex_planner.collocation.junctions import double_nodes
 from flex_planner.collocation.mesh import coarsen
 from flex_planner.collocation.problem import BoundaryValueProblem
 from flex_planner.collocation.result import CollocationResult, INTERRUPTED
@@ -65,4 +66,5 @@ def _refine_mesh(point: CollocationSolution, most: int) -> CollocationSolution:
     before = point.intervals
     count = min(int(_FINER * before), max(most, before))
     places = np.linspace(0, before, count + 1)
-    return point.on_mesh(np.interp(places, np.arange(before + 1), point.mesh))
+    mesh = np.interp(places, np.arange(before + 1), point.mesh)
+    return point.on_mesh(double_nodes(mesh, point.junctions))

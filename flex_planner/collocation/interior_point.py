@@ -18,6 +18,7 @@ from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
 from flex_planner.collocation.compiled_system import factorise_system
 from flex_planner.collocation.equations import CHUNK
+from flex_planner.collocation.junctions import evaluate_junctions
 from flex_planner.collocation.linear import Residual
 from flex_planner.collocation.problem import Indices, RATE_NOT_FINITE, SingularSystemError
 from flex_planner.collocation.solution import CollocationSolution
@@ -189,18 +190,19 @@ def _find_step(problem: BarrierProblem, at: BarrierOutcome, monitor: Monitor) ->
     (left, left_rows), (right, right_rows) = (
         problem.left(solution.nodes[0]), problem.right(solution.nodes[-1]))
     scale = np.maximum(np.abs(solution.nodes).max(axis=0), problem.scale(at.mu))
-    system = factorise_system(solution.rule, solution.steps,
-                              jacobians.reshape(count, stages, size, size), left_rows, right_rows,
-                              scale, problem.explicit)
     gaps = np.diff(solution.nodes, axis=0) - solution.steps[:, None] * (
         solution.rule.weights @ solution.stages)
+    junctions = evaluate_junctions(problem, solution, gaps)
+    system = factorise_system(solution.rule, solution.steps,
+                              jacobians.reshape(count, stages, size, size), left_rows, right_rows,
+                              scale, problem.explicit, junctions, monitor)
     nodes, rates = system.correction(Residual(
         solution.stages - rate.reshape(solution.stages.shape), gaps, left, right))
     norm = float(np.sqrt(np.mean((nodes / scale) ** 2)))
     if not np.isfinite(norm):
         raise SingularSystemError(RATE_NOT_FINITE)
     dz = nodes[:-1, None] + solution.steps[:, None, None] * (solution.rule.matrix @ rates)
-    dy = problem.find_step(z, y, dz.reshape(-1, size), at.mu).reshape(at.y.shape)
+    dy = _find_steps(problem, z, y, dz.reshape(-1, size), at.mu, monitor).reshape(at.y.shape)
     return _Step(nodes, rates, dy, norm)
 
 
@@ -213,9 +215,21 @@ def _condense(problem: BarrierProblem, z: Array, y: Array, mu: float,
         monitor.check()
         part = slice(first, first + chunk)
         rate[part], jacobians[part] = problem.condense(z[part], y[part], mu)
-    if not (np.isfinite(rate).all() and np.isfinite(jacobians).all()):
-        raise SingularSystemError(RATE_NOT_FINITE)
+        if not (np.isfinite(rate[part]).all() and np.isfinite(jacobians[part]).all()):
+            raise SingularSystemError(RATE_NOT_FINITE)
     return rate, jacobians
+
+
+def _find_steps(problem: BarrierProblem, z: Array, y: Array, dz: Array, mu: float,
+                monitor: Monitor) -> Array:
+    """Return the steps of y; the monitor is asked now and then."""
+    steps = np.empty_like(y)
+    chunk = max(1, CHUNK // problem.size**2)
+    for first in range(0, len(z), chunk):
+        monitor.check()
+        part = slice(first, first + chunk)
+        steps[part] = problem.find_step(z[part], y[part], dz[part], mu)
+    return steps
 
 
 def _advance(problem: BarrierProblem, at: BarrierOutcome, step: _Step,

@@ -15,10 +15,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
 from flex_planner.collocation.banded import BandedFactors
 from flex_planner.collocation.exact_stages import ExactStages
 from flex_planner.collocation.gauss import GaussRule
+from flex_planner.collocation.junctions import JunctionRows, NO_JUNCTIONS
 from flex_planner.collocation.mean_stages import MeanStages
 from flex_planner.collocation.problem import Indices, SingularSystemError
 import numpy as np
@@ -37,7 +39,7 @@ class Residual:
     stages : numpy.ndarray, shape (N, s, m)
         Stage derivative minus F at the stage.
     steps : numpy.ndarray, shape (N, m)
-        Gap between an interval's end and the next node.
+        Gap between an interval's end and the next node; at a junction, what does not hold.
     left, right : numpy.ndarray, shape (l,) and (m - l,)
         Boundary rows.
 
@@ -68,9 +70,9 @@ class Stages(Protocol):
 class LinearSystem(Protocol):
     """The linearised collocation equations, factorised once for several right-hand sides."""
 
-    def with_rule(self, rule: GaussRule) -> LinearSystem:
+    def with_rule(self, rule: GaussRule, monitor: Monitor | None = None) -> LinearSystem:
         """
-        Return the system of another rule on the same mesh.
+        Return the system of another rule on the same mesh; a monitor may stop it.
 
         Its factors are its own: on a step much longer than a layer one more stage turns the sign
         of the transition matrix.
@@ -107,6 +109,8 @@ class NewtonSystem:
         Magnitudes of the unknowns: rows and columns are scaled by them for the pivoting.
     explicit : numpy.ndarray of int
         See `BoundaryValueProblem.explicit`.
+    junctions : JunctionRows
+        What stands for the step of intervals of no length.
 
     Raises
     ------
@@ -116,8 +120,10 @@ class NewtonSystem:
     """
 
     def __init__(self, rule: GaussRule, steps: Array, jacobians: Array, left: Array,
-                 right: Array, scale: Array, explicit: Indices) -> None:
+                 right: Array, scale: Array, explicit: Indices,
+                 junctions: JunctionRows = NO_JUNCTIONS) -> None:
         self._rule, self._scale, self._left_rows = rule, scale, left.shape[0]
+        self._junctions = junctions
         self._parts = steps, jacobians, left, right, scale, explicit
         self._stages: Stages = (
             ExactStages(rule, steps, jacobians) if jacobians.ndim == 4
@@ -130,11 +136,13 @@ class NewtonSystem:
         if self._factors.singular:
             raise SingularSystemError(SINGULAR_PROBLEM)
 
-    def with_rule(self, rule: GaussRule) -> NewtonSystem:
+    def with_rule(self, rule: GaussRule, monitor: Monitor | None = None) -> NewtonSystem:
         """Return the system of another rule on the same mesh."""
+        if monitor is not None:
+            monitor.check()
         steps, jacobians, left, right, scale, explicit = self._parts
         return NewtonSystem(rule, steps, resample_jacobians(jacobians, self._rule, rule), left,
-                            right, scale, explicit)
+                            right, scale, explicit, self._junctions)
 
     def _assemble(self, transition: Array, left: Array, right: Array) -> Array:
         """Return the banded matrix of the node equations: left rows, intervals, right rows."""
@@ -145,11 +153,17 @@ class NewtonSystem:
         diagonal = self._lower + self._upper
         inner = np.arange(size)
         blocks = (-transition * scale / scale[:, None]).swapaxes(1, 2)
+        at, rows = self._junctions.intervals, self._junctions.rows
+        if at.size:
+            joined = (rows * np.tile(scale, 2) / scale[:, None]).swapaxes(1, 2)
+            blocks[at] = joined[:, :size]
         per_node = columns.reshape(count + 1, size, -1)
         # entry (row, column) of the matrix stands at diagonal + row - column
         within = diagonal + top + inner - inner[:, None]
         per_node[:-1, inner[:, None], within] = blocks
         per_node[1:, inner, diagonal + top - size] = 1
+        if at.size:
+            per_node[at[:, None, None] + 1, inner[:, None], within - size] = joined[:, size:]
         per_node[0, inner[:, None], diagonal + np.arange(top) - inner[:, None]] = (
             left * scale / self._row_scale[:top, None]).T
         per_node[-1, inner[:, None], diagonal + np.arange(top, size) - inner[:, None]] = (

@@ -64,7 +64,9 @@ def switching_times(problem: BoundaryValueProblem, solution: CollocationSolution
     times[:, -1], unknowns[:, -1] = solution.mesh[1:], solution.nodes[1:]
     values = problem.switches(times.ravel(), unknowns.reshape(-1, problem.size))
     sign = (values >= 0).reshape(*times.shape, -1)
-    k, i, e = np.nonzero(sign[:, 1:] != sign[:, :-1])
+    changes = sign[:, 1:] != sign[:, :-1]
+    changes[solution.steps == 0] = False
+    k, i, e = np.nonzero(changes)
     if not k.size:
         return np.zeros(0)
     values = values.reshape(*times.shape, -1)
@@ -192,6 +194,8 @@ def level_mesh(solution: CollocationSolution, defect: Array, growth: float, swit
     """
     Return a mesh with nodes on the switches that spreads the error evenly between them.
 
+    Nodes that come twice do so in the new mesh, too.
+
     Parameters
     ----------
     solution : CollocationSolution
@@ -206,12 +210,14 @@ def level_mesh(solution: CollocationSolution, defect: Array, growth: float, swit
         Bounds of the number of intervals, which is at least one more than the switches.
 
     """
-    density = _density(solution, defect, switches)
+    density, twice = _density(solution, defect, switches), solution.junctions
+    fewest, most = max(fewest - twice.size, 1), most - twice.size
     # intervals wanted up to each node; the worst interval of now is cut into `growth`
     wanted = np.concatenate([[0.0], np.cumsum(density)]) * growth
     total = float(np.clip(wanted[-1], fewest, most))
     wanted *= total / wanted[-1]
-    breaks = np.concatenate([solution.mesh[:1], switches, solution.mesh[-1:]])
+    breaks = np.concatenate([solution.mesh[:1], _between(solution, switches),
+                             solution.mesh[-1:]])
     at_breaks = np.interp(breaks, solution.mesh, wanted)
     counts = np.maximum(1, np.rint(np.diff(at_breaks))).astype(int)
     while counts.sum() > most and counts.max() > 1:  # rounding made too many
@@ -220,7 +226,18 @@ def level_mesh(solution: CollocationSolution, defect: Array, growth: float, swit
               for a, b, count in zip(at_breaks, at_breaks[1:], counts, strict=False)]
     for piece, first, last in zip(pieces, breaks, breaks[1:], strict=False):
         piece[0], piece[-1] = first, last
-    return np.concatenate([pieces[0][:1], *(piece[1:] for piece in pieces)])
+    mesh = np.concatenate([pieces[0][:1], *(piece[1:] for piece in pieces)])
+    return np.sort(np.concatenate([mesh, twice])) if twice.size else mesh
+
+
+def _between(solution: CollocationSolution, switches: Array) -> Array:
+    """Return switches and nodes that come twice, in order; a switch at such a node is none."""
+    twice, span = solution.junctions, solution.mesh[-1] - solution.mesh[0]
+    if not twice.size:
+        return switches
+    apart = np.abs(switches[:, None] - twice).min(axis=1) > _CLOSEST * span
+    merged: Array = np.sort(np.concatenate([switches[apart], twice]))
+    return merged
 
 
 def _density(solution: CollocationSolution, defect: Array, switches: Array) -> Array:
@@ -237,6 +254,7 @@ def _density(solution: CollocationSolution, defect: Array, switches: Array) -> A
     density = np.maximum(density / density.max(), _LEAST_DENSITY)
     padded = np.pad(density, 1, mode='edge')
     graded: Array = np.maximum(density, (padded[:-2] + padded[2:]) / 2)
+    graded[solution.steps == 0] = 0
     return graded
 
 

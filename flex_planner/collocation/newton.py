@@ -56,7 +56,7 @@ def newton(problem: BoundaryValueProblem, guess: CollocationSolution, *, toleran
     problem : BoundaryValueProblem
         What to solve.
     guess : CollocationSolution
-        Starting point.
+        Starting point; its mesh has the double nodes of the problem, see `place_junctions`.
     tolerance : float
         Root mean square of the relative correction that counts as converged.
     max_iterations : int
@@ -110,9 +110,10 @@ class _Run:
         """Factorise once and move as far as the matrix is good for; True if converged."""
         self._monitor.check()
         self._scale = magnitudes(self._problem, self._solution)
-        residual, jacobians = linearise(self._problem, self._solution, self._monitor,
-                                        exact=self._exact)
-        system = self._system = factorise(self._problem, self._solution, jacobians)
+        residual, jacobians, junctions = linearise(self._problem, self._solution, self._monitor,
+                                                   exact=self._exact)
+        system = self._system = factorise(self._problem, self._solution, jacobians, junctions,
+                                          self._monitor)
         full = self._measure(system, residual)
         self.iterations += 1
         self._norm = full.norm

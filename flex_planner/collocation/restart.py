@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
+from flex_planner.collocation.junctions import junction_times, place_junctions
 from flex_planner.collocation.mesh import cost_of_gaps, defects, level_mesh, switching_times
 from flex_planner.collocation.newton import newton
 from flex_planner.collocation.problem import BoundaryValueProblem
@@ -100,7 +101,7 @@ class _Restart:
                  settings: SolverSettings, monitor: Monitor) -> None:
         self._problem, self._known, self._settings = problem, known, settings
         self._monitor, self._iterations, self._meshes = monitor, 0, 1
-        self.nearest, self._correction = known.solution, np.inf
+        self.nearest, self._correction = place_junctions(problem, known.solution), np.inf
 
     def run(self) -> CollocationResult | None:
         """Return the solution, None if it is not near or not known to be exact."""
@@ -148,13 +149,15 @@ class _Restart:
         """Return the mesh with the nodes at switches moved along; None if that spoils it."""
         mesh = self.nearest.mesh
         nearest = mesh[np.abs(before[:, None] - mesh).argmin(axis=1)]
-        ends = [np.concatenate([mesh[:1], times, mesh[-1:]]) for times in (nearest, after)]
-        if not np.diff(ends[0]).min() > 0:
+        fixed = np.concatenate([mesh[:1], junction_times(self._problem), mesh[-1:]])
+        old: Array = np.sort(np.concatenate([fixed, nearest]))
+        new: Array = np.sort(np.concatenate([fixed, after]))
+        if not np.diff(old).min() > 0:
             return None
-        stretches = np.diff(ends[1]) / np.diff(ends[0])
+        stretches = np.diff(new) / np.diff(old)
         if not (stretches.max() <= _MOST_STRETCH and stretches.min() >= 1 / _MOST_STRETCH):
             return None
-        moved: Array = np.interp(mesh, *ends)
+        moved: Array = np.interp(mesh, old, new)
         return moved
 
     def _judge(self, switches: Array) -> CollocationResult | None:

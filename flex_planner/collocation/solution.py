@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 @dataclass(frozen=True, slots=True, eq=False)
 class CollocationSolution:
     """
-    Piecewise polynomial of degree s, continuous at the nodes.
+    Piecewise polynomial of degree s, continuous at the nodes but where a node comes twice.
 
     Attributes
     ----------
     mesh : numpy.ndarray, shape (N + 1,)
-        Node times, increasing.
+        Node times, increasing; where one comes twice, z may jump, see `junctions`.
     nodes : numpy.ndarray, shape (N + 1, m)
         z at the nodes.
     stages : numpy.ndarray, shape (N, s, m)
@@ -36,13 +36,20 @@ class CollocationSolution:
     @classmethod
     def from_values(cls, mesh: Array, nodes: Array, rule: GaussRule) -> CollocationSolution:
         """Return the piecewise linear function through node values, as a guess."""
-        slopes = np.diff(nodes, axis=0) / np.diff(mesh)[:, None]
+        steps = np.diff(mesh)[:, None]
+        slopes = np.diff(nodes, axis=0) / np.where(steps, steps, 1.0)
         return cls(mesh, nodes, np.repeat(slopes[:, None], rule.stages, axis=1), rule)
 
     @property
     def steps(self) -> Array:
         """Return the interval lengths, shape (N,)."""
         return np.diff(self.mesh)
+
+    @property
+    def junctions(self) -> Array:
+        """Return the times of the nodes that come twice, shape (J,)."""
+        times: Array = self.mesh[1:][self.steps == 0]
+        return times
 
     @property
     def intervals(self) -> int:
@@ -76,8 +83,11 @@ class CollocationSolution:
         return values
 
     def __call__(self, times: Array) -> Array:
-        """Return z at times (k,) within the mesh, shape (k, m)."""
-        interval, theta = self._locate(times)
+        """Return z at times (k,) within the mesh, shape (k, m); where it jumps, that after."""
+        return self._evaluate(*self._locate(times))
+
+    def _evaluate(self, interval: NDArray[np.intp], theta: Array) -> Array:
+        """Return z at positions in intervals, shape (k, m)."""
         basis = self.rule.basis(theta)
         increments = (basis[:, None] @ self.stages[interval])[:, 0]
         values: Array = self.nodes[interval] + self.steps[interval, None] * increments
@@ -98,7 +108,22 @@ class CollocationSolution:
         rule, steps = rule or self.rule, np.diff(mesh)
         stage_times = (mesh[:-1, None] + steps[:, None] * rule.nodes).ravel()
         stages = self.rate(stage_times).reshape(steps.size, rule.stages, -1)
-        return CollocationSolution(mesh, self(mesh), stages, rule)
+        nodes = self(mesh)
+        first = np.flatnonzero(steps == 0)
+        nodes[first] = self.before(mesh[first])
+        return CollocationSolution(mesh, nodes, stages, rule)
+
+    def before(self, times: Array) -> Array:
+        """Return z at times (k,) after the first, shape (k, m); where it jumps, that before."""
+        interval = np.clip(np.searchsorted(self.mesh, times, side='left') - 1, 0,
+                           self.intervals - 1)
+        return self._evaluate(interval, (times - self.mesh[interval]) / self.steps[interval])
+
+    def without_jumps(self) -> CollocationSolution:
+        """Return the solution with each node once, at which it may jump nevertheless."""
+        there = np.append(self.steps > 0, True)
+        return CollocationSolution(self.mesh[there], self.nodes[there], self.stages[there[:-1]],
+                                   self.rule)
 
     def _locate(self, times: Array) -> tuple[NDArray[np.intp], Array]:
         """Return the interval of each time and the position inside it, 0 to 1."""

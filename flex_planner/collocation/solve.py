@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from flex_planner.base.progress import Monitor, StopReason
+from dataclasses import replace
+
+from flex_planner.base.progress import Monitor, StoppedError, StopReason
 from flex_planner.base.validation import Array
 from flex_planner.collocation.estimate import Estimate, estimate_error
+from flex_planner.collocation.junctions import place_junctions
 from flex_planner.collocation.mesh import are_on_nodes, defects, level_mesh, switching_times
 from flex_planner.collocation.newton import newton
 from flex_planner.collocation.newton_outcome import NewtonOutcome
@@ -37,7 +40,8 @@ def solve(problem: BoundaryValueProblem, guess: CollocationSolution, settings: S
     problem : BoundaryValueProblem
         z' = F(t, z) with separated boundary conditions.
     guess : CollocationSolution
-        Start; its mesh is the first mesh, its rule is replaced by that of the settings.
+        Start; its mesh is the first mesh, with the double nodes that the problem needs; its rule
+        is replaced by that of the settings.
     settings : SolverSettings
         Tolerances and limits.
     monitor : Monitor, optional
@@ -49,7 +53,8 @@ def solve(problem: BoundaryValueProblem, guess: CollocationSolution, settings: S
     """
     if guess.rule.stages != settings.stages:
         guess = guess.on_mesh(guess.mesh, settings.rule)
-    return _MeshRefinement(problem, guess, settings, monitor or Monitor(), expected_error).run()
+    return _MeshRefinement(problem, place_junctions(problem, guess), settings,
+                           monitor or Monitor(), expected_error).run()
 
 
 class _MeshRefinement:
@@ -79,7 +84,11 @@ class _MeshRefinement:
             switches = switching_times(self._problem, self._point)
             if self._place_nodes(switches):
                 continue
-            estimate = estimate_error(self._problem, self._point, outcome.system)
+            try:
+                estimate = estimate_error(self._problem, self._point, outcome.system,
+                                          self._monitor)
+            except StoppedError as error:
+                return self._fail(replace(outcome, stopped=error.reason, message=str(error)))
             if tolerance > 3 * self._newton_tolerance(estimate.worst):
                 self._expected = estimate.worst  # the mesh deserves a better solution
                 continue

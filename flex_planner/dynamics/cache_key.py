@@ -19,7 +19,8 @@ import numpy as np
 
 # symbols in the functions, or nothing that they contain
 FREE_FIELDS = frozenset({'Arm.name', 'Arm.source', 'Arm.payload_inertia',
-                         'Link.flexural_rigidity', 'Link.family_assumed', 'Motor.stall_torque',
+                         'Link.flexural_rigidity', 'Link.family_assumed', 'Link.allowable_moment',
+                         'Motor.stall_torque',
                          'Motor.no_load_speed', 'Motor.max_torque', 'Motor.max_speed',
                          'Joint.lower_limit', 'Joint.upper_limit', 'SpatialArm.name',
                          'SpatialArm.source', 'SpatialArm.notes', 'SpatialArm.payload_inertia',

@@ -12,53 +12,27 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 import ctypes
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Protocol
 
 from flex_planner.base.compiled_library import build_library, find_library
 from flex_planner.base.compiler import CompilerError
 from flex_planner.base.library_cache import warn_once
+from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
+from flex_planner.dynamics.function_source import (
+    Builder,
+    derive_beside,
+    Signature,
+    write_source,
+)
 import numpy as np
 
 # straight-line code gains nothing from more, and -O1 takes up to five times as long
 _OPTIONS = ('-Og',)
 
-Builder = Callable[[], Mapping[str, tuple[Any, int]]]
-
 _POINTERS = ctypes.POINTER(ctypes.c_void_p)
-
-
-@dataclass(frozen=True, slots=True)
-class Signature:
-    """Shapes of a function: entries of each input, (rows, columns) of each output."""
-
-    batched: int
-    inputs: tuple[int, ...]
-    outputs: tuple[tuple[int, int], ...]
-
-    @classmethod
-    def of(cls, function: Any, batched: int) -> Signature:
-        """Read the signature of a CasADi function."""
-        inputs = tuple(int(function.numel_in(i)) for i in range(function.n_in()))
-        outputs = tuple((int(function.size1_out(i)), int(function.size2_out(i)))
-                        for i in range(function.n_out()))
-        return cls(batched, inputs, outputs)
-
-    def prepare(self, inputs: Sequence[Array]) -> tuple[list[Array], list[Array]]:
-        """Return contiguous inputs and empty outputs, after a check of the shapes."""
-        arrays = [np.ascontiguousarray(values, dtype=float) for values in inputs]
-        count = arrays[0].shape[0]
-        shapes = [(count, size) for size in self.inputs[:self.batched]]
-        shapes += [(size,) for size in self.inputs[self.batched:]]  # type: ignore[misc]
-        given = [array.shape for array in arrays]
-        if given != shapes:
-            raise ValueError(f'inputs have shapes {given}, expected {shapes}')
-        # a matrix comes transposed from CasADi's column order, so rows and columns swap
-        outputs = [np.empty((count, rows) if columns == 1 else (count, columns, rows))
-                   for rows, columns in self.outputs]
-        return arrays, outputs
 
 
 class BatchFunction(Protocol):
@@ -111,7 +85,7 @@ class _NativeFunction:
         return self._evaluate(inputs, chain=True)
 
     def _evaluate(self, inputs: Sequence[Array], *, chain: bool) -> tuple[Array, ...]:
-        arrays, outputs = self._signature.prepare(inputs)
+        arrays, outputs = _prepare(self._signature, inputs)
         if self._call(len(arrays[0]), chain, _pointers(arrays), _pointers(outputs)):
             raise MemoryError('no memory to evaluate a compiled function')
         return tuple(outputs)
@@ -151,7 +125,7 @@ class _InterpretedFunction:
         return self._evaluate(inputs, chain=True)
 
     def _evaluate(self, inputs: Sequence[Array], *, chain: bool) -> tuple[Array, ...]:
-        arrays, outputs = self._signature.prepare(inputs)
+        arrays, outputs = _prepare(self._signature, inputs)
         batched, arrays[0] = self._signature.batched, arrays[0].copy()
         for point in range(len(arrays[0])):
             if chain and point:
@@ -174,7 +148,8 @@ class _InterpretedFunction:
         return None
 
 
-def load_functions(key: str, build: Builder) -> dict[str, BatchFunction]:
+def load_functions(key: str, build: Builder,
+                   monitor: Monitor | None = None) -> dict[str, BatchFunction]:
     """
     Return compiled functions: from the disk if they are there, else built and kept.
 
@@ -184,20 +159,32 @@ def load_functions(key: str, build: Builder) -> dict[str, BatchFunction]:
         From `content_key`; equal keys mean equal functions.
     build : callable
         Returns the CasADi functions and the number of batched inputs of each, by name.
+    monitor : Monitor, optional
+        May stop it: another process then derives the functions, and `build` is pickled.
+
+    Raises
+    ------
+    StoppedError
+        If the monitor stopped it.
 
     """
     functions = find_library(key, _load)
     if functions is not None:
         return functions
-    built = build()
-    signatures = {name: Signature.of(f, batched) for name, (f, batched) in built.items()}
+    source = None if monitor is None else derive_beside(build, monitor)
+    built = None
+    if source is None:
+        built = build()
+        source = write_source(built)
+    signatures = source.signatures
     try:
-        return build_library(key, _source(built), lambda library: _bind(library, signatures),
+        return build_library(key, source.text, lambda library: _bind(library, signatures),
                              record={name: asdict(s) for name, s in signatures.items()},
-                             options=_OPTIONS)
+                             options=_OPTIONS, monitor=monitor)
     except CompilerError as error:
         warn_once(f'{error}: functions are interpreted, which makes a plan 10 to 50 times slower')
-    return {name: _InterpretedFunction(f, signatures[name]) for name, (f, _) in built.items()}
+    return {name: _InterpretedFunction(f, signatures[name])
+            for name, (f, _) in (built or build()).items()}
 
 
 def _load(library: Path, functions: Mapping[str, Any]) -> dict[str, BatchFunction]:
@@ -208,40 +195,19 @@ def _load(library: Path, functions: Mapping[str, Any]) -> dict[str, BatchFunctio
         for name, entry in functions.items()})
 
 
-def _source(built: Mapping[str, tuple[Any, int]]) -> str:
-    """Return the C source of all functions with a loop over points around each."""
-    import casadi as ca
-
-    generator = ca.CodeGenerator('functions', {'with_header': False})
-    for function, _ in built.values():
-        generator.add(function)
-    loops = (_loop(name, function, batched) for name, (function, batched) in built.items())
-    return '\n'.join([str(generator.dump()), '#include <stdlib.h>', *loops])
-
-
-def _loop(name: str, function: Any, batched: int) -> str:
-    """Return C code that evaluates a function at n points; 1 means out of memory."""
-    signature = Signature.of(function, batched)
-    arguments = ''.join(
-        f'    arg[{i}] = in[{i}]' + (f' + k*{size}' if i < batched else '') + ';\n'
-        for i, size in enumerate(signature.inputs))
-    results = ''.join(f'    res[{i}] = out[{i}] + k*{rows * columns};\n'
-                      for i, (rows, columns) in enumerate(signature.outputs))
-    return f"""
-int {name}_batch(long long n, int chain, const double *const *in, double *const *out) {{
-  const double *arg[{function.sz_arg() + 1}];
-  double *res[{function.sz_res() + 1}];
-  long long iw[{function.sz_iw() + 1}];
-  double *w = malloc(sizeof(double) * {function.sz_w() + 1});
-  if (!w) return 1;
-  for (long long k = 0; k < n; ++k) {{
-{arguments}    if (chain && k) arg[0] = res[0];
-{results}    {name}(arg, res, iw, w, 0);
-  }}
-  free(w);
-  return 0;
-}}
-"""
+def _prepare(signature: Signature, inputs: Sequence[Array]) -> tuple[list[Array], list[Array]]:
+    """Return contiguous inputs and empty outputs, after a check of the shapes."""
+    arrays = [np.ascontiguousarray(values, dtype=float) for values in inputs]
+    count = arrays[0].shape[0]
+    shapes = [(count, size) for size in signature.inputs[:signature.batched]]
+    shapes += [(size,) for size in signature.inputs[signature.batched:]]  # type: ignore[misc]
+    given = [array.shape for array in arrays]
+    if given != shapes:
+        raise ValueError(f'inputs have shapes {given}, expected {shapes}')
+    # a matrix comes transposed from CasADi's column order, so rows and columns swap
+    outputs = [np.empty((count, rows) if columns == 1 else (count, columns, rows))
+               for rows, columns in signature.outputs]
+    return arrays, outputs
 
 
 def _bind(library: Path, signatures: Mapping[str, Signature]) -> dict[str, BatchFunction]:

@@ -8,13 +8,15 @@ conditions z = (q, q', psi_1, psi_2).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from flex_planner.arms.arm import Arm
 from flex_planner.base.compiled_library import content_key
 from flex_planner.base.errors import InvalidTaskError
+from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
 from flex_planner.collocation import SolverSettings
 from flex_planner.collocation.core import prepare_core
@@ -52,6 +54,14 @@ class Controls:
     hamiltonian: Array
     payload_share: Array
     acceleration: Array
+
+    @classmethod
+    def of(cls, values: Sequence[Array]) -> Controls:
+        """Return what a compiled function found."""
+        torque, free, cost, hamiltonian, share, acceleration = values
+        return cls(torque=torque, free_torque=free, cost_rate=cost[:, 0],
+                   hamiltonian=hamiltonian[:, 0], payload_share=share[:, 0],
+                   acceleration=acceleration)
 
 
 class ArmModel(ArmDynamics):
@@ -111,7 +121,7 @@ class ArmModel(ArmDynamics):
         Parameters
         ----------
         name : str
-            ``optimality``, ``free_payload`` or ``free_duration``.
+            ``optimality``, ``free_payload``, ``free_duration`` or ``free_times``.
         p : numpy.ndarray
             `Parameters.stack`.
 
@@ -125,20 +135,55 @@ class ArmModel(ArmDynamics):
 
     def controls(self, z: Array, p: Array) -> Controls:
         """Return torque, cost and Hamiltonian at points, see `Controls`."""
-        torque, free, cost, hamiltonian, share, acceleration = self._load_optimality(
-            'control')(z, p)
-        return Controls(torque=torque, free_torque=free, cost_rate=cost[:, 0],
-                        hamiltonian=hamiltonian[:, 0], payload_share=share[:, 0],
-                        acceleration=acceleration)
+        return Controls.of(self._load_optimality('control')(z, p))
 
     def barrier(self, name: str) -> BatchFunction:
         """Return a function of `build_barrier_functions`; they are derived when first wanted."""
         if name not in self._loaded:
+            self.prepare_barrier()
+        return self._loaded[name]
+
+    def offset_function(self, name: str) -> BatchFunction:
+        """Return a function of `build_offset_functions`; they are derived when first wanted."""
+        if name not in self._loaded:
             key = cache_key(self.arm, 'dynamics', 'optimal_control')
             self._loaded |= load_functions(
-                content_key(key, 'barrier', 'caps' if has_caps(self.arm) else ''),
-                self._build_barrier)
+                content_key(key, 'offset', 'caps' if has_caps(self.arm) else ''),
+                self._build_offset)
         return self._loaded[name]
+
+    def prepare_barrier(self, monitor: Monitor | None = None) -> None:
+        """
+        Load the functions of an interior-point method from disk, or compile them.
+
+        Parameters
+        ----------
+        monitor : Monitor, optional
+            Told of it; it may stop it.
+
+        Raises
+        ------
+        StoppedError
+            If the monitor stopped it.
+
+        """
+        if 'barrier' in self._loaded:
+            return
+        if monitor is not None:
+            monitor.check()
+            monitor.announce('loading the functions of the interior-point method')
+        key = cache_key(self.arm, 'dynamics', 'optimal_control')
+        self._loaded |= load_functions(
+            content_key(key, 'barrier', 'caps' if has_caps(self.arm) else ''),
+            partial(_build_barrier, self.arm), monitor)
+
+    def offset_optimality(self, z: Array, offset: Array, p: Array) -> Array:
+        """Return z' with effort measured from offsets (k, n), shape (k, 4 n_t)."""
+        return self.offset_function('offset_optimality')(z, offset, p)[0]
+
+    def offset_controls(self, z: Array, offset: Array, p: Array) -> Controls:
+        """Return `controls` with effort measured from offsets (k, n): in H, not in L."""
+        return Controls.of(self.offset_function('offset_control')(z, offset, p))
 
     def payload_sensitivity(self, z: Array, p: Array) -> tuple[Array, Array, Array]:
         """Return dz'/dm_p (k, 4 n_t), dH/dm_p and d2H/dm_p2 (k,)."""
@@ -153,14 +198,21 @@ class ArmModel(ArmDynamics):
                                            self._build_optimality)
         return self._loaded[name]
 
-    def _build_barrier(self) -> Mapping[str, tuple[Any, int]]:
-        """Derive the functions of an interior-point method; CasADi is imported only here."""
-        from flex_planner.optimal_control.barrier_conditions import build_barrier_functions
+    def _build_offset(self) -> Mapping[str, tuple[Any, int]]:
+        """Derive the functions of effort from an offset; CasADi is imported only here."""
+        from flex_planner.optimal_control.offset_conditions import build_offset_functions
 
-        return build_barrier_functions(self.arm)
+        return build_offset_functions(self.arm)
 
     def _build_optimality(self) -> Mapping[str, tuple[Any, int]]:
         """Derive the functions; CasADi is imported only here."""
         from flex_planner.optimal_control.pontryagin import build_optimality_functions
 
         return build_optimality_functions(self.arm)
+
+
+def _build_barrier(arm: Arm) -> Mapping[str, tuple[Any, int]]:
+    """Derive the functions of an interior-point method; CasADi is imported only here."""
+    from flex_planner.optimal_control.barrier_conditions import build_barrier_functions
+
+    return build_barrier_functions(arm)

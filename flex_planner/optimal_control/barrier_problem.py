@@ -31,6 +31,7 @@ class MotionBarrier:
         self.motion = motion
         self.size, self.explicit = motion.size, motion.explicit
         self.free = motion.model.arm.n_joints
+        self.junctions = motion.junctions
         self._p = np.where(np.isfinite(motion.p), motion.p, _ENDLESS)
 
     @property
@@ -84,6 +85,10 @@ class MotionBarrier:
     def right(self, z: Array) -> tuple[Array, Array]:
         """Return the final conditions."""
         return self.motion.right(z)
+
+    def join(self, junction: int, before: Array, after: Array) -> tuple[Array, Array]:
+        """Return what holds at a via point."""
+        return self.motion.join(junction, before, after)
 
     def guess(self, solution: CollocationSolution, mu: float) -> Array:
         """Return torques inside their limits, slacks and multipliers for a motion."""
@@ -155,6 +160,10 @@ class PayloadBarrier(MotionBarrier):
     def right(self, z: Array) -> tuple[Array, Array]:
         """Return the final conditions."""
         return self.payload.right(z)
+
+    def join(self, junction: int, before: Array, after: Array) -> tuple[Array, Array]:
+        """Return what holds at a via point."""
+        return self.payload.join(junction, before, after)
 
     def guess(self, solution: CollocationSolution, mu: float) -> Array:
         """Return torques inside their limits, slacks and multipliers for a motion."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from flex_planner.base.errors import InvalidTaskError
 from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationResult, CollocationSolution
 from flex_planner.collocation.problem import CompiledRate
@@ -35,9 +36,16 @@ class FreeDurationProblem:
     price : float
         rho, > 0 [1/s].
 
+    Raises
+    ------
+    InvalidTaskError
+        If the motion has via points, whose times belong to a given duration.
+
     """
 
     def __init__(self, motion: MotionProblem, price: float) -> None:
+        if motion.junctions.size:
+            raise InvalidTaskError('the duration of a motion with via points must be given')
         self.motion, self._price = motion, price
         self.size = motion.size + 1
         self.scale = np.append(motion.scale, _SHORTEST * motion.task.duration)
@@ -57,7 +65,9 @@ class FreeDurationProblem:
         return append_zeros(duration * rate, 1), jacobian
 
     def compiled_rate(self) -> CompiledRate | None:
-        """Return both as machine code, None without a compiler."""
+        """Return both as machine code, None without a compiler or with limits on the way."""
+        if self.motion.compiled_rate() is None:
+            return None
         return self.motion.model.compiled_rate('free_duration', self.motion.p)
 
     def switches(self, t: Array, z: Array) -> Array:
@@ -74,6 +84,7 @@ class FreeDurationProblem:
         residual, rows = self.motion.right(z[:-1])
         point = z[None, :-1]
         hamiltonian = self.motion.model.controls(point, self.motion.p).hamiltonian
+        hamiltonian = hamiltonian + self.motion.barrier_rate(point)
         rate = self.motion.rate(np.zeros(1), point)[0]
         half = rate.size // 2
         gradient = np.concatenate([-rate[half:], rate[:half], [0.0]])

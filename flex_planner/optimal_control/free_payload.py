@@ -44,6 +44,7 @@ class FreePayloadProblem:
         self.size = last = motion.size + 2
         self.scale = np.concatenate([motion.scale, [0.1, price]])
         self.explicit: Indices = np.concatenate([motion.explicit, [last - 2, last - 1]])
+        self.junctions = motion.junctions
         self._p = motion.p.copy()
         self._ends = _ends(motion)
 
@@ -98,6 +99,14 @@ class FreePayloadProblem:
         rows[half, half:size], rows[half, -2:] = change, (z[half:size] @ bend, 1)
         miss = np.concatenate([z[:half] - state, z[half:size]])
         return np.append(inner @ miss, z[half:size] @ change + z[-1] + self._price), rows
+
+    def join(self, junction: int, before: Array, after: Array) -> tuple[Array, Array]:
+        """Return what holds at a via point: payload and nu go on as they were."""
+        inner, size = self.motion.size, self.size
+        residual, rows = after - before, np.hstack([-np.eye(size), np.eye(size)])
+        residual[:inner], found = self.motion.join(junction, before[:inner], after[:inner])
+        rows[:inner, :inner], rows[:inner, size:size + inner] = np.hsplit(found, 2)
+        return residual, rows
 
     def extend(self, solution: CollocationSolution) -> CollocationSolution:
         """Return a motion with the payload of the task as a guess."""

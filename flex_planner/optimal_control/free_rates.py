@@ -44,6 +44,19 @@ def free_duration_rates(functions: Mapping[str, BatchedFunction]) -> dict[str, B
                  ca.vertcat(duration * F(z, p), 0), ca.vertcat(duration * rate, 0), jacobian)
 
 
+def free_times_rates(functions: Mapping[str, BatchedFunction]) -> dict[str, BatchedFunction]:
+    """Return the rates of `FreeViaTimesProblem` and their Jacobian, of (z, t, d) and p."""
+    F, F_jacobian = (functions[name][0] for name in ('optimality', 'optimality_jacobian'))
+    size = F.numel_in(0)
+    unknowns, p = ca.MX.sym('unknowns', size + 2), ca.MX.sym('p', F.numel_in(1))
+    z, phase = unknowns[:size], unknowns[size + 1]
+    rate, inner = F_jacobian(z, p)
+    jacobian = ca.horzcat(ca.vertcat(phase * inner, ca.MX.zeros(1, size), rate.T),
+                          ca.vertcat(ca.MX.zeros(size + 1, 1), 1), ca.MX.zeros(size + 2, 1))
+    return _pair('free_times', [unknowns, p], ca.vertcat(phase * F(z, p), phase, 0),
+                 ca.vertcat(phase * rate, phase, 0), jacobian)
+
+
 def _pair(name: str, inputs: list[ca.MX], alone: ca.MX, rate: ca.MX,
           jacobian: ca.MX) -> dict[str, BatchedFunction]:
     """Return a function of rates and one of rates and Jacobian, with dense results."""

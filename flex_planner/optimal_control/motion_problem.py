@@ -6,12 +6,14 @@ from dataclasses import replace
 
 from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationSolution, GaussRule
+from flex_planner.collocation.junctions import double_nodes
 from flex_planner.collocation.problem import CompiledRate
 from flex_planner.dynamics.statics import check_inertia, natural_modes
-from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.arm_model import ArmModel, Controls
 from flex_planner.optimal_control.boundary_conditions import BoundaryConditions
 from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.optimal_control.task import Task
+from flex_planner.optimal_control.via_conditions import ViaConditions
 import numpy as np
 from numpy.typing import NDArray
 
@@ -48,9 +50,13 @@ class MotionProblem:
     explicit : numpy.ndarray of int
         q and psi_1, whose rates the collocation need not factorise.
 
+    via : ViaConditions
+        Via points, and when they are passed.
     holds : bool
         Whether to refuse a goal that the motors cannot hold; without, the problem only stands for
         a task that is refused.
+    via_times : numpy.ndarray, shape (K,), optional
+        When the via points are passed; free times are guessed if it is not given [s].
 
     Raises
     ------
@@ -64,7 +70,7 @@ class MotionProblem:
     """
 
     def __init__(self, model: ArmModel, task: Task, parameters: Parameters, *,
-                 holds: bool = True) -> None:
+                 holds: bool = True, via_times: Array | None = None) -> None:
         self.model, self.task, self.parameters = model, task, parameters
         self.p = parameters.stack()
         n_t = model.arm.n_coordinates
@@ -75,6 +81,18 @@ class MotionProblem:
         self.holding_torque = self.ends.holding_torque
         self.scale = self._scale()
         self.explicit: Indices = np.r_[0:n_t, 2 * n_t:3 * n_t]
+        n = model.arm.n_joints
+        self.via = ViaConditions.of(model.arm, task.via_points, (self.start[:n], self.goal[:n]),
+                                    task.duration, self.scale, via_times)
+
+    @property
+    def junctions(self) -> Array:
+        """Return the times of the via points, shape (K,)."""
+        return self.via.times
+
+    def join(self, junction: int, before: Array, after: Array) -> tuple[Array, Array]:
+        """Return what holds at a via point, see `ViaConditions.join`."""
+        return self.via.join(junction, before, after)
 
     def rate(self, t: Array, z: Array) -> Array:
         """Return z'; the problem does not depend on time."""
@@ -88,9 +106,17 @@ class MotionProblem:
         """Return both as machine code, None without a compiler."""
         return self.model.compiled_rate('optimality', self.p)
 
+    def controls(self, t: Array, z: Array) -> Controls:
+        """Return torque, cost and Hamiltonian at times (k,) and points (k, 4 n_t)."""
+        return self.model.controls(z, self.p)
+
+    def hamiltonian_rate(self, t: Array, z: Array) -> Array:
+        """Return dH/dt of an extremal at times (k,) and points (k, 4 n_t), shape (k,): zero."""
+        return np.zeros(len(t))
+
     def switches(self, t: Array, z: Array, p: Array | None = None) -> Array:
         """Return the distances of the unbounded torque from its bounds, 2 n columns or more."""
-        free = self.model.controls(z, self.p if p is None else p).free_torque
+        free = (self.controls(t, z) if p is None else self.model.controls(z, p)).free_torque
         n_t, n = self.model.arm.n_coordinates, self.model.arm.n_joints
         return np.hstack(self.parameters.torque_limits.distances(free, z[:, n_t:n_t + n]))
 
@@ -102,6 +128,10 @@ class MotionProblem:
         """Return the final conditions of eq. (16), or transversality of eq. (6)."""
         return self.ends.right(z)
 
+    def barrier_rate(self, z: Array) -> Array:
+        """Return what a barrier adds to L and H, shape (k,): nothing here."""
+        return np.zeros(len(z))
+
     def target_state(self, end: Array) -> Array:
         """Return the state (2 n_t,) that a motion ending in `end` is to reach."""
         return self.ends.target_state(end)
@@ -110,7 +140,13 @@ class MotionProblem:
         """Return the problem of the same task changed in payload or duration."""
         task = replace(self.task, **changes)  # type: ignore[arg-type]
         parameters = replace(self.parameters, payload_mass=task.payload_mass)
-        return MotionProblem(self.model, task, parameters)
+        times = self.via.times * (task.duration / self.task.duration)
+        return MotionProblem(self.model, task, parameters, via_times=np.where(
+            self.via.given, self.via.times, times) if times.size else None)
+
+    def with_via_times(self, times: Array) -> MotionProblem:
+        """Return the same problem with its via points passed at other times (K,) [s]."""
+        return MotionProblem(self.model, self.task, self.parameters, via_times=times)
 
     def fewest_intervals(self, stages: int) -> int:
         """Return the intervals of a mesh that resolves nothing finely but overlooks nothing."""
@@ -120,14 +156,36 @@ class MotionProblem:
         return int(np.ceil(_POINTS_PER_CYCLE * cycles / stages))
 
     def straight_line(self, intervals: int, rule: GaussRule) -> CollocationSolution:
-        """Return constant velocity from start to goal with zero costates, as a guess."""
+        """
+        Return constant velocity from start to goal with zero costates, as a guess.
+
+        Joints go from one via point to the next in the same way.
+
+        """
         n_t = self.model.arm.n_coordinates
         mesh = np.linspace(0, self.task.duration, intervals + 1, dtype=np.float64)
         nodes = np.zeros((intervals + 1, self.size))
         change = self.goal[:n_t] - self.start[:n_t]
         nodes[:, :n_t] = self.start[:n_t] + np.outer(mesh / self.task.duration, change)
         nodes[:, n_t:2 * n_t] = change / self.task.duration
-        return CollocationSolution.from_values(mesh, nodes, rule)
+        if not self.junctions.size:
+            return CollocationSolution.from_values(mesh, nodes, rule)
+        return self._pass_via_points(CollocationSolution.from_values(mesh, nodes, rule))
+
+    def _pass_via_points(self, straight: CollocationSolution) -> CollocationSolution:
+        """Return a straight line bent so that joints pass their via points."""
+        n, duration = self.model.arm.n_joints, self.task.duration
+        n_t = self.model.arm.n_coordinates
+        mesh = double_nodes(straight.mesh, self.junctions)
+        nodes = straight(mesh)
+        times = np.concatenate([[0.0], self.junctions, [duration]])
+        way = np.vstack([self.start[:n], self.via.postures, self.goal[:n]])
+        slopes = np.diff(way, axis=0) / np.diff(times)[:, None]
+        phase = np.clip(np.searchsorted(times, mesh, side='right') - 1, 0, times.size - 2)
+        phase[:-1][np.diff(mesh) == 0] -= 1
+        nodes[:, :n] = way[phase] + (mesh - times[phase])[:, None] * slopes[phase]
+        nodes[:, n_t:n_t + n] = slopes[phase]
+        return CollocationSolution.from_values(mesh, nodes, straight.rule)
 
     def _scale(self) -> Array:
         """

@@ -40,6 +40,7 @@ class PlannedTorque:
     def of(cls, problem: MotionProblem, solution: CollocationSolution) -> PlannedTorque:
         """Interpolate the torque of a solution, cut where a motor switches."""
         cuts = switching_times(problem, solution)
+        solution = solution.without_jumps()  # torques have none, but bend there
         if cuts.size:
             solution = solution.on_mesh(_merge(solution.mesh, cuts))
         n, n_t = problem.model.arm.n_joints, problem.model.arm.n_coordinates

@@ -20,7 +20,11 @@ from flex_planner.arms.arm import Arm
 from flex_planner.dynamics.build_chain import build_chain
 from flex_planner.dynamics.chain import Chain
 from flex_planner.dynamics.dynamics_functions import batch, BatchedFunction, solver_of
-from flex_planner.optimal_control.free_rates import free_duration_rates, free_payload_rates
+from flex_planner.optimal_control.free_rates import (
+    free_duration_rates,
+    free_payload_rates,
+    free_times_rates,
+)
 from flex_planner.optimal_control.parameters import ParameterSymbols
 from flex_planner.optimal_control.rate_jacobian import RateJacobian
 from flex_planner.optimal_control.running_cost import running_cost
@@ -112,8 +116,8 @@ def build_optimality_functions(arm: Arm) -> dict[str, BatchedFunction]:
         - ``control`` z -> torque, torque without bounds, running cost L, Hamiltonian H,
           dH/dm_p, accelerations
         - ``payload_sensitivity`` z -> dz'/dm_p, dH/dm_p, d2H/dm_p2
-        - ``free_payload``, ``free_payload_jacobian`` and the same of the duration: see
-          `free_rates`
+        - ``free_payload``, ``free_payload_jacobian`` and the same of the duration and of the times
+          of via points: see `free_rates`
 
     """
     chain = build_chain(arm)
@@ -131,7 +135,8 @@ def build_optimality_functions(arm: Arm) -> dict[str, BatchedFunction]:
         'payload_sensitivity': batch('payload_sensitivity', [z], p, [
             ca.jacobian(F, payload), share, ca.jacobian(share, payload)]),
     }
-    return functions | free_payload_rates(functions) | free_duration_rates(functions)
+    return (functions | free_payload_rates(functions) | free_duration_rates(functions)
+            | free_times_rates(functions))
 
 
 def derive_conditions(chain: Chain, parameters: ParameterSymbols,

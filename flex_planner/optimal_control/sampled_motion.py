@@ -59,10 +59,11 @@ def sample_motion(problem: MotionProblem, solution: CollocationSolution) -> Samp
     theta = np.concatenate([[0.0], rule.nodes, [1.0]])
     shares = np.concatenate([[0.0], rule.weights, [0.0]])
     z = solution.values_at(theta).reshape(-1, problem.size)
+    times = solution.times_at(theta).ravel()
     points = SampledMotion(
-        theta=theta, times=solution.times_at(theta).ravel(),
+        theta=theta, times=times,
         weights=(solution.steps[:, None] * shares).ravel(), z=z,
-        controls=problem.model.controls(z, problem.p))
+        controls=problem.controls(times, z))
     for values in (points.theta, points.times, points.weights, points.z):
         values.setflags(write=False)
     return points

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, TYPE_CHECKING
 
@@ -10,6 +11,8 @@ from flex_planner.arms.inverse_kinematics import check_angle_limits
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.validation import Array, number, vector
 from flex_planner.optimal_control.ends_at_points import ends_at_points, MAX_COORDINATE
+from flex_planner.optimal_control.path_constraints.path_constraint import PathConstraint
+from flex_planner.optimal_control.via_points import check_via_points, ViaPoint
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -65,11 +68,17 @@ class Task:
     time_weight : float
         Price of a second, >= 0 [1/s]: if not 0, the duration is free and this times t_f is
         added to eq. (6). The larger it is, the nearer the motion comes to minimum time.
+    via_points : sequence of ViaPoint
+        Joint angles or points of the tip that are passed on the way, in this order, without a
+        stop; not with `time_weight`.
     tolerance : float
         eps of eq. (17) with W_p = W_v = 1, 1e-15 to 1.
     allow_large_bending : bool
         Whether a plan may bend links by more than 0.3 of their length, though they are linear
         beams.
+    path_constraints : tuple of PathConstraint
+        Limits that hold on the whole way, besides those of the arm; see
+        `optimal_control.path_constraints`.
 
     Raises
     ------
@@ -95,8 +104,10 @@ class Task:
     goal_position_weights: Array = field(default_factory=lambda: np.zeros(0))
     goal_velocity_weights: Array = field(default_factory=lambda: np.zeros(0))
     time_weight: float = 0.0
+    via_points: tuple[ViaPoint, ...] = ()
     tolerance: float = 1e-3
     allow_large_bending: bool = False
+    path_constraints: tuple[PathConstraint, ...] = ()
 
     if TYPE_CHECKING:
         # arrays are made of anything like one; type checkers would insist on arrays
@@ -108,8 +119,9 @@ class Task:
                 goal_velocities: ArrayLike = ..., start_modal_displacements: ArrayLike = ...,
                 start_point: ArrayLike = ..., goal_point: ArrayLike = ...,
                 goal_position_weights: ArrayLike = ..., goal_velocity_weights: ArrayLike = ...,
-                time_weight: float = ..., tolerance: float = ...,
-                allow_large_bending: bool = ...) -> None:
+                time_weight: float = ..., via_points: Sequence[ViaPoint] = ...,
+                tolerance: float = ..., allow_large_bending: bool = ...,
+                path_constraints: Sequence[PathConstraint] = ...) -> None:
             """Accept lists where arrays are kept."""
 
     @classmethod
@@ -197,6 +209,8 @@ class Task:
         for name in ('goal_position_weights', 'goal_velocity_weights'):
             self._set(name, _goal_weights(name, getattr(self, name), n, n_t))
         self._set_bending()
+        self._set_constraints()
+        self._set_via_points()
 
     @property
     def ends_at_rest(self) -> bool:
@@ -223,6 +237,25 @@ class Task:
         if bending.size and self.start_point.size:
             raise InvalidValueError(name, 'given', 'left out where the start is a point: there '
                                     'the arm rests')
+
+    def _set_constraints(self) -> None:
+        """Check the limits on the way."""
+        given = tuple(self.path_constraints)
+        for i, one in enumerate(given):
+            name = f'path_constraints[{i}]'
+            if not isinstance(one, PathConstraint):
+                raise InvalidValueError(name, one, 'a PathConstraint, such as KeepOut')
+            one.check(name, self.arm)
+        object.__setattr__(self, 'path_constraints', given)
+
+    def _set_via_points(self) -> None:
+        """Check the via points."""
+        points = check_via_points(self.arm, tuple(self.via_points), self.duration,
+                                  MAX_JOINT_ANGLE)
+        object.__setattr__(self, 'via_points', points)
+        if points and self.time_weight:
+            raise InvalidValueError('time_weight', self.time_weight, '0 where there are via '
+                                    'points: their times are those of a given duration')
 
     def _set(self, name: str, value: Array) -> None:
         object.__setattr__(self, name, value)

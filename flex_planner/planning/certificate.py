@@ -12,6 +12,7 @@ from flex_planner.dynamics.integration import integrate
 from flex_planner.dynamics.statics import residual_vibration
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.planned_torque import PlannedTorque
+from flex_planner.planning.constraint_margins import smallest_slack
 import numpy as np
 
 
@@ -27,7 +28,8 @@ class Certificate:
     boundary_error : float
         Left side of eq. (17) with W_p = W_v = 1, at the end of the re-simulation.
     hamiltonian_drift : float
-        Spread of H over the motion relative to its largest term; 0 on an extremal.
+        Spread of H over the motion relative to its largest term; 0 on an extremal. H may jump
+        where a via point is passed at a given time: the spread is that between such times.
     tip_error : float
         Distance of the re-simulated tip from the point that was asked for, or else from where the
         goal's joint angles have it [m].
@@ -37,6 +39,13 @@ class Certificate:
         Estimated largest error of states and costates at the nodes of the mesh, relative to
         the largest value of each. Of a plan that starts from another one it may be carried over,
         at twice its size or more, see `collocation.restart`.
+    via_error : float
+        Largest distance of the re-simulated tip from a via point at its time; of joint angles, the
+        largest error of one times the reach of the arm; 0 without via points [m].
+    limit_slack : float
+        Smallest slack of all limits on the way, at the nodes of the mesh in the re-simulation, as
+        a share of the limit's scale; ``inf`` without limits. `Plan.constraints` has those of the
+        motion as it is planned, between the nodes, too.
 
     """
 
@@ -47,6 +56,8 @@ class Certificate:
     residual_vibration: float = np.inf
     state_error: float = np.inf
     costate_error: float = np.inf
+    via_error: float = np.inf
+    limit_slack: float = np.inf
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,6 +73,7 @@ class CertificateLimits:
     hamiltonian_drift: float = 0.02
     tip_error: float = 1e-5
     residual_vibration: float = 1e-4
+    via_error: float = 1e-5
 
     def violations(self, certificate: Certificate) -> list[str]:
         """Return a sentence for each limit that is not met."""
@@ -89,7 +101,8 @@ def certify(problem: MotionProblem, result: CollocationResult, monitor: Monitor,
     """
     if not np.isclose(result.solution.mesh[-1], problem.task.duration, rtol=1e-12):
         raise ValueError('the solution does not last as long as its task')
-    final, reached = simulate_to_goal(problem, result.solution, monitor, rtol)
+    states, torque = _simulate(problem, result.solution, monitor, rtol)
+    final, reached = states[-1], _target(problem, result.solution)
     if not np.isfinite(final).all():
         return Certificate(collocation_residual=result.residual)
     arm, n_t = problem.model.arm, problem.model.arm.n_coordinates
@@ -104,7 +117,9 @@ def certify(problem: MotionProblem, result: CollocationResult, monitor: Monitor,
         residual_vibration=residual_vibration(problem.model, _at_rest(problem) + miss,
                                               problem.goal[:n_t], problem.parameters),
         state_error=float(result.errors[:2 * n_t].max()),
-        costate_error=float(result.errors[2 * n_t:].max()))
+        costate_error=float(result.errors[2 * n_t:].max()),
+        via_error=_via_error(problem, torque.breaks, states),
+        limit_slack=smallest_slack(problem, states))
 
 
 def simulate_to_goal(problem: MotionProblem, solution: CollocationSolution, monitor: Monitor,
@@ -118,9 +133,33 @@ def simulate_to_goal(problem: MotionProblem, solution: CollocationSolution, moni
         If the monitor stopped it.
 
     """
-    states = integrate(problem.model, problem.parameters.physical, problem.start,
-                       PlannedTorque.of(problem, solution), monitor, rtol=rtol, atol=rtol / 100)
-    return states[-1], problem.target_state(solution.nodes[-1, :problem.goal.size])
+    states, _ = _simulate(problem, solution, monitor, rtol)
+    return states[-1], _target(problem, solution)
+
+
+def _simulate(problem: MotionProblem, solution: CollocationSolution, monitor: Monitor,
+              rtol: float) -> tuple[Array, PlannedTorque]:
+    """Return the states (N + 1, 2 n_t) at the breaks of the planned torque, and the torque."""
+    torque = PlannedTorque.of(problem, solution)
+    return integrate(problem.model, problem.parameters.physical, problem.start, torque, monitor,
+                     rtol=rtol, atol=rtol / 100), torque
+
+
+def _target(problem: MotionProblem, solution: CollocationSolution) -> Array:
+    """Return the state (2 n_t,) that a motion should reach."""
+    return problem.target_state(solution.nodes[-1, :problem.goal.size])
+
+
+def _via_error(problem: MotionProblem, times: Array, states: Array) -> float:
+    """Return by how much states at given times miss the via points [m]."""
+    via, arm, worst = problem.via, problem.model.arm, 0.0
+    for k, time in enumerate(via.times):
+        at = int(np.abs(times - time).argmin())
+        miss, _ = via.miss(k, states[at, :arm.n_coordinates])
+        size = (float(np.linalg.norm(miss)) if via.points[k].point.size
+                else float(np.abs(miss).max()) * arm.reach)
+        worst = max(worst, size if times[at] == time else np.inf)
+    return worst
 
 
 def _at_rest(problem: MotionProblem) -> Array:
@@ -133,8 +172,17 @@ def hamiltonian_drift(problem: MotionProblem, solution: CollocationSolution) -> 
     """Return the spread of H over the motion relative to the size of its terms."""
     times = np.linspace(0, problem.task.duration, 4 * solution.intervals + 1, dtype=np.float64)
     z = solution(times)
-    controls = problem.model.controls(z, problem.p)
+    controls = problem.controls(times, z)
     half = z.shape[1] // 2
     powers = np.abs(z[:, half:] * problem.rate(times, z)[:, :half]).max(axis=1)
     size = max(float(np.max(controls.cost_rate)), float(np.max(powers)), np.finfo(float).tiny)
-    return float(np.ptp(controls.hamiltonian)) / size
+    constant = controls.hamiltonian + problem.barrier_rate(z) - _due_change(problem, times, z)
+    phases = np.searchsorted(problem.junctions[problem.via.given], times, side='right')
+    spread = max(float(np.ptp(constant[phases == k])) for k in np.unique(phases))
+    return spread / size
+
+
+def _due_change(problem: MotionProblem, times: Array, z: Array) -> Array:
+    """Return how much H changes by the conditions themselves."""
+    rates = problem.hamiltonian_rate(times, z)
+    return np.append(0.0, np.cumsum((rates[1:] + rates[:-1]) / 2 * np.diff(times)))

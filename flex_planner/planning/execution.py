@@ -59,7 +59,7 @@ class ExecutionCertificate:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Robustness:
+class RobustnessReport:
     """
     Residual vibration of the same trajectory on other arms, with the PD; ``inf`` if they run away.
 

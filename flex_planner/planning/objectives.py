@@ -23,6 +23,8 @@ from flex_planner.base.validation import Array, number
 from flex_planner.collocation import CollocationSolution
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import MAX_TIME_WEIGHT, Task
+from flex_planner.optimal_control.via_points import free_times
+from flex_planner.planning.robust.objective import Robustness, RobustSearch
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -60,6 +62,9 @@ class Objectives:
     weight_tolerance : float
         delta W of condition (II): a weight is the smallest that meets its objective if the weight
         over 1 + weight_tolerance does not; 1e-4 to 1.
+    robustness : Robustness or None
+        Which errors of the model the residual vibration must forgive; met by an offset of the
+        effort, see `flex_planner.planning.robust`.
 
     Raises
     ------
@@ -72,12 +77,14 @@ class Objectives:
     max_torque_shares: Array = field(default_factory=lambda: np.zeros(0))
     max_modal_rates: Array = field(default_factory=lambda: np.zeros(0))
     weight_tolerance: float = 0.01
+    robustness: Robustness | None = None
 
     if TYPE_CHECKING:
         # arrays are made of anything like one; type checkers would insist on arrays
         def __init__(self, *, max_joint_speeds: ArrayLike = ...,
                      max_torque_shares: ArrayLike = ...,
-                     max_modal_rates: ArrayLike = ..., weight_tolerance: float = ...) -> None:
+                     max_modal_rates: ArrayLike = ..., weight_tolerance: float = ...,
+                     robustness: Robustness | None = ...) -> None:
             """Accept lists where arrays are kept."""
 
     def __post_init__(self) -> None:
@@ -95,7 +102,8 @@ class Objectives:
         InvalidSizeError
             If there are too few or too many.
         InvalidTaskError
-            If the duration is free: it would grow where weights are raised.
+            If the duration is free: it would grow where weights are raised; or if the time of a
+            via point is; or if the robustness does not go with the task, see `Robustness.check`.
 
         """
         arm = task.arm
@@ -106,9 +114,14 @@ class Objectives:
             if entries not in (0, count):
                 bound = f'a list of {count} numbers' if count else 'empty: the links are rigid'
                 raise InvalidSizeError(name, f'{entries} entries', bound)
+        if self.robustness is not None:
+            self.robustness.check(task)
         if task.time_weight:
             raise InvalidTaskError(f'time_weight is {task.time_weight:g}, but must be 0 where '
                                    'objectives are given')
+        if free_times(task.via_points):
+            raise InvalidTaskError('a via point has no time, but must have one where objectives '
+                                   'are given')
 
     def limits(self, objective: Objective, arm: Arm) -> Array:
         """Return the limits of all joints or modes, ``inf`` where there is none."""
@@ -164,12 +177,13 @@ def _peaks(objective: Objective, problem: MotionProblem,
     """Return the largest values over the motion."""
     n, n_t = problem.model.arm.n_joints, problem.model.arm.n_coordinates
     z = solution.values_at(_POINTS).reshape(-1, problem.size)
+    times = solution.times_at(_POINTS).ravel()
     if objective is Objective.MODAL_RATES:
         return _largest(z[:, 2 * n_t - problem.model.arm.n_modes:2 * n_t])
     rates = z[:, n_t:n_t + n]
     if objective is Objective.JOINT_SPEEDS:
         return _largest(rates)
-    torque = problem.model.controls(z, problem.p).torque
+    torque = problem.controls(times, z).torque
     return _largest(torque / problem.parameters.torque_limits.toward(torque, rates))
 
 
@@ -241,6 +255,8 @@ class ObjectiveSearch:
         The path of weights.
     margins : tuple of Margin
         One for each objective that needed a weight.
+    robust : RobustSearch or None
+        How errors of the model are forgiven; None if that was not asked for, or not come to.
 
     """
 
@@ -248,6 +264,7 @@ class ObjectiveSearch:
     met: bool
     trials: tuple[WeightTrial, ...] = ()
     margins: tuple[Margin, ...] = ()
+    robust: RobustSearch | None = None
 
 
 def minimum_effort(task: Task) -> Task:

@@ -19,13 +19,31 @@ from flex_planner.base.html_view import html_view
 from flex_planner.base.validation import Array
 from flex_planner.base.value_files import load_value, save_value
 from flex_planner.collocation import CollocationSolution, GaussRule
+from flex_planner.control.joint_controller import EffortHold, Gains, JointController
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.boundary_conditions import BoundaryConditions
+from flex_planner.optimal_control.constrained_motion import ConstrainedMotion
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.parameters import Parameters
+from flex_planner.optimal_control.path_constraints import (
+    BendingMoment,
+    Capsule,
+    Circle,
+    Deflection,
+    HalfPlane,
+    JointRange,
+    JointSpeed,
+    KeepOut,
+    PathSlacks,
+    SelfClearance,
+)
 from flex_planner.optimal_control.task import Task
 from flex_planner.optimal_control.torque_limits import TorqueLimits
+from flex_planner.optimal_control.torque_offset import OffsetProblem, TorqueOffset
+from flex_planner.optimal_control.via_conditions import ViaConditions
+from flex_planner.optimal_control.via_points import ViaPoint
 from flex_planner.planning.certificate import Certificate
+from flex_planner.planning.constraint_margins import ConstraintMargin
 from flex_planner.planning.kinds.clusters import KindOfMotion
 from flex_planner.planning.kinds.explorer import ExploredMotion
 from flex_planner.planning.objectives import (
@@ -35,6 +53,7 @@ from flex_planner.planning.objectives import (
     ObjectiveSearch,
     WeightTrial,
 )
+from flex_planner.planning.robust.objective import Robustness, RobustSearch, RobustTrial
 from flex_planner.planning.strategies.try_strategies import TriedStrategy
 from flex_planner.planning.warnings import PlanWarning, WarningKind
 import numpy as np
@@ -128,6 +147,12 @@ class Plan:
         When a motor reaches or leaves its limit [s].
     saturation : numpy.ndarray, shape (n,)
         Share of the time that each motor spends on its limit.
+    constraints : tuple of ConstraintMargin
+        How near the motion comes to each limit on the way; empty without limits or solution.
+    barrier_gap : float
+        Number of slacks times mu times duration, where limits bent the motion: by at most so much
+        J is above the least where the task is convex, which motions of arms are not; where it was
+        measured, J was nearer by far.
     kinds : tuple of KindOfMotion
         Kinds of motion that were met, at most four, that of the plan first; values of the others
         are of the arm made rigid.
@@ -158,6 +183,8 @@ class Plan:
     energy: float = np.inf
     switching_times: Array = field(default_factory=lambda: np.zeros(0))
     saturation: Array = field(default_factory=lambda: np.zeros(0))
+    constraints: tuple[ConstraintMargin, ...] = ()
+    barrier_gap: float = 0.0
     kinds: tuple[KindOfMotion, ...] = ()
     starts: int = 1
     warnings: tuple[PlanWarning, ...] = ()
@@ -186,6 +213,11 @@ class Plan:
     def model(self) -> ArmModel:
         """Return the arm's compiled functions."""
         return self.problem.model
+
+    @property
+    def via_times(self) -> Array:
+        """Return when the via points of the task are passed, shape (K,) [s]."""
+        return self.problem.junctions
 
     @property
     def mesh_intervals(self) -> int:
@@ -257,7 +289,7 @@ class Plan:
         times = self._within(times)
         arm, z = self.arm, self.solution(times)
         n_t = arm.n_coordinates
-        control = self.model.controls(z, self.problem.p)
+        control = self.problem.controls(times, z)
         lower, upper = TorqueLimits.of(arm).bounds(z[:, n_t:n_t + arm.n_joints])
         return Samples(
             times=times, coordinates=z[:, :n_t], rates=z[:, n_t:2 * n_t],
@@ -291,7 +323,11 @@ _SAVED = (Plan, PlanStatus, Certificate, Task, Arm, Link, BeamSection, Joint, El
           Node, SpatialArm, SpatialLink, SpatialBeam, SpatialBody, SpatialJoint, ArmModel,
           MotionProblem, BoundaryConditions, Parameters, CollocationSolution, GaussRule,
           ObjectiveSearch, Objectives, Objective, WeightTrial, Margin, KindOfMotion,
-          ExploredMotion, PlanWarning, WarningKind, TriedStrategy)
+          ExploredMotion, PlanWarning, WarningKind, TriedStrategy, ConstraintMargin,
+          ConstrainedMotion, PathSlacks, JointRange, JointSpeed, KeepOut, Circle, Capsule,
+          HalfPlane, SelfClearance, BendingMoment, Deflection, ViaPoint, ViaConditions,
+          OffsetProblem, TorqueOffset, Robustness, RobustSearch, RobustTrial, JointController,
+          Gains, EffortHold)
 
 
 def plan_view(plan: Plan) -> list[tuple[str, str]]:

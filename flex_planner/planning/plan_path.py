@@ -14,9 +14,10 @@ from typing import Any
 from flex_planner.base.errors import HoldingError, InvalidTaskError
 from flex_planner.base.processes import helper_processes
 from flex_planner.base.progress import Monitor
-from flex_planner.base.validation import integer
+from flex_planner.base.validation import Array, integer
 from flex_planner.collocation import CollocationSolution, KnownSolution, Solver
 from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.constrained_motion import ConstrainedMotion
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.kinds.clusters import KindOfMotion, MOST_KINDS
@@ -25,6 +26,7 @@ from flex_planner.planning.kinds.kinds_strategy import as_guess
 from flex_planner.planning.objectives import Objectives
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_problem import plan_problem
+from flex_planner.planning.plan_within_limits import check_ends, keep_limits, plan_again_within
 from flex_planner.planning.proofs import (
     check_duration,
     find_doubt,
@@ -32,12 +34,13 @@ from flex_planner.planning.proofs import (
     Proof,
     prove_not_held,
 )
+from flex_planner.planning.robust.make_robust import make_robust
 from flex_planner.planning.stiff_links import find_stiff_links
 from flex_planner.planning.strategies.catalogue import CATALOGUE
 from flex_planner.planning.strategies.initial_guesses import restart, warm_start
 from flex_planner.planning.strategies.strategy import Strategy
 from flex_planner.planning.warnings import find_arm_warnings
-from flex_planner.planning.weight_search import adapt_weights
+from flex_planner.planning.weight_search import adapt_weights, check_objectives
 import numpy as np
 
 
@@ -99,7 +102,8 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
     solver = (solver or Solver()).watched_by(monitor)
     parameters = task_parameters(task)
     try:
-        problem = MotionProblem(model, task, parameters)
+        problem = MotionProblem(model, task, parameters,
+                                via_times=_known_times(task, start_from))
     except HoldingError as error:
         refused = MotionProblem(model, task, parameters, holds=False)
         return _impossible(refused, prove_not_held(error, task.payload_mass))
@@ -112,19 +116,43 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
     doubt = find_doubt(problem)
     if doubt is not None:
         return _not_found(problem, doubt)
-    plan = _plan_as_rigid(problem, solver, start_from, objectives, strategies, effort)
+    broken = check_ends(problem)
+    if broken:
+        return _not_possible(problem, broken)
+    plan = (_plan_as_rigid(problem, solver, start_from, objectives, strategies, effort)
+            or _plan_again(problem, solver, start_from, objectives))
     if plan is not None:
-        return plan
+        return _forgive(plan, objectives, solver)
     plan = plan_problem(problem, solver, (*_given(start_from, problem, solver), *strategies),
                         effort)
     if plan.status in (PlanStatus.NOT_FOUND, PlanStatus.NOT_CONVERGED):
         proof = find_proof(problem, thorough=True)
         return plan if proof is None else replace(
             plan, status=PlanStatus.INFEASIBLE, message=str(proof))
-    # weights that meet an objective may well bring a motion back within its limits
-    if objectives is None or not plan.certified:
+    return _forgive(_keep(plan, solver, objectives, effort), objectives, solver)
+
+
+def _known_times(task: Task,
+                 start: Plan | KindOfMotion | CollocationSolution | None) -> Array | None:
+    """Return the times at which a given plan passes the via points of a task, if it does."""
+    if not (isinstance(start, Plan) and start.via_times.size == len(task.via_points) > 0):
+        return None
+    times = start.via_times * (task.duration / start.task.duration)
+    given = [via.time for via in task.via_points]
+    known = np.array([time if wanted is None else wanted
+                      for time, wanted in zip(times.tolist(), given, strict=True)])
+    return known if (np.diff([0.0, *known, task.duration]) > 0).all() else None
+
+
+def _forgive(plan: Plan, objectives: Objectives | None, solver: Solver) -> Plan:
+    """Return the plan that forgives errors of the model, if that is asked and it can be made."""
+    if objectives is None or objectives.robustness is None or not plan.certified:
         return plan
-    return adapt_weights(plan, objectives, solver)
+    if isinstance(plan.problem, ConstrainedMotion):
+        return replace(plan, status=PlanStatus.OBJECTIVE_NOT_MET, message=(
+            f'{PlanStatus.OBJECTIVE_NOT_MET.value}; max_residual is given, but limits on the way '
+            'bend the motion, and such a motion cannot be made to forgive errors of the model'))
+    return make_robust(plan, objectives, solver)
 
 
 def plan_kind(task: Task, number: int, **options: Any) -> Plan:
@@ -161,6 +189,39 @@ def plan_kind(task: Task, number: int, **options: Any) -> Plan:
     return replace(plan, kinds=(*plan.kinds[:1], *others), starts=best.starts)
 
 
+def _keep(plan: Plan, solver: Solver, objectives: Objectives | None,
+          effort: SearchEffort) -> Plan:
+    """Return a plan that meets its objectives and keeps its limits on the way."""
+    # weights that meet an objective may well bring a motion back within its limits
+    if objectives is not None and plan.certified:
+        plan = adapt_weights(plan, objectives, solver)
+    within = keep_limits(plan, solver, effort)
+    if within is plan or objectives is None:
+        return within
+    return check_objectives(within, plan.objectives, objectives)
+
+
+def _plan_again(problem: MotionProblem, solver: Solver,
+                start: Plan | KindOfMotion | CollocationSolution | None,
+                objectives: Objectives | None) -> Plan | None:
+    """Return the plan from a motion that limits on the way have bent; None from another one."""
+    if isinstance(start, KindOfMotion):
+        start_problem, solution = start.motion.problem, start.motion.solution
+    elif isinstance(start, Plan) and start.solution is not None:
+        start_problem, solution = start.problem, start.solution
+    else:
+        return None
+    if objectives is not None or not isinstance(start_problem, ConstrainedMotion):
+        return None
+    return plan_again_within(problem, solution, solver)
+
+
+def _not_possible(problem: MotionProblem, why: str) -> Plan:
+    """Return the plan of a task whose ends break a limit on the way."""
+    return Plan(task=problem.task, status=PlanStatus.INFEASIBLE, message=why, strategy='',
+                problem=problem, solution=None, warnings=find_arm_warnings(problem.model.arm))
+
+
 def _impossible(problem: MotionProblem, proof: Proof) -> Plan:
     """Return the plan of a task that no motion does."""
     return Plan(task=problem.task, status=PlanStatus.INFEASIBLE, message=str(proof), strategy='',
@@ -178,6 +239,8 @@ def _plan_as_rigid(problem: MotionProblem, solver: Solver,
     solution = start.solution if isinstance(start, Plan) else start
     if isinstance(solution, CollocationSolution):
         solution = stiff.restrict(solution)
+    if objectives is not None:  # rigid links leave nothing to forgive
+        objectives = replace(objectives, robustness=None)
     plan = plan_path(stiff.task(), solver=solver, start_from=solution, objectives=objectives,
                      strategies=strategies, search=effort)
     return stiff.lift(plan, solver)

@@ -10,6 +10,7 @@ from flex_planner.collocation import CollocationResult, Solver, SolverStatus
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import MAX_DURATION
 from flex_planner.optimal_control.totals import integrate_totals
+from flex_planner.optimal_control.via_points import free_times
 from flex_planner.planning.advice import suggest_changes
 from flex_planner.planning.certificate import CertificateLimits, certify
 from flex_planner.planning.kinds.cheaper import find_cheaper
@@ -21,6 +22,12 @@ from flex_planner.planning.strategies.initial_guesses import WARM_START
 from flex_planner.planning.strategies.price_continuation import free_duration
 from flex_planner.planning.strategies.strategy import Attempt, Strategy
 from flex_planner.planning.strategies.try_strategies import TriedStrategy, try_strategies
+from flex_planner.planning.strategies.via_times import (
+    choose_via_times,
+    free_via_times,
+    move_free_via_points,
+    TimedMotion,
+)
 from flex_planner.planning.verdict import judge
 from flex_planner.planning.warnings import find_arm_warnings
 
@@ -31,6 +38,7 @@ STOP_STATUS = {StopReason.TIMEOUT: PlanStatus.TIMEOUT, StopReason.CANCELED: Plan
 _REFINEMENTS = 2
 _REFINEMENT_FACTOR = 10.0
 _STRICTER = 100.0
+_MOVED = 'homotopy in via points at free times'
 # longer guesses of a free duration
 _GUESSES = (2.0, 4.0, 8.0)
 
@@ -60,10 +68,13 @@ def plan_problem(problem: MotionProblem, solver: Solver,
     try:
         if problem.task.time_weight:
             problem, strategy, attempt = _solve_in_any_time(problem, solver, strategies, tried)
+        elif free_times(problem.task.via_points):
+            problem, strategy, attempt = _solve_at_via_times(problem, solver, strategies, tried)
         else:
             strategy, attempt = try_strategies(problem, solver, strategies, tried)
         plan = _conclude(problem, strategy, attempt, solver)
         if (effort.explores and strategy != WARM_START and plan.solution is not None
+                and not problem.junctions.size  # kinds are looked for without via points
                 and plan.status not in STOP_STATUS.values()
                 and plan.cost > 0):  # nothing is cheaper than nothing
             plan = _look_for_cheaper(plan, attempt, solver, effort)
@@ -74,6 +85,47 @@ def plan_problem(problem: MotionProblem, solver: Solver,
     warnings = plan.warnings or find_arm_warnings(problem.task.arm)
     return replace(plan, warnings=warnings, iterations=solver.monitor.iteration,
                    tried=tuple(tried), planning_time=solver.monitor.elapsed)
+
+
+def _solve_at_via_times(
+        problem: MotionProblem, solver: Solver, strategies: Sequence[Strategy],
+        tried: list[TriedStrategy]) -> tuple[MotionProblem, str, Attempt]:
+    """
+    Solve a task whose via points have free times: at times that are near, then at the best.
+
+    Where no quick strategy leads to a motion at such times they may be too demanding; then via
+    points are moved with free times.
+
+    """
+    warm = [strategy for strategy in strategies if strategy.name == WARM_START]
+    near = TimedMotion(problem, CollocationResult.failed(problem.straight_line(
+        solver.settings.intervals, solver.settings.rule), 'not looked for'))
+    if not warm:
+        solver.monitor.phase = 'motion without via points'
+        near = choose_via_times(problem, solver)
+    quick = [strategy for strategy in strategies if strategy.quick] or strategies
+    name, attempt = try_strategies(near.problem, solver, quick, tried)
+    if attempt.result.converged:
+        solver.monitor.phase = 'times of via points freed'
+        found = free_via_times(near.problem, attempt.result, solver)
+        if found.result.converged or found.result.status in INTERRUPTED_STATUS:
+            return found.problem, name, Attempt(result=found.result)
+    if warm:
+        near = choose_via_times(problem, solver)
+    solver.monitor.phase = _MOVED
+    moved = move_free_via_points(near, solver)
+    if moved.result.converged or moved.result.status in INTERRUPTED_STATUS:
+        return moved.problem, _MOVED, Attempt(result=moved.result)
+    slow = [strategy for strategy in strategies if strategy not in quick]
+    if attempt.result.converged or not slow:
+        return near.problem, name, Attempt(result=moved.result)
+    names, failure = f'{name}, {_MOVED}', f'{attempt.result.message}; {moved.result.message}'
+    name, attempt = try_strategies(near.problem, solver, slow, tried)
+    if attempt.result.converged:
+        found = free_via_times(near.problem, attempt.result, solver)
+        return found.problem, name, Attempt(result=found.result)
+    return near.problem, f'{names}, {name}', replace(attempt, result=replace(
+        attempt.result, message=f'{failure}; {attempt.result.message}'))
 
 
 def _look_for_cheaper(plan: Plan, attempt: Attempt, solver: Solver,
@@ -89,14 +141,14 @@ def _look_for_cheaper(plan: Plan, attempt: Attempt, solver: Solver,
     if met.result is attempt.result:
         plan = replace(plan, kinds=met.kinds[:MOST_KINDS], starts=met.starts)
         return replace(plan, message=describe_choice(plan)) if plan.solved else plan
-    other = _conclude_in_time(cheapest.problem, plan.strategy, met, solver)
+    other = conclude(cheapest.problem, plan.strategy, met, solver)
     if other.status is PlanStatus.CANCELED:
         return other
     better = other.solved > plan.solved or other.cost < plan.cost
     return other if better and other.solved >= plan.solved else plan
 
 
-def _conclude_in_time(problem: MotionProblem, strategy: str, attempt: Attempt,
+def conclude(problem: MotionProblem, strategy: str, attempt: Attempt,
                       solver: Solver) -> Plan:
     """Return the plan of another motion of the same task, in the time that is best for it."""
     if problem.task.time_weight:

@@ -79,7 +79,10 @@ def _first_times(motion: PublishedMotion, longest: float) -> Array:
     if begin and motion.ramp[1]:
         breaks.append(begin + motion.ramp[1])
     if np.ceil((end - begin) / longest) + motion.kinks.size <= MAX_SAMPLES:
-        for time in motion.kinks.tolist():
+        marks = motion.marks.tolist()
+        apart = [time for time in motion.kinks.tolist()
+                 if all(abs(time - mark) >= SMALLEST_STEP for mark in marks)]
+        for time in sorted([*apart, *marks]):
             if breaks[-1] + SMALLEST_STEP <= time <= end - SMALLEST_STEP:
                 breaks.append(time)
     pieces = [np.linspace(first, last, int(np.ceil((last - first) / longest)), endpoint=False)

@@ -83,8 +83,15 @@ class PublishedMotion:
     @property
     def kinks(self) -> Array:
         """Return when the slope of an effort jumps [s]."""
-        kinks: Array = self.begin + self.plan.switching_times + self.delay
+        bends = np.concatenate([self.plan.switching_times, self.plan.via_times])
+        kinks: Array = np.sort(self.begin + bends + self.delay)
         return kinks
+
+    @property
+    def marks(self) -> Array:
+        """Return the times of which each is to have a point: those of via points [s]."""
+        marks: Array = self.begin + self.plan.via_times
+        return marks
 
     def motion(self, times: Array) -> tuple[Array, Array]:
         """Return positions [rad] and velocities [rad/s] at times (m,), shape (m, n)."""

@@ -119,7 +119,7 @@ class FastVibrations:
             vibration += residual_vibration(problem.model, state, rest[:n_t], problem.parameters)
         return Certificate(collocation_residual=0.0, boundary_error=error, hamiltonian_drift=0.0,
                            tip_error=away, residual_vibration=vibration, state_error=0.0,
-                           costate_error=0.0)
+                           costate_error=0.0, via_error=0.0)
 
 
 def price_rest(along: Sequence[FastVibrations], start: Array, goal: Array, *,

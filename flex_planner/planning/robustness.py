@@ -9,29 +9,33 @@ and payloads lighter and heavier, by a tenth.
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 from flex_planner.arms.arm import Arm
 from flex_planner.base.errors import NoEquilibriumError
 from flex_planner.base.progress import Monitor
-from flex_planner.base.validation import Array
 from flex_planner.control.feedback_stability import feedback_growth
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.physical_parameters import PhysicalParameters
-from flex_planner.dynamics.statics import equilibrium
 from flex_planner.planning.execution import (
     describe_controller,
     Execution,
     ExecutionCertificate,
-    Robustness,
+    RobustnessReport,
     UNSTABLE_GROWTH,
 )
 from flex_planner.planning.plan import Plan
+from flex_planner.planning.robust.differing_arms import (
+    differing_parameters,
+    MORE_MODES,
+    other_execution,
+    plain_parameters,
+    with_more_modes,
+)
 from flex_planner.planning.sampling import SampledPlan
 from flex_planner.planning.warnings import PlanWarning, WarningKind
 import numpy as np
 
-MORE_MODES = 2
 DIFFERENCE = 0.1
 # of the nominal vibration, and as a share of the reach: a vibration above both is told of
 _FAR_ABOVE, _NOTABLE = 10.0, 1e-4
@@ -41,7 +45,7 @@ _POSTURES = 5
 
 
 def assess_robustness(plan: Plan, sampled: SampledPlan,
-                      monitor: Monitor | None = None) -> Robustness:
+                      monitor: Monitor | None = None) -> RobustnessReport:
     """
     Return what is left of a sampled plan on arms that are not quite that of the plan.
 
@@ -75,10 +79,10 @@ def assess_robustness(plan: Plan, sampled: SampledPlan,
     more, growth = nominal, sampled.execution.feedback_growth
     if plan.arm.n_passive:
         other = replace(execution, dynamics=ArmDynamics.of(with_more_modes(plan.arm)))
-        more = _vibration(execution, other.dynamics, _physical(given), sampled, monitor)
+        more = _vibration(execution, other.dynamics, plain_parameters(given), sampled, monitor)
         positions = plan.uniform_samples(_POSTURES).coordinates[:, :plan.arm.n_joints]
         growth = feedback_growth(other.arm, positions)
-    return Robustness(
+    return RobustnessReport(
         nominal=nominal, more_modes=more, more_modes_growth=growth,
         stiffness_differs=worst(*_scaled(given, rigidity=True)) if plan.arm.n_passive else nominal,
         payload_differs=worst(*_scaled(given, rigidity=False)) if payload else nominal)
@@ -90,14 +94,7 @@ def prepare_robustness(arm: Arm) -> None:
         ArmDynamics.of(with_more_modes(arm))
 
 
-def with_more_modes(arm: Arm) -> Arm:
-    """Return an arm whose flexible links have two more modes, as far as links may have them."""
-    return replace(arm, links=tuple(
-        link.with_more_modes(MORE_MODES) if link.modes else link
-        for link in arm.links))
-
-
-def robustness_warnings(certificate: ExecutionCertificate, robustness: Robustness,
+def robustness_warnings(certificate: ExecutionCertificate, robustness: RobustnessReport,
                         reach: float) -> list[PlanWarning]:
     """
     Return what a user should know before an arm carries a motion out.
@@ -106,7 +103,7 @@ def robustness_warnings(certificate: ExecutionCertificate, robustness: Robustnes
     ----------
     certificate : ExecutionCertificate
         Of the trajectory.
-    robustness : Robustness
+    robustness : RobustnessReport
         Of it.
     reach : float
         Of the arm [m].
@@ -157,45 +154,17 @@ def _millimetres(length: float) -> str:
 
 def _scaled(given: PhysicalParameters, *, rigidity: bool) -> list[PhysicalParameters]:
     """Return the parameters with less and with more of the stiffness, or of the payload."""
-    factors = 1 - DIFFERENCE, 1 + DIFFERENCE
-    plain = _physical(given)
+    errors = -DIFFERENCE, DIFFERENCE
     if rigidity:
-        return [replace(plain, rigidity=given.rigidity * factor) for factor in factors]
-    return [replace(plain, payload_mass=given.payload_mass * factor,
-                    payload_inertia=given.payload_inertia * factor) for factor in factors]
-
-
-def _physical(given: PhysicalParameters) -> PhysicalParameters:
-    """Return the part of a plan's parameters that is about the arm."""
-    return PhysicalParameters(**{one.name: getattr(given, one.name)
-                                 for one in fields(PhysicalParameters)})
+        return [differing_parameters(given, error, 0.0) for error in errors]
+    return [differing_parameters(given, 0.0, error) for error in errors]
 
 
 def _vibration(nominal: Execution, dynamics: ArmDynamics, parameters: PhysicalParameters,
                sampled: SampledPlan, monitor: Monitor | None) -> float:
     """Return the residual vibration of another arm that follows the trajectory [m]."""
     try:
-        start = _start(nominal, dynamics, parameters)
+        other = other_execution(nominal, dynamics, parameters)
     except NoEquilibriumError:
         return float(np.inf)
-    other = replace(nominal, dynamics=dynamics, parameters=parameters, start=start)
     return other.vibration(other.arrive(sampled.reference, monitor))
-
-
-def _start(nominal: Execution, dynamics: ArmDynamics, parameters: PhysicalParameters) -> Array:
-    """Return where another arm starts: as far from its rest as the one that was planned for."""
-    planned, arm = nominal.dynamics.arm, dynamics.arm
-    angles = nominal.start[:planned.n_joints]
-    rest, _ = equilibrium(nominal.dynamics, angles, nominal.parameters)
-    other, _ = equilibrium(dynamics, angles, parameters)
-    start = np.concatenate([other, np.zeros_like(other)])
-    away = nominal.start - np.concatenate([rest, np.zeros_like(rest)])
-    for half in (0, 1):
-        own, theirs = half * planned.n_coordinates, half * arm.n_coordinates
-        first = arm.n_joints + len(arm.elastic_joints)
-        start[theirs:theirs + first] += away[own:own + first]
-        for mine, its in zip(planned.modal_slices, arm.modal_slices, strict=True):
-            count = mine.stop - mine.start
-            start[theirs + its.start:theirs + its.start + count] += (
-                away[own + mine.start:own + mine.stop])
-    return start

@@ -24,7 +24,7 @@ from flex_planner.planning.execution import (
     Execution,
     ExecutionCertificate,
     ExecutionLimits,
-    Robustness,
+    RobustnessReport,
 )
 from flex_planner.planning.plan import Plan, PlanStatus, Samples
 from flex_planner.planning.point_times import MAX_SAMPLES, point_times, SMALLEST_STEP
@@ -62,7 +62,7 @@ class SampledPlan:
         For which efforts are shifted by a half; 0 if they are not [s].
     execution : ExecutionCertificate
         What the controller makes of times, joints and efforts.
-    robustness : Robustness or None
+    robustness : RobustnessReport or None
         What it makes of them on other arms; None unless `assess_robustness` has found out.
     start_hold : float
         How long the arm is held before the motion [s].
@@ -75,7 +75,7 @@ class SampledPlan:
     torque_error: float
     controller_period: float
     execution: ExecutionCertificate
-    robustness: Robustness | None = None
+    robustness: RobustnessReport | None = None
     start_hold: float = 0.0
 
     @property

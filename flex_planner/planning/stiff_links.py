@@ -141,6 +141,8 @@ class StiffLinks:
         task = self._problem.task
         asked = [getattr(task, name)[~self._kept] for name in _ENTRIES]
         hard = all(np.isinf(values).all() for values in asked[4:])
+        if any(one.bends for one in task.path_constraints):
+            return False
         return hard and not (np.any(asked[:4]) or task.start_modal_displacements.size)
 
     def _problem_of(self, plan: Plan) -> MotionProblem:
@@ -249,8 +251,8 @@ def _unsolved(plan: Plan, problem: MotionProblem) -> Plan:
 
 
 def find_stiff_links(problem: MotionProblem, solver: Solver) -> StiffLinks | None:
-    """Return the stiff links and joints of a problem; None without any."""
-    if not problem.model.arm.n_passive:
+    """Return the stiff links and joints of a problem; None without any, or with via points."""
+    if not problem.model.arm.n_passive or problem.junctions.size:
         return None
     try:
         found = StiffLinks(problem, solver)

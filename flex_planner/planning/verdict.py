@@ -7,9 +7,13 @@ from dataclasses import replace
 from flex_planner.collocation import CollocationSolution
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.planning.bending import find_bending, LARGEST
+from flex_planner.planning.constraint_margins import find_margins
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.warnings import find_warnings
 from flex_planner.planning.way_limits import find_limit_violations
+
+# of the scale of a limit, by which the re-simulated motion may pass it
+_DRIFT = 1e-4
 
 
 def judge(plan: Plan) -> Plan:
@@ -23,9 +27,10 @@ def judge(plan: Plan) -> Plan:
 
     """
     assert plan.solution is not None
-    refused = find_refusal(plan.problem, plan.solution)
+    refused = find_refusal(plan.problem, plan.solution) or _find_drift(plan)
     status, message = refused or (PlanStatus.SOLVED, plan.message)
     return replace(plan, status=status, message=message,
+                   constraints=find_margins(plan.problem, plan.solution),
                    warnings=find_warnings(plan.problem, plan.solution))
 
 
@@ -55,7 +60,20 @@ def find_refusal(problem: MotionProblem,
         return PlanStatus.LIMIT_VIOLATED, (
             f'{violations[0]}{more}; another duration, another posture at start or goal, or '
             'weights on positions or speeds may lead past')
+    broken = [one for one in find_margins(problem, solution) if not one.kept]
+    if broken:
+        return PlanStatus.LIMIT_VIOLATED, str(min(broken, key=lambda one: one.slack))
     return None if problem.task.allow_large_bending else _find_bent_link(problem, solution)
+
+
+def _find_drift(plan: Plan) -> tuple[PlanStatus, str] | None:
+    """Refuse a motion that is planned within its limits, but re-simulated beyond one."""
+    slack = plan.certificate.limit_slack
+    if slack >= -_DRIFT:
+        return None
+    return PlanStatus.CERTIFICATE_FAILED, (
+        f'the re-simulated motion passes a limit on the way by {-slack:.2g} of its scale, but may '
+        f'by {_DRIFT:g} at most')
 
 
 def _find_bent_link(problem: MotionProblem,

@@ -94,6 +94,34 @@ def adapt_weights(plan: Plan, objectives: Objectives, solver: Solver) -> Plan:
     return found
 
 
+def check_objectives(plan: Plan, search: ObjectiveSearch | None, objectives: Objectives) -> Plan:
+    """
+    Return a plan that its limits on the way have bent, with whether it still meets objectives.
+
+    Parameters
+    ----------
+    plan : Plan
+        Within its limits.
+    search : ObjectiveSearch or None
+        What was found without them.
+    objectives : Objectives
+        Which weights were chosen for.
+
+    """
+    if plan.solution is None or not plan.certified:
+        return replace(plan, objectives=search)
+    shares = {one: float(objectives.shares(one, plan.problem, plan.solution).max())
+              for one in objectives.limited(plan.arm)}
+    missed = [f'{one.value}: {share:.4g} of what they may be' for one, share in shares.items()
+              if share > 1]
+    if search is not None:
+        search = replace(search, met=not missed)
+    if not missed or not plan.solved:
+        return replace(plan, objectives=search)
+    return replace(plan, objectives=search, status=PlanStatus.OBJECTIVE_NOT_MET, message=(
+        f'within the limits on the way the weights found do not meet {"; ".join(missed)}'))
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Trial:
     """A motion and how it meets the objectives: the largest share of each."""

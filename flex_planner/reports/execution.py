@@ -6,9 +6,10 @@ from flex_planner.arms.arm import Arm
 from flex_planner.planning.execution import (
     describe_controller,
     ExecutionCertificate,
-    Robustness,
+    RobustnessReport,
 )
-from flex_planner.planning.robustness import DIFFERENCE, MORE_MODES
+from flex_planner.planning.robust.differing_arms import MORE_MODES
+from flex_planner.planning.robustness import DIFFERENCE
 from flex_planner.reports.motion import Row
 import numpy as np
 
@@ -25,7 +26,7 @@ def execution_rows(certificate: ExecutionCertificate) -> list[Row]:
          f'error at the start grows to {certificate.open_loop_amplification:.2g} times its size')]
 
 
-def robustness_rows(robustness: Robustness, arm: Arm) -> list[Row]:
+def robustness_rows(robustness: RobustnessReport, arm: Arm) -> list[Row]:
     """Return the residual vibration on other arms: of a rigid arm there is none."""
     if not arm.n_modes:
         return []
@@ -33,7 +34,7 @@ def robustness_rows(robustness: Robustness, arm: Arm) -> list[Row]:
             *((f'  {change}', length) for change, length in vibrations(robustness))]
 
 
-def vibrations(robustness: Robustness) -> list[Row]:
+def vibrations(robustness: RobustnessReport) -> list[Row]:
     """Return what differs, and the residual vibration then."""
     return [(f'{MORE_MODES} more modes per link', millimetres(robustness.more_modes)),
             (f'stiffness +-{DIFFERENCE:.0%}', millimetres(robustness.stiffness_differs)),

@@ -8,6 +8,7 @@ import sys
 from flex_planner.arms.spatial_joint import slides
 from flex_planner.base.text import printable
 from flex_planner.capacity.results import MaxPayload
+from flex_planner.optimal_control.via_points import say_via_points
 from flex_planner.planning.certificate import Certificate
 from flex_planner.planning.kinds.clusters import KindOfMotion
 from flex_planner.planning.plan import Peaks, Plan
@@ -66,7 +67,14 @@ def certificate_rows(certificate: Certificate) -> list[Row]:
         ('  boundary error', f'{certificate.boundary_error:.1e}'),
         ('  Hamiltonian drift', f'{certificate.hamiltonian_drift:.1e}'),
         ('  re-simulated tip error', f'{certificate.tip_error * 1e3:.1e} mm'),
-        ('  residual vibration', f'{certificate.residual_vibration * 1e3:.1e} mm')]
+        ('  residual vibration', f'{certificate.residual_vibration * 1e3:.1e} mm'),
+        *via_rows(certificate)]
+
+
+def via_rows(certificate: Certificate) -> list[Row]:
+    """Return by how much via points are missed; empty without any, and of older reports."""
+    error = getattr(certificate, 'via_error', 0.0)
+    return [('  via points missed by', f'{error * 1e3:.1e} mm')] if error else []
 
 
 def plan_rows(plan: Plan) -> list[Row]:
@@ -100,6 +108,8 @@ def motion_rows(plan: Plan, peaks: Peaks) -> list[Row]:
             peaks.speeds, peaks.speed_shares, peaks.torques, peaks.torque_shares,
             map(slides, plan.arm.joints)))),
         ('motors on their limit', _saturation(plan)),
+        *(('passes', sentence) for sentence in say_via_points(plan.task.via_points,
+                                                              plan.via_times)),
         *certificate_rows(plan.certificate)]
 
 
@@ -109,7 +119,8 @@ def kind_rows(kinds: Sequence[KindOfMotion], starts: int, before: str, after: st
         return []
     rows = [('kinds of motion', f'{len(kinds)} found from {starts} starts')]
     return rows + [(f'  kind {i}', f'{before}{kind.value:.6g}{after}: {kind.sentence} (met '
-                                   f'{kind.met} times)') for i, kind in enumerate(kinds, 1)]
+                                   f'{"once" if kind.met == 1 else f"{kind.met} times"})')
+                   for i, kind in enumerate(kinds, 1)]
 
 
 def _saturation(plan: Plan) -> str:
@@ -129,7 +140,7 @@ def warning_rows(warnings: Sequence[PlanWarning]) -> list[Row]:
 def objective_rows(plan: Plan) -> list[Row]:
     """Return the weights that meet the objectives of a plan; empty if it has none."""
     search = plan.objectives
-    if search is None:
+    if search is None or not search.objectives.limited(plan.arm):
         return []
     if not search.trials:
         return [('objectives', 'met with the weights of the task')]
@@ -154,7 +165,7 @@ def payload_rows(found: MaxPayload) -> list[Row]:
     rows = [('status', found.status.value), ('method', found.method.value),
             planning_row(found.planning_time, f'{found.iterations} iterations'),
             ('largest payload', _bracket(found))]
-    if found.limiting_joint is not None:
+    if found.limiting_joint is not None and _limiting_share(found) > 0:
         rows.append(('limited by', _limit(found)))
     if np.isfinite(found.proved_upper):
         rows.append(('proved', f'no motion carries more than {found.proved_upper:.6g} kg '
@@ -181,10 +192,9 @@ def _bracket(found: MaxPayload) -> str:
 def _limit(found: MaxPayload) -> str:
     """Return the motor that limits the payload."""
     assert found.limiting_joint is not None
-    if found.held or found.plan is None:
-        reason = 'which can hold no more at the goal'
-    else:
-        reason = f'on its limit for {found.plan.saturation[found.limiting_joint]:.1%} of the time'
+    share = _limiting_share(found)
+    reason = ('which can hold no more at the goal' if np.isinf(share) else
+              f'on its limit for {share:.1%} of the time')
     return f'the motor of joint {found.limiting_joint + 1}, {reason}'
 
 
@@ -201,3 +211,11 @@ def search_table(found: MaxPayload) -> str:
             [str(i), f'{trial.payload:.6f}', f'{trial.step:.6f}', 'yes' if trial.solved else 'no',
              f'{trial.boundary_error:.1e}'] for i, trial in enumerate(found.trials, 1)])
     return ''
+
+
+def _limiting_share(found: MaxPayload) -> float:
+    """Return for which share of the time the limiting motor is on its limit; inf if it holds."""
+    assert found.limiting_joint is not None
+    if found.held or found.plan is None:
+        return np.inf
+    return float(found.plan.saturation[found.limiting_joint])

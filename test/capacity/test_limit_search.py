@@ -154,8 +154,9 @@ def test_search_over_kinds_is_stopped_wherever_it_is(rigid_model: ArmModel,
     task = paper_task(rigid_model.arm)
     assert_stopped_at(
         lambda monitor: find_max_payload(task, model=rigid_model, monitor=monitor),
-        {('kinds of motion, start 7 of 16', False): False,
-         ('payload at a rising price', False): False,
+        # nothing is met yet, but the payload of the task is planned in the time of grace
+        {('kinds of motion, start 7 of 16', False): True,
+         ('payload at a rising price', False): True,
          ('continuation to the limit', False): True, ('continuation to the limit', True): True})
 
 

@@ -472,3 +472,34 @@ def test_speed_limit_that_cannot_be_kept_or_read_is_a_failure_with_a_reason(
                  limits, '--no-plot', '--no-recording', '--output', str(tmp_path)])
     assert code == 1
     assert text in capsys.readouterr().err
+
+
+FORGIVING = ['plan', 'korayem_ei5', *MOTION, '--payload', '1', '--no-plot',
+             '--search', 'fast', '--max-residual', '0.0015']
+
+
+def test_plan_that_forgives_is_printed_recorded_and_checked(tmp_path: Path) -> None:
+    outcome = run(*FORGIVING, '--robust', '0.1,0.05', '--output', str(tmp_path))
+    assert outcome.code == 0, outcome.err
+    assert outcome.rows['forgives'] == '0.1 of stiffness, 0.05 of payload'
+    assert outcome.rows['residual bending'].endswith('may be 1.5 mm')
+    (path,) = (tmp_path / 'recordings').iterdir()
+    messages = recorded(str(path))
+    task, report = messages['motion_task'], messages['plan_report']
+    assert (task.stiffness_error, task.payload_error, task.max_residual) == (0.1, 0.05, 0.0015)
+    assert 0 < report.forgiven_residual <= 0.0015 < report.forgiven_residual_before
+    assert len(report.torque_offset) == 2 * (len(report.torque_offset_breaks) + 4)
+    # costates and efforts go together, with the torque that effort was measured from
+    checked = run('report', str(path))
+    assert checked.code == 0 and 'FAILED' not in checked.out
+
+
+@pytest.mark.parametrize(('options', 'message'), [
+    (['--robust', '0.1,0.1'], '--robust is given without --max-residual'),
+    (['--max-residual', '0'], '--max-residual is 0.0, but must be a number >= 1e-09'),
+    (['--max-residual', '0.001', '--robust', '0.1'], '--robust'),
+    (['--max-residual', '0.001', '--robust', '0.9,0.1'], '--robust, stiffness_error is 0.9'),
+])
+def test_wrong_forgiveness_names_the_option(options: list[str], message: str) -> None:
+    outcome = run('plan', 'korayem_ei5', *MOTION, *DRY, *options)
+    assert outcome.code != 0 and message in outcome.err

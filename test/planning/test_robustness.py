@@ -12,14 +12,11 @@ from flex_planner.control.joint_controller import Gains, JointController
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.statics import equilibrium
 from flex_planner.optimal_control.task import Task
-from flex_planner.planning.execution import Robustness
+from flex_planner.planning.execution import RobustnessReport
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_path
-from flex_planner.planning.robustness import (
-    assess_robustness,
-    robustness_warnings,
-    with_more_modes,
-)
+from flex_planner.planning.robust.differing_arms import with_more_modes
+from flex_planner.planning.robustness import assess_robustness, robustness_warnings
 from flex_planner.planning.sampling import (
     judge_execution,
     sample_plan,
@@ -44,7 +41,7 @@ def sampled(plan: Plan) -> SampledPlan:
 
 
 @pytest.fixture(scope='module')
-def robustness(plan: Plan, sampled: SampledPlan) -> Robustness:
+def robustness(plan: Plan, sampled: SampledPlan) -> RobustnessReport:
     return assess_robustness(plan, sampled)
 
 
@@ -64,7 +61,7 @@ def scaled(arm: Arm, factor: float) -> Arm:
 
 
 def test_figures_are_those_of_the_simulated_arm(plan: Plan, sampled: SampledPlan,
-                                                robustness: Robustness) -> None:
+                                                robustness: RobustnessReport) -> None:
     arm = plan.arm
     soft, stiff = (simulated_vibration(plan, sampled, scaled(arm, factor), 1.0)
                    for factor in (0.9, 1.1))
@@ -78,7 +75,7 @@ def test_figures_are_those_of_the_simulated_arm(plan: Plan, sampled: SampledPlan
 
 
 def test_vibration_far_above_the_nominal_one_is_warned_of(plan: Plan, sampled: SampledPlan,
-                                                          robustness: Robustness) -> None:
+                                                          robustness: RobustnessReport) -> None:
     more = replace(robustness, payload_differs=2e-4)
     warnings = robustness_warnings(sampled.execution, more, plan.arm.reach)
     assert [warning.kind for warning in warnings] == [WarningKind.SENSITIVE_TO_STIFFNESS,
@@ -115,7 +112,7 @@ def test_feedback_that_more_modes_make_unstable_is_told() -> None:
 
 
 def test_open_loop_that_magnifies_errors_is_told(plan: Plan, sampled: SampledPlan,
-                                                 robustness: Robustness) -> None:
+                                                 robustness: RobustnessReport) -> None:
     unstable = replace(sampled.execution, open_loop_amplification=345.6)
     first = robustness_warnings(unstable, robustness, plan.arm.reach)[0]
     assert first.kind is WarningKind.OPEN_LOOP_UNSTABLE

@@ -9,12 +9,15 @@ from factories import PlanFactory, TaskFactory
 from flex_planner.arms.arm import Arm, Joint, Link, Motor
 from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.capacity.results import PayloadMethod
+from flex_planner.collocation import Solver
+from flex_planner.collocation.solve import solve
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.certificate import CertificateLimits
 from flex_planner.planning.objectives import Objectives
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_path import plan_path
+from flex_planner.planning.verdict import find_refusal
 from flex_planner.planning.way_limits import (
     find_limit_violations,
     LimitKind,
@@ -66,14 +69,41 @@ def swinging(rigid_model: ArmModel) -> Plan:
     return plan_path(Task(arm=rigid_model.arm, **SWINGING), model=rigid_model)
 
 
-def test_motion_that_swings_through_a_limit_is_not_solved(rigid_model: ArmModel) -> None:
+@pytest.fixture(scope='module')
+def narrow_task(rigid_model: ArmModel) -> Task:
     joints = tuple(replace(joint, lower_limit=-2.2, upper_limit=2.2)
                    for joint in rigid_model.arm.joints)
-    plan = plan_path(Task(arm=replace(rigid_model.arm, joints=joints), **SWINGING),
-                     model=rigid_model)
+    return Task(arm=replace(rigid_model.arm, joints=joints), **SWINGING)
+
+
+def test_motion_that_swings_through_a_limit_is_refused(
+        rigid_model: ArmModel, narrow_task: Task, swinging: Plan) -> None:
+    refusal = find_refusal(problem_of(rigid_model, narrow_task), solution_of(swinging))
+    assert refusal is not None
+    status, message = refusal
+    assert status is PlanStatus.LIMIT_VIOLATED
+    assert message.startswith('joint 2 is at -176.26 deg at 1.586 s, 50.2 deg beyond its '
+                              'lower limit of -126.05 deg; another duration')
+
+
+def test_motion_that_would_swing_through_a_limit_is_planned_within_it(
+        rigid_model: ArmModel, narrow_task: Task) -> None:
+    plan = plan_path(narrow_task, model=rigid_model)
+    assert plan.solved, plan.message
+    # IPOPT on 80 intervals of 4 points
+    assert plan.cost == pytest.approx(3.5969466, rel=1e-4)
+    assert find_limit_violations(plan.problem, solution_of(plan)) == ()
+    nearest = min(plan.constraints, key=lambda one: one.slack)
+    assert nearest.name == 'lower limit of joint 2'
+    assert 0 < nearest.margin < 1e-4
+
+
+def test_where_limits_cannot_bend_a_motion_it_is_kept_but_not_solved(
+        rigid_model: ArmModel, narrow_task: Task) -> None:
+    # a method of another package knows of no barriers
+    other = Solver(backend=lambda *given, **named: solve(*given, **named))
+    plan = plan_path(narrow_task, model=rigid_model, solver=other, search='fast')
     assert (plan.status, plan.solved, plan.certified) == (PlanStatus.LIMIT_VIOLATED, False, True)
-    assert plan.message.startswith('joint 2 is at -176.26 deg at 1.586 s, 50.2 deg beyond its '
-                                   'lower limit of -126.05 deg; another duration')
     # what was found is kept, with its certificate
     assert CertificateLimits().violations(plan.certificate) == []
     assert plan.sample([1.586]).coordinates[0, 1] == pytest.approx(np.radians(-176.26), abs=1e-4)
@@ -129,22 +159,24 @@ def test_fastest_moment_of_a_single_link_is_that_of_its_parabola() -> None:
     for limit, passed in ((0.99 * fast, 1), (1.01 * fast, 0)):
         arm = Arm(name='bar', links=(link,), joints=(Joint(motor=Motor(max_speed=limit)),))
         for goal in (1.2, -1.2):
-            plan = plan_path(Task(arm=arm, start_positions=[0.0], goal_positions=[goal],
-                                  duration=2.0))
-            assert plan.solved is not bool(passed)
-            found = find_limit_violations(plan.problem, solution_of(plan))
+            task = Task(arm=arm, start_positions=[0.0], goal_positions=[goal], duration=2.0)
+            free = plan_path(replace(task, arm=replace(arm, joints=(Joint(),))))
+            assert plan_path(task).solved
+            found = find_limit_violations(problem_of(free.model, task), solution_of(free))
             assert [(one.time, one.value) for one in found] == passed * [
                 (pytest.approx(1.0, abs=1e-3), pytest.approx(np.sign(goal) * fast, abs=1e-8))]
             assert [one.limit for one in found] == passed * [np.sign(goal) * limit]
 
 
-def test_worst_of_several_is_told_with_their_number(rigid_model: ArmModel) -> None:
+def test_worst_of_several_is_told_with_their_number(
+        rigid_model: ArmModel, swinging: Plan) -> None:
     arm = limited(limited(rigid_model.arm, 0, max_speed=1.0), 1, lower_limit=-2.2)
-    plan = plan_path(Task(arm=arm, **SWINGING), model=rigid_model)
-    found = find_limit_violations(plan.problem, solution_of(plan))
+    problem = problem_of(rigid_model, Task(arm=arm, **SWINGING))
+    found = find_limit_violations(problem, solution_of(swinging))
     assert [one.share for one in found] == sorted((one.share for one in found), reverse=True)
     assert {one.kind for one in found} == {LimitKind.LOWER_ANGLE, LimitKind.SPEED}
-    assert plan.message.startswith(f'{found[0]} ({len(found) - 1} more limit')
+    _, message = find_refusal(problem, solution_of(swinging)) or (None, '')
+    assert message.startswith(f'{found[0]} ({len(found) - 1} more limit')
     speed = next(one for one in found if one.kind is LimitKind.SPEED)
     assert str(speed).startswith('joint 1 turns at -')
     assert str(speed).endswith('rad/s beyond its max_speed of 1')
@@ -157,11 +189,11 @@ def test_arm_without_limits_is_not_looked_at(swinging: Plan) -> None:
 def test_weights_that_meet_an_objective_may_bring_a_motion_back(
         rigid_model: ArmModel, paper_task: TaskFactory) -> None:
     arm = limited(rigid_model.arm, 0, max_speed=0.9)
-    plan = plan_path(paper_task(arm), model=rigid_model)
-    assert plan.status is PlanStatus.LIMIT_VIOLATED
     kept = plan_path(paper_task(arm), model=rigid_model,
                      objectives=Objectives(max_joint_speeds=[0.9, np.inf]))
     assert kept.solved, kept.message
+    # the free motion with these weights keeps the limit: no barrier is in it
+    assert (kept.barrier_gap, kept.objectives and kept.objectives.met) == (0.0, True)
 
 
 # A payload whose motion leaves a limit is not carried
@@ -173,13 +205,12 @@ def slow_arm(rigid_arm: Arm) -> Arm:
     return limited(rigid_arm, 1, max_speed=1.58)
 
 
-def test_payload_that_only_a_motion_beyond_a_limit_carries_is_not_carried(
+def test_largest_payload_is_that_of_a_motion_within_the_limits(
         rigid_model: ArmModel, slow_arm: Arm, paper_task: TaskFactory) -> None:
     found = find_max_payload(paper_task(slow_arm, 0.0), model=rigid_model)
-    assert found.status is PlanStatus.LIMIT_VIOLATED
-    assert 'joint 2 turns at ' in found.message
-    # what is certified instead is lighter than 5.85 kg, and keeps the limit
-    assert 0 < found.payload < 5.8
+    assert found.solved, found.message
+    # 5.855 kg without the limit, and 5.4 kg by motions that no limit bends
+    assert 5.75 < found.payload < found.local_upper < 5.855
     assert found.plan is not None
     assert find_limit_violations(found.plan.problem, solution_of(found.plan)) == ()
 

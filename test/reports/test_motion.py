@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from typing import Any
+from unittest.mock import Mock
 
 from flex_planner.arms.arm import Arm
 from flex_planner.capacity.incremental import PayloadTrial
 from flex_planner.capacity.results import MaxPayload, PayloadMethod
 from flex_planner.optimal_control.task import Task
+from flex_planner.planning.kinds.clusters import KindOfMotion
 from flex_planner.planning.plan import PlanStatus
 from flex_planner.reports.motion import (
     columns,
     joint_rows,
+    kind_rows,
     payload_rows,
     planning_row,
     search_table,
 )
+import pytest
 
 
 def search(arm: Arm, **found: Any) -> MaxPayload:
@@ -36,6 +40,13 @@ def test_planning_that_got_nowhere_names_no_strategy() -> None:
     assert planning_row(0.5, '', '3 iterations') == ('planned in', '0.50 s (3 iterations)')
 
 
+@pytest.mark.parametrize(('met', 'words'), [(1, '(met once)'), (3, '(met 3 times)')])
+def test_kind_says_how_often_it_was_met(met: int, words: str) -> None:
+    kind = KindOfMotion(value=2.0, sentence='straight', met=met, motion=Mock())
+    assert kind_rows([kind], 16, '', ' kg') == [
+        ('kinds of motion', '1 found from 16 starts'), ('  kind 1', f'2 kg: straight {words}')]
+
+
 def test_failed_search_has_no_bracket(rigid_arm: Arm) -> None:
     found = search(rigid_arm, status=PlanStatus.TIMEOUT)
     assert dict(payload_rows(found))['largest payload'] == 'none found'
@@ -54,3 +65,12 @@ def test_motor_that_can_hold_no_more_is_told(rigid_arm: Arm) -> None:
                    limiting_joint=1)
     rows = dict(payload_rows(found))
     assert rows['limited by'] == 'the motor of joint 2, which can hold no more at the goal'
+
+
+@pytest.mark.parametrize(('shares', 'row'), [
+    ([0.0, 0.0], None), ([0.25, 0.0], 'the motor of joint 1, on its limit for 25.0% of the time')])
+def test_motor_that_never_is_on_its_limit_limits_nothing(rigid_arm: Arm, shares: list[float],
+                                                         row: str | None) -> None:
+    found = search(rigid_arm, status=PlanStatus.TIMEOUT, payload=0.1, limiting_joint=0,
+                   plan=Mock(saturation=shares, solution=None, warnings=()))
+    assert dict(payload_rows(found)).get('limited by') == row

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 
+from flex_planner.ros.runtime import start
 import pytest
 
 START = [sys.executable, '-m', 'flex_planner.ros.runtime.start']
@@ -58,3 +59,15 @@ def test_node_needs_neither_streams_nor_a_home(tmp_path: Path) -> None:
     assert ended.returncode == 1
     assert ended.stderr.count('\n') == 1
     assert r"[arm_simulator]: arm file 'none\x1b[31m.yaml' does not exist" in ended.stderr
+
+
+@pytest.mark.parametrize('name', ['planner', 'arm_simulator', 'replay'])
+def test_help_says_how_a_node_is_started_and_starts_none(
+        name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(start, 'import_module', pytest.fail)
+    monkeypatch.setattr(start, 'prepare_process', lambda: None)
+    monkeypatch.setattr(sys, 'argv', [name, '--help'])
+    getattr(start, name)()
+    told = capsys.readouterr().out
+    assert told.startswith(f'usage: {name} [--ros-args ')
+    assert f'{name} --ros-args -p ' in told

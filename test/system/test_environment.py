@@ -229,6 +229,18 @@ class TestRun:
         assert done.returncode == 2
         assert 'usage' in done.stderr
 
+    def test_help_tells_the_usage(self):
+        done = self.run('--help')
+        assert (done.returncode, done.stderr) == (0, '')
+        assert done.stdout.startswith('usage: tools/run COMMAND')
+        assert self.run('--nonsense').returncode == 2
+
+    @pytest.mark.skipif(shutil.which('ros2') is not None, reason='ROS 2 is installed')
+    def test_missing_ros2_command_is_told_with_the_way_to_join(self):
+        done = self.run('ros2', 'topic', 'list', ROS_DOMAIN_ID='7')
+        assert done.returncode == 127
+        assert 'ROS_DOMAIN_ID=7' in done.stderr
+
     def test_foreign_environment_is_replaced(self):
         done = self.run('env', PYTHONPATH='/foreign', LD_LIBRARY_PATH='/foreign',
                         AMENT_PREFIX_PATH='/foreign', RMW_IMPLEMENTATION='foreign')

@@ -39,6 +39,7 @@ from flex_planner.reports.motion import (
     table,
     weights_table,
 )
+from flex_planner.reports.robust import robust_rows
 
 _STEP = 1.0
 
@@ -100,7 +101,8 @@ def _plan(options: argparse.Namespace) -> int:
 
     plan = run_with_progress(request.task.arm, request.time_limit, work)
     plan, reference, rows = _sample(request, plan)
-    _print_result(request, f'with {request.task.payload_mass:g} kg', [*plan_rows(plan), *rows])
+    _print_result(request, f'with {request.task.payload_mass:g} kg',
+                  [*plan_rows(plan), *robust_rows(plan), *rows])
     if text := weights_table(plan):
         print(f'\n{text}\n')
     print_files(outputs.write_plan(plan, reference if plan.solved else None))

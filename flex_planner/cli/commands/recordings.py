@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+import re
 import sys
 
 from flex_planner.base.errors import FlexPlannerError, RecordingError
@@ -17,6 +18,7 @@ from flex_planner.cli.signals import SIGNALS
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.recording import (
     definition_folder,
+    find_recordings,
     ForeignChannel,
     MessageTypes,
     read_metadata,
@@ -33,6 +35,8 @@ from flex_planner.reports.recording import (
 )
 
 _MOST_SECONDS, _FOLDER = 3600.0, Path('output')
+_NAME = re.compile(r'.+_(\d{8}T\d{6}_\d{9})_(\d{4,})')  # of what nodes and commands record
+_NEWEST = ', or a folder of recordings, of which it takes the newest'
 
 
 def add_commands(commands: Commands) -> None:
@@ -46,7 +50,7 @@ def _add_replay(commands: Commands) -> None:
     parser = _add_command(
         commands, 'replay', _replay, 'publish a recording again (needs ROS 2)',
         'Publish a recording on its topics, at its times and with its quality of service, then '
-        'end; Ctrl-C ends it earlier.')
+        'end; Ctrl-C ends it earlier.', _NEWEST)
     parser.add_argument('--rate', type=number_argument, default=1.0, metavar='FACTOR',
                         help='speed of the playback, 2 is twice as fast (default: 1)')
     parser.add_argument('--start', type=number_argument, default=0.0, metavar='S',
@@ -63,7 +67,7 @@ def _add_report(commands: Commands) -> None:
         commands, 'report', _report,
         'make an HTML page of a recorded plan, and check it',
         'Make one HTML file of a recorded request: task, outcome, certificate, and plots to zoom '
-        'into. It needs neither ROS nor a network.')
+        'into. It needs neither ROS nor a network.', _NEWEST)
     parser.add_argument('--output', type=path_argument, metavar='HTML',
                         help='the file (default: output/<recording>.html)')
     parser.add_argument('--check', action='store_true',
@@ -79,17 +83,26 @@ def _add_recover(commands: Commands) -> None:
 
 
 def _add_command(commands: Commands, name: str, run: Callable[[argparse.Namespace], int],
-                 summary: str, description: str) -> argparse.ArgumentParser:
+                 summary: str, description: str, newest: str = '') -> argparse.ArgumentParser:
     """Add a command that is about one recording."""
     parser = commands.add_parser(name, help=summary, description=description)
     parser.add_argument('recording', type=path_argument, metavar='RECORDING',
-                        help='folder of a recording, or its .mcap file')
+                        help=f'folder of a recording, or its .mcap file{newest}')
     parser.set_defaults(run=run)
     return parser
 
 
+def _newest(path: Path) -> Path:
+    """Return the newest recording of a folder that holds some, else the path itself."""
+    if not path.is_dir() or any(path.glob('*.mcap')):
+        return path
+    found = find_recordings(path, _NAME)
+    return found[-1].path if found else path
+
+
 def _replay(options: argparse.Namespace) -> int:
     """Play a recording back."""
+    options.recording = _newest(options.recording)
     rate = number('--rate', options.rate, at_least=1e-3, at_most=1e3)
     longest = read_metadata(options.recording).duration_ns * 1e-9
     start = number('--start', options.start, at_least=0, at_most=longest, unit='s')
@@ -110,6 +123,7 @@ def _replay(options: argparse.Namespace) -> int:
 
 def _report(options: argparse.Namespace) -> int:
     """Make a page of a recording; check its plan if that is wanted."""
+    options.recording = _newest(options.recording)
     request = RecordedRequest.read(options.recording)
     name = options.recording.resolve().name.removesuffix('.mcap')
     output = options.output or _FOLDER / f'{name}.html'

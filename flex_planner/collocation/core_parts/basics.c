@@ -59,6 +59,13 @@ struct interval {
     int pivots[SIZE];
 };
 
+/* intervals of no length, in order, and what holds there in the place of a step */
+struct junctions {
+    long long count;
+    const long long *intervals;
+    double *rows; /* (count, m, 2 m) */
+};
+
 struct last_node {
     double factors[SIZE * SIZE];
     int pivots[SIZE];

@@ -10,11 +10,15 @@ typedef int batch(long long n, int chain, const double *const *in, double *const
 typedef int boundary_rows(const double *first, const double *last, double *left, double *right,
                           double *left_rows, double *right_rows);
 
+/* the gap (m,) at a junction between two nodes (2, m), and if asked for its rows (m, 2 m) */
+typedef int junction_rows(long long junction, const double *nodes, double *gap, double *rows);
+
 enum { MOST_INPUTS = 8 };
 
 struct problem {
     batch *rate, *rate_jacobian;
     boundary_rows *ends;
+    junction_rows *junction;
     const double *shared[MOST_INPUTS]; /* inputs of the functions after the first */
 };
 

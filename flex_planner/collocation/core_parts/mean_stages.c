@@ -114,7 +114,7 @@ static void multiply_rows(struct interval *k, const struct scales *s, struct pro
         }
 }
 
-/* weighted sums over the pairs: of mu^(p - 1) S^-1 in `of`, of mu^(p - 1) in `ones`, p = 0 to 4 */
+/* weighted sums over the pairs: of mu^(p - 1) S^-1 in `of`, of mu^(p - 1) in `ones`, p = 1 to 4 */
 struct powers {
     double of[5][IMPLICIT][INNER], ones[5];
 };
@@ -122,11 +122,8 @@ struct powers {
 static void add_to_powers(struct powers *powers, double inverse[IMPLICIT][2 * INNER], double step,
                           double re, double im, double weight_re, double weight_im)
 {
-    double square = re * re + im * im;
-    double a = (weight_re * re + weight_im * im) / square;
-    double b = (weight_im * re - weight_re * im) / square;
-    double scale = 1 / step;
-    for (int p = 0; p < 5; ++p) {
+    double a = weight_re, b = weight_im, scale = 1;
+    for (int p = 1; p < 5; ++p) {
         double f = a * scale, g = b * scale, next = a * re - b * im;
         for (int i = 0; i < IMPLICIT; ++i)
             for (int c = 0; c < INNER; ++c)

@@ -19,6 +19,7 @@ struct newton {
     /* the last linear system, and what it was made of */
     struct factorisation *factorisation;
     double *jacobians, *left_rows, *right_rows, *scale;
+    struct junctions junctions;
     /* what comes of it */
     double norm;
     long long iterations, factorised, coarse;
@@ -66,6 +67,12 @@ static int find_residual(struct run *r, const struct point *at, int with_jacobia
     int failure = evaluate(&n->problem, n->count, n->rule, n->steps, at->nodes, at->stages,
                            r->residual.stages, r->residual.gaps,
                            with_jacobians ? n->jacobians : NULL, &r->watch);
+    for (long long j = 0; j < n->junctions.count && !failure; ++j) {
+        const long long first = n->junctions.intervals[j] * SIZE;
+        failure = n->problem.junction(j, at->nodes + first, r->residual.gaps + first,
+                                      with_jacobians ? n->junctions.rows + 2 * SIZE * SIZE * j
+                                                     : NULL);
+    }
     if (failure) return failure;
     return n->problem.ends(at->nodes, last, r->residual.left, r->residual.right,
                            with_jacobians ? n->left_rows : NULL,
@@ -192,7 +199,7 @@ static int iterate(struct run *r)
     n->factorised = 0;
     failure = factorise_system(n->factorisation, n->count, n->rule, n->steps, n->jacobians,
                                n->left_rows, n->right_rows, n->scale, n->explicit,
-                               n->implicit, &r->watch);
+                               n->implicit, &n->junctions, &r->watch);
     if (failure) return failure;
     n->factorised = 1;
     failure = measure(r, &r->full);
@@ -242,6 +249,8 @@ int solve_newton(struct newton *n)
         memcpy(n->nodes, r.solution.nodes, (n->count + 1) * SIZE * sizeof *memory);
         memcpy(n->stages, r.solution.stages, n->count * STAGES * SIZE * sizeof *memory);
     }
+    /* its watch ends here */
+    ((struct factorisation *)n->factorisation)->watch = NULL;
     free(memory);
     return outcome;
 }

@@ -17,6 +17,14 @@ static int measure_rows(struct scales *s, const double *left, const double *righ
     return 1;
 }
 
+/* the rows of a junction between two nodes at the same time, see junctions.py */
+static void join_nodes(const double *rows, const double *scale, double panel[ROWS][WIDTH])
+{
+    for (int i = 0; i < SIZE; ++i)
+        for (int j = 0; j < 2 * SIZE; ++j)
+            panel[LEFT + i][j] = rows[2 * SIZE * i + j] * scale[j % SIZE] / scale[i];
+}
+
 /* eliminate a node from the rows that contain it; the last LEFT rows are carried to the next */
 static int eliminate_node(struct interval *k, double panel[ROWS][WIDTH])
 {
@@ -47,15 +55,18 @@ static int eliminate_node(struct interval *k, double panel[ROWS][WIDTH])
 }
 
 /*
- * Factorise the linearised equations; what comes of it is kept in f. Nobody need watch.
+ * Factorise the linearised equations; what comes of it is kept in f. Nobody need watch; who
+ * does is asked by `correct`, too.
  *
  * jacobians (N, m, m), or (N, s, m, m) with EXACT; left (l, m) and right (m - l, m): boundary rows.
+ * At `junctions` intervals of no length, in order, rows (m, 2 m) stand for the step.
  */
 int factorise_system(struct factorisation *f, long long count, const struct rule *rule,
                      const double *steps, const double *jacobians, const double *left,
                      const double *right, const double *scale, const int *explicit,
-                     const int *implicit, struct watch *watch)
+                     const int *implicit, const struct junctions *junctions, struct watch *watch)
 {
+    long long passed = 0;
     struct scales *s = &f->scales;
     double panel[ROWS][WIDTH], carried[LEFT + 1][SIZE], transition[SIZE][SIZE];
     f->rule = *rule;
@@ -75,11 +86,14 @@ int factorise_system(struct factorisation *f, long long count, const struct rule
             return SINGULAR_STAGES;
         memset(panel, 0, sizeof panel);
         for (int i = 0; i < LEFT; ++i) memcpy(panel[i], carried[i], sizeof carried[i]);
-        for (int i = 0; i < SIZE; ++i) {
-            double *row = panel[LEFT + i];
-            for (int j = 0; j < SIZE; ++j) row[j] = -transition[i][j] * scale[j] / scale[i];
-            row[SIZE + i] = 1;
-        }
+        if (passed < junctions->count && junctions->intervals[passed] == n)
+            join_nodes(junctions->rows + 2 * SIZE * SIZE * passed++, scale, panel);
+        else
+            for (int i = 0; i < SIZE; ++i) {
+                double *row = panel[LEFT + i];
+                for (int j = 0; j < SIZE; ++j) row[j] = -transition[i][j] * scale[j] / scale[i];
+                row[SIZE + i] = 1;
+            }
         if (!eliminate_node(k, panel)) return SINGULAR_NODES;
         for (int i = 0; i < LEFT; ++i) memcpy(carried[i], panel[SIZE + i] + SIZE, sizeof carried[i]);
     }

@@ -32,6 +32,7 @@ from flex_planner.planning.kinds.newton_explorer import (
 )
 from flex_planner.planning.kinds.search import is_better, rigid_twin
 from flex_planner.planning.kinds.windings import say_turns
+from flex_planner.planning.plan import PlanStatus
 from flex_planner.planning.strategies.homotopies import has_weights
 from flex_planner.planning.strategies.initial_guesses import lift
 from flex_planner.planning.verdict import find_refusal
@@ -91,14 +92,16 @@ def find_cheaper(problem: MotionProblem, found: CollocationResult, solver: Solve
     own, rigid = as_kind(problem, found.solution), rigid_twin(problem)
     if rigid is None:
         return CheapestMotion(problem=problem, result=found, kinds=(own,), starts=1)
-    best = _Best(problem=problem, result=found, kind=own,
-                 refused=find_refusal(problem, found.solution) is not None)
+    refusal = find_refusal(problem, found.solution)
+    best = _Best(problem=problem, result=found, kind=own, refused=refusal is not None)
+    # a motion that leaves a limit on the way can be bent
+    hard = refusal is not None and refusal[0] is not PlanStatus.LIMIT_VIOLATED
     own_rigid = own if rigid is problem else None
     met = [kind for kind in known if _is_of(kind.motion, problem)]
     motions, starts = ([] if own_rigid is None else [own.motion]), 1
     if not met or best.refused or effort is SearchEffort.THOROUGH:
         motions, starts = explore_from_plan(rigid, own_rigid, newton_budget(problem, found),
-                                            solver, effort, hard=best.refused)
+                                            solver, effort, hard=hard)
     ways = explore_other_ways(problem, solver)
     better = is_better(Free.NOTHING)
     every = cluster([*motions, *(way.motion for way in ways)], better)

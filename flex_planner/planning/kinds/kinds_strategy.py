@@ -44,6 +44,8 @@ _NEAR, _NEAR_FLEXIBLE = 0.98, 0.9
 
 def explore_kinds(problem: MotionProblem, solver: Solver) -> Attempt | None:
     """Start from motions of the rigid arm that IPOPT finds from many paths, the cheapest first."""
+    if problem.junctions.size:  # paths are looked for without via points
+        return None
     bare = drop_weights(problem)
     rigid, starts = rigid_twin(bare), SearchEffort.NORMAL.starts
     if rigid is None:

@@ -23,6 +23,7 @@ from flex_planner.planning.strategies.limit_strategies import (
     continue_in_payload,
 )
 from flex_planner.planning.strategies.strategy import Strategy
+from flex_planner.planning.strategies.via_homotopy import move_via_points
 
 BARRIER = (Strategy('interior point', pass_barrier),
            Strategy('interior point from the rigid motion', pass_barrier_from_rigid))
@@ -31,6 +32,7 @@ CATALOGUE: tuple[Strategy, ...] = (
     Strategy('rigid motion first', lift_rigid_motion, quick=True),
     Strategy('homotopy in the weights', raise_weights, quick=True),
     Strategy('coarse mesh first', coarse_mesh, quick=True),
+    Strategy('homotopy in via points', move_via_points, quick=True),
     *BARRIER,
     Strategy('homotopy in vibration weights', lower_vibration_price),
     Strategy('homotopy in stiffness', soften_links),

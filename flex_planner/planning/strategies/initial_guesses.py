@@ -147,7 +147,9 @@ def rigid_problem(problem: MotionProblem) -> MotionProblem:
     rigid_task = replace(
         task, arm=task.arm.rigid(), start_positions=problem.start[:n],
         goal_positions=problem.goal[:n], start_point=none, goal_point=none,
-        start_modal_displacements=none, **{name: getattr(task, name)[:n] for name in entries})
+        start_modal_displacements=none,
+        path_constraints=tuple(one for one in task.path_constraints if not one.bends),
+        **{name: getattr(task, name)[:n] for name in entries})
     return MotionProblem(ArmModel.of(rigid_task.arm), rigid_task,
                          problem.parameters.drop_modes())
 
@@ -160,8 +162,8 @@ def direct_collocation(problem: MotionProblem, solver: Solver) -> Attempt | None
     arm starts from the rigid motion that is bent by its forces, if there is one.
 
     """
-    if np.isfinite(problem.goal_weights).any():
-        return None  # the transcription knows hard goals only
+    if np.isfinite(problem.goal_weights).any() or problem.junctions.size:
+        return None  # the transcription knows hard goals only, and no via points
     intervals = min(max(_DIRECT_INTERVALS, problem.fewest_intervals(_DIRECT_STAGES)),
                     solver.settings.max_intervals)
     direct = DirectProblem(problem.model, DirectSettings(

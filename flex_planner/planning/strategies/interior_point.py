@@ -21,6 +21,7 @@ from flex_planner.collocation import (
     SolverStatus,
 )
 from flex_planner.collocation.interior_point import BarrierSchedule, solve_barrier
+from flex_planner.collocation.junctions import place_junctions
 from flex_planner.optimal_control.barrier_problem import MotionBarrier
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.planning.strategies.initial_guesses import rigid_problem
@@ -93,11 +94,12 @@ def pass_barrier_from(problem: MotionProblem, near: CollocationSolution,
 def _pass_on_meshes(problem: MotionProblem, make_guess: MakeGuess,
                     tries: tuple[tuple[float, float], ...], solver: Solver) -> CollocationResult:
     """Return the solution that a guess leads to, on the first mesh and with the first mu."""
+    problem.model.prepare_barrier(solver.monitor)
     barrier, exact = MotionBarrier(problem), solver.with_settings(exact=True)
     rate = barrier.cost_rate
     for share, first in tries:
         count = int(share * max(_FEWEST, problem.fewest_intervals(_STAGES)))
-        guess = make_guess(min(count, solver.settings.max_intervals))
+        guess = place_junctions(problem, make_guess(min(count, solver.settings.max_intervals)))
         schedule = BarrierSchedule(first=first * rate, last=_LAST * rate, tolerance=_TOLERANCE,
                                    max_iterations=min(_PATIENCE, solver.settings.max_iterations))
         met = solve_barrier(barrier, guess, barrier.guess(guess, schedule.first), schedule,

@@ -155,8 +155,8 @@ def jump_in_price(parameter: FreeParameter, here: Extremal, target_gap: TargetGa
 
 def _fewest_intervals(problem: MotionProblem) -> int | None:
     """Return the intervals of the coarsest mesh; None where IPOPT is no way to the motion."""
-    if np.isfinite(problem.goal_weights).any():
-        return None  # the transcription knows hard goals only
+    if np.isfinite(problem.goal_weights).any() or problem.junctions.size:
+        return None  # the transcription knows hard goals only, and no via points
     fewest = problem.fewest_intervals(_STAGES)
     return fewest if fewest <= _MOST_FIRST else None  # and takes minutes on fine meshes
 

@@ -19,6 +19,7 @@ from flex_planner.collocation import (
 )
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import MAX_DURATION
+from flex_planner.optimal_control.via_points import free_times
 from flex_planner.planning.strategies.extremals import Extremal
 from flex_planner.planning.strategies.first_extremals import approach_limit
 from flex_planner.planning.strategies.free_parameters import (
@@ -44,11 +45,12 @@ def continue_in_payload(problem: MotionProblem, solver: Solver) -> Attempt | Non
     """
     Start with little payload and let it grow, at a rising price of effort, up to the task's.
 
-    What can be carried does not depend on the weights, which come last.
+    What can be carried does not depend on the weights, which come last. None where the times of
+    via points are free.
 
     """
     wanted = problem.task.payload_mass
-    if not wanted:
+    if not wanted or free_times(problem.task.via_points):
         return None
     light = drop_weights(PAYLOAD.with_value(problem, 0.0))
     extremals = collect_until(approach_limit(PAYLOAD, light, solver.coarse()),
@@ -80,7 +82,14 @@ def _reach_payload(problem: MotionProblem, extremals: list[Extremal],
 
 
 def continue_in_duration(problem: MotionProblem, solver: Solver) -> Attempt | None:
-    """Start with a longer duration and shorten it, at a rising price of time, to the task's."""
+    """
+    Start with a longer duration and shorten it, at a rising price of time, to the task's.
+
+    None where via points belong to the duration of the task.
+
+    """
+    if problem.junctions.size:
+        return None
     wanted, met = problem.task.duration, list[Extremal]()
     bare = drop_weights(problem)
     for factor in (factor for factor in _LONGER if wanted * factor <= MAX_DURATION):

@@ -55,7 +55,7 @@ def reach_limit(problem: MotionProblem, solver: Solver, target_gap: TargetGap) -
     most = _most_effort(problem)
     if not np.isfinite(most) or np.isfinite(problem.goal_weights).any():
         return None
-    barrier = PayloadBarrier(problem, _PRICE * most / _moved_mass(problem))
+    barrier = PayloadBarrier(problem, _PRICE * most / moved_mass(problem))
     found = _lower_mu(barrier, solver)
     if found is None:
         return None
@@ -98,9 +98,10 @@ def _count(problem: MotionProblem) -> int:
 def _lower_mu(barrier: PayloadBarrier, solver: Solver) -> CollocationSolution | None:
     """Return the motion at the end of the barrier."""
     problem = barrier.motion
+    problem.model.prepare_barrier(solver.monitor)
     count = min(_count(problem), solver.settings.max_intervals)
     guess = barrier.extend(problem.straight_line(count, GaussRule.of(_STAGES)))
-    scale = barrier.price * _moved_mass(problem) / problem.task.duration
+    scale = barrier.price * moved_mass(problem) / problem.task.duration
     schedule = BarrierSchedule(first=_FIRST * scale, last=_LAST * scale, tolerance=_TOLERANCE,
                                max_iterations=_PATIENCE)
     try:
@@ -123,6 +124,11 @@ def _cheapen(barrier: PayloadBarrier, payload: float, motion: CollocationSolutio
                                       motion.stages * costates, motion.rule)
 
 
+def barrier_price(problem: MotionProblem) -> float:
+    """Return a price of payload that is nearly endless [1/kg]; inf without limits of motors."""
+    return _PRICE * _most_effort(problem) / moved_mass(problem)
+
+
 def _most_effort(problem: MotionProblem) -> float:
     """Return the effort of all motors at their limits all the time."""
     parameters = problem.parameters
@@ -130,7 +136,7 @@ def _most_effort(problem: MotionProblem) -> float:
     return float(parameters.effort_weights @ torques**2) * problem.task.duration / 2
 
 
-def _moved_mass(problem: MotionProblem) -> float:
+def moved_mass(problem: MotionProblem) -> float:
     """Return about what the motors move [kg]."""
     links = sum(link.mass for link in problem.model.arm.links)
     return problem.task.payload_mass + links

@@ -30,12 +30,12 @@ def bend_quasi_statically(problem: MotionProblem, rigid: CollocationSolution, me
     rigid : CollocationSolution
         In (4 n,) unknowns.
     mesh : numpy.ndarray, shape (N + 1,)
-        Of the guess; it spans that of the motion [s].
+        Of the guess; it spans that of the motion [s]. Times that come twice do so once.
     rule : GaussRule
         Of the guess.
 
     """
-    points = _Points.of(mesh, rule)
+    points = _Points.of(np.unique(mesh), rule)
     model, p = problem.model, problem.parameters.physical
     n, n_t, z = model.arm.n_joints, model.arm.n_coordinates, rigid(points.times.ravel())
     parameters = problem.parameters.drop_modes()

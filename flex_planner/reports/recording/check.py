@@ -27,6 +27,7 @@ from flex_planner.reports.recording.execution import (
     recorded_execution,
 )
 from flex_planner.reports.recording.findings import CheckLimits, Finding, MotionCheck
+from flex_planner.reports.recording.forgiveness import recorded_offset
 from flex_planner.reports.recording.optimality import optimality_findings
 import numpy as np
 
@@ -80,7 +81,8 @@ def check_motion(request: RecordedRequest, model: ArmModel | None = None,
         *_deviation_from_request(request, motion, limits),
         *optimality_findings(model, motion, parameters, limits, effort_delay(request),
                              efforts_settled(request, motion),
-                             float(request.report.torque_interpolation_error))))
+                             float(request.report.torque_interpolation_error),
+                              _given_via_times(request, motion), recorded_offset(request))))
 
 
 def _states(execution: Execution, motion: RecordedMotion, monitor: Monitor | None) -> Array:
@@ -89,6 +91,13 @@ def _states(execution: Execution, motion: RecordedMotion, monitor: Monitor | Non
                                    monitor)
     return np.stack([np.interp(motion.times, carried.times, column)
                      for column in carried.states.T], axis=1)
+
+
+def _given_via_times(request: RecordedRequest, motion: RecordedMotion) -> Array:
+    """Return when via points with given times are passed; older recordings have none [s]."""
+    given = np.array(getattr(request.task, 'via_times', ()), dtype=np.float64)
+    times: Array = motion.begin + given[given > 0]
+    return times
 
 
 def _start_state(model: ArmModel, request: RecordedRequest, motion: RecordedMotion) -> Array:

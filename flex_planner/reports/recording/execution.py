@@ -5,7 +5,7 @@ from __future__ import annotations
 from flex_planner.control.default_gains import default_gains
 from flex_planner.control.joint_controller import EffortHold, Gains, JointController
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
-from flex_planner.planning.execution import ExecutionCertificate, Robustness
+from flex_planner.planning.execution import ExecutionCertificate, RobustnessReport
 from flex_planner.planning.published_motion import start_ramp
 from flex_planner.reports.recording.contents import RecordedMotion, RecordedRequest
 import numpy as np
@@ -52,12 +52,12 @@ def recorded_execution(request: RecordedRequest) -> ExecutionCertificate | None:
         feedback_growth=float(report.feedback_growth))
 
 
-def recorded_robustness(request: RecordedRequest) -> Robustness | None:
+def recorded_robustness(request: RecordedRequest) -> RobustnessReport | None:
     """Return the figures of other arms; None where nobody has found them."""
     report = request.report
     if not _is_told(request) or not np.isfinite(report.feedback_growth_if_more_modes):
         return None
-    return Robustness(
+    return RobustnessReport(
         nominal=float(report.executed_residual_vibration),
         more_modes=float(report.vibration_if_more_modes),
         stiffness_differs=float(report.vibration_if_stiffness_differs),

@@ -14,13 +14,14 @@ from flex_planner.reports.recording.arm_tables import arm_tables
 from flex_planner.reports.recording.contents import RecordedRequest
 from flex_planner.reports.recording.execution import recorded_execution, recorded_robustness
 from flex_planner.reports.recording.findings import MotionCheck
+from flex_planner.reports.recording.forgiveness import forgiveness_tables
 from flex_planner.reports.recording.frequencies import NaturalFrequencies
 from flex_planner.reports.recording.report_table import Cells, ReportTable
 import numpy as np
 
 _CERTIFICATE = {
     'collocation_residual': '', 'boundary_error': '', 'hamiltonian_drift': '', 'tip_error': ' m',
-    'residual_vibration': ' m', 'state_error': '', 'costate_error': ''}
+    'residual_vibration': ' m', 'state_error': '', 'costate_error': '', 'via_error': ' m'}
 
 
 def verdict(request: RecordedRequest, check: MotionCheck | None = None) -> str:
@@ -42,6 +43,7 @@ def tables(request: RecordedRequest, check: MotionCheck | None = None,
     found = [_task(request), _outcome(request), *_kinds(request), *_warnings(request.report)]
     if request.solved:
         found += [_certificate(request), *_execution(request)]
+    found += forgiveness_tables(request)
     if check is not None:
         found.append(check_table(check))
     if request.motion is not None:
@@ -73,7 +75,8 @@ def _task(request: RecordedRequest) -> ReportTable:
     task = request.task
     ends = [_say_end(task, 'start', task.space == task.CARTESIAN),
             _say_end(task, 'goal', task.space != task.JOINT)]
-    rows = [('start', ends[0]), ('goal', ends[1]), ('duration', f'{task.duration:g} s'),
+    rows = [('start', ends[0]), *_via_points(request), ('goal', ends[1]),
+            ('duration', f'{task.duration:g} s'),
             ('payload', f'{task.payload_mass:g} kg, '
              f'{task.payload_inertia or request.arm.payload_inertia:g} kg m²'),
             ('weights R', numbers(task.effort_weights)),
@@ -89,6 +92,21 @@ def _task(request: RecordedRequest) -> ReportTable:
         if len(getattr(task, name)):
             rows.append((name.replace('_', ' '), numbers(getattr(task, name))))
     return ReportTable(title='Task', rows=tuple(rows))
+
+
+def _via_points(request: RecordedRequest) -> list[tuple[str, str]]:
+    """Return the via points of the request; older recordings have none."""
+    task, n = request.task, request.arm.n_joints
+    times = getattr(task, 'via_times', ())
+    passed = list(getattr(request.report, 'via_times', ())) or list(times)
+    rows = []
+    for k, (time, when) in enumerate(zip(times, passed, strict=False)):
+        angles = np.degrees(task.via_positions[k * n:(k + 1) * n])
+        place = (f'({numbers(angles)}) deg' if np.isfinite(angles).any()
+                 else f'({task.via_points[k].x:g}, {task.via_points[k].y:g}) m')
+        at = f' at {when:.6g} s' if when else ''
+        rows.append((f'via point {k + 1}', f'{place}{at}{"" if time else " (free time)"}'))
+    return rows
 
 
 def _say_end(task: Any, name: str, is_point: bool) -> str:
@@ -163,7 +181,9 @@ def _certificate(request: RecordedRequest) -> ReportTable:
               for entry in fields(CertificateLimits)} | {'boundary_error': request.tolerance}
     rows = []
     for name, unit in _CERTIFICATE.items():
-        value, limit = float(getattr(request.report, name)), limits.get(name)
+        value, limit = float(getattr(request.report, name, 0.0)), limits.get(name)
+        if name == 'via_error' and not value:
+            continue  # without via points, or older
         judged = '' if limit is None else 'passed' if value <= limit else 'FAILED'
         rows.append((name.replace('_', ' '), f'{value:.2e}{unit}',
                      '–' if limit is None else f'{limit:.0e}', judged))

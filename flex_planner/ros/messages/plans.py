@@ -19,6 +19,7 @@ from flex_planner.base.progress import StopReason
 from flex_planner.base.sentences import say_reason
 from flex_planner.base.text import printable
 from flex_planner.base.validation import number, vector
+from flex_planner.control.joint_controller import JointController
 from flex_planner.optimal_control.ends_at_points import ends_at_points
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.kinds.clusters import KindOfMotion
@@ -39,7 +40,9 @@ from flex_planner.ros.messages.classes import (
     Point,
 )
 from flex_planner.ros.messages.measured_starts import ArmStateError
+from flex_planner.ros.messages.robustness import add_robustness, robustness_from_message
 from flex_planner.ros.messages.spaces import SPACES
+from flex_planner.ros.messages.via_points import via_points_from_message
 from flex_planner.ros.settings.planner import PlannerSettings
 import numpy as np
 
@@ -100,13 +103,15 @@ def task_from_message(message: MotionTask, arm: Arm, settings: PlannerSettings) 
         effort_weights=np.asarray(message.effort_weights or settings.effort_weights),
         position_weights=np.asarray(message.position_weights),
         velocity_weights=np.asarray(message.velocity_weights),
+        via_points=via_points_from_message(message, arm),
         tolerance=tolerance or settings.tolerance,
         allow_large_bending=message.allow_large_bending)
 
 
-def objectives_from_message(message: MotionTask) -> Objectives | None:
+def objectives_from_message(message: MotionTask,
+                            controller: JointController | None = None) -> Objectives | None:
     """
-    Return the objectives of a request, None if it has none.
+    Return the objectives of a request under a joint controller, None if it has none.
 
     Raises
     ------
@@ -115,7 +120,10 @@ def objectives_from_message(message: MotionTask) -> Objectives | None:
 
     """
     given: dict[str, Any] = {name: np.asarray(getattr(message, name)) for name in OBJECTIVE_FIELDS}
-    return Objectives(**given) if any(limits.size for limits in given.values()) else None
+    robustness = robustness_from_message(message, controller)
+    if robustness is None and not any(limits.size for limits in given.values()):
+        return None
+    return Objectives(**given, robustness=robustness)
 
 
 def planning_time_limit(message: MotionTask, settings: PlannerSettings) -> float:
@@ -157,8 +165,8 @@ def failure_report(code: int, sentence: str) -> PlanReport:
     report = PlanReport(error_code=code, error_msg=printable(sentence))
     for name in ('cost', 'effort', 'energy', 'collocation_residual', 'boundary_error',
                  'hamiltonian_drift', 'tip_error', 'residual_vibration', 'state_error',
-                 'costate_error', 'torque_interpolation_error', *EXECUTION_FIELDS,
-                 *ROBUSTNESS_FIELDS):
+                 'costate_error', 'via_error', 'torque_interpolation_error', *EXECUTION_FIELDS,
+                 *ROBUSTNESS_FIELDS, 'forgiven_residual', 'forgiven_residual_before'):
         setattr(report, name, float('inf'))
     return report
 
@@ -174,6 +182,7 @@ def report_from_plan(plan: Plan) -> PlanReport:
     for name in plan.certificate.__slots__:
         setattr(report, name, float(getattr(plan.certificate, name)))
     report.switching_times = plan.switching_times.tolist()
+    report.via_times = plan.via_times.tolist()
     report.saturation = plan.saturation.tolist()
     add_warnings(report, plan.warnings)
     report.velocity_weights = plan.task.velocity_weights.tolist()
@@ -183,6 +192,7 @@ def report_from_plan(plan: Plan) -> PlanReport:
     report.tried_objectives = [trial.objective.value for trial in trials]
     report.tried_weights = [float(trial.weight) for trial in trials]
     report.tried_shares = [float(trial.share) for trial in trials]
+    add_robustness(report, plan)
     return report
 
 

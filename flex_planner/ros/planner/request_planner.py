@@ -105,7 +105,8 @@ class RequestPlanner:
             monitor.payload = task.payload_mass
             cell = self._starts.near(task, searched=False)
             plan = plan_kind(task, message.kind, model=self._model, solver=settings.solver(),
-                             monitor=monitor, objectives=objectives_from_message(message),
+                             monitor=monitor, objectives=objectives_from_message(
+                                 message, settings.controller()),
                              start_from=cell.motion.solution() if cell else None,
                              search=settings.search)
             report = report_from_plan(plan)

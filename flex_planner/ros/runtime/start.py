@@ -27,6 +27,30 @@ def prepare_process() -> None:
         signal.signal(number, _leave)
 
 
+_HELP = """\
+usage: {name} [--ros-args [-p PARAMETER:=VALUE]... [--params-file FILE]... [-r FROM:=TO]...]
+
+{summary}
+
+example:     {name} --ros-args -p {example}
+parameters:  {parameters}
+names:       {names}
+"""
+_HELPS = {
+    'planner': (
+        'Plan motions of a flexible arm on request, and publish them.', 'arm:=desk_arm',
+        'config/planner.yaml lists them', 'docs/ros_node.md lists services, actions and topics'),
+    'arm_simulator': (
+        'Simulate a flexible arm in real time, which follows the topic joint_trajectory.',
+        'arm:=desk_arm -r joint_trajectory:=/flex_planner/joint_trajectory',
+        'config/planner.yaml lists them', 'docs/simulator.md lists topics'),
+    'replay': (
+        'Publish a recording again, with its topics and times.', 'recording:=PATH',
+        'rate, start, delay and loop, as flex-planner replay --help has them',
+        'those that were recorded'),
+}
+
+
 def planner() -> None:
     """Run the planner node."""
     _run('planner', 'flex_planner.ros.planner.node')
@@ -43,8 +67,13 @@ def replay() -> None:
 
 
 def _run(name: str, module: str) -> None:
-    """Run the main function of a module."""
+    """Run the main function of a module, or say how the node is started."""
     prepare_process()
+    if sys.argv[1:] in (['-h'], ['--help']):
+        summary, example, parameters, names = _HELPS[name]
+        print(_HELP.format(name=name, summary=summary, example=example, parameters=parameters,
+                           names=names), end='')
+        return
     try:
         main = import_module(module).main
     except ImportError as error:

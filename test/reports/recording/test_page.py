@@ -50,6 +50,22 @@ def test_report_on_the_command_line(plan: Path, failure: Path, tmp_path: Path,
         assert complaint in capsys.readouterr().err
 
 
+def test_report_of_a_folder_of_recordings_is_that_of_the_newest(
+        plan: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ('plan_path_20260101T000000_000000000_0002', 'my_own',
+                 'find_max_payload_20260101T000000_000000001_0001'):
+        shutil.copytree(plan, tmp_path / name)
+        for file in (tmp_path / name).glob('*.mcap'):
+            file.rename(file.with_name(f'{name}_0.mcap'))
+    # what cannot be read is no recording yet
+    (tmp_path / 'plan_path_20270101T000000_000000000_0001').mkdir()
+    page = tmp_path / 'page.html'
+    assert main(['report', str(tmp_path), '--output', str(page)]) == 0
+    told = capsys.readouterr().out
+    assert 'find_max_payload_20260101T000000_000000001_0001' in told.splitlines()[0]
+    assert page.name in {path.name for path in tmp_path.iterdir()}
+
+
 # The page
 
 

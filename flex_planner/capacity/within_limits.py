@@ -1,0 +1,176 @@
+"""
+The largest payload and the shortest duration of motions that limits on the way bend.
+
+Without such limits a search follows a price, see `limit_search`. Where its motion leaves them, the
+payload is found with the limits as a barrier, and a motion with a little less is planned and
+certified; durations are tried, shorter and shorter ones, each from the motion before.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from flex_planner.base.errors import FlexPlannerError
+from flex_planner.capacity.results import MaxPayload, MinDuration
+from flex_planner.collocation import CollocationSolution, Solver
+from flex_planner.optimal_control.constrained_motion import relieve_ends, slacks_of
+from flex_planner.optimal_control.motion_problem import MotionProblem
+from flex_planner.optimal_control.path_constraints import PathSlacks
+from flex_planner.optimal_control.task import MAX_DURATION, Task
+from flex_planner.planning.plan import Plan, PlanStatus
+from flex_planner.planning.plan_path import plan_path
+from flex_planner.planning.plan_within_limits import plan_from
+from flex_planner.planning.strategies.homotopies import drop_weights
+from flex_planner.planning.strategies.interior_point import applies
+from flex_planner.planning.strategies.payload_within_limits import reach_largest_payload
+import numpy as np
+
+# shares of the payload that was reached, at which a motion is certified: the first as little less
+# as the accuracy allows
+_LESS = (0.9995, 0.999, 0.997, 0.99, 0.97, 0.9)
+# costates of a payload that is nearly endless in price, as those of a least effort
+_COSTATES = 1e-3
+# of a motion so near the limit
+_MOST_INTERVALS = 600
+# first durations by that of the free motion, and the most tries
+_LONGER, _MOST_TRIES = (1.05, 1.2, 1.5, 2.0, 4.0), 30
+
+
+def carry_within_limits(problem: MotionProblem, solver: Solver, accuracy: float,
+                        free: MaxPayload) -> MaxPayload | None:
+    """
+    Return the largest payload within the limits on the way.
+
+    Parameters
+    ----------
+    problem : MotionProblem
+        Of the task.
+    solver : Solver
+        Its monitor may interrupt the search.
+    accuracy : float
+        To which the limit is wanted [kg].
+    free : MaxPayload
+        The outcome without them, whose motion leaves them.
+
+    Returns
+    -------
+    MaxPayload or None
+        None where the method does not apply or finds nothing.
+
+    Raises
+    ------
+    StoppedError
+        If the monitor stopped it.
+
+    """
+    slacks = slacks_of(problem)
+    if slacks is None or not applies(problem, solver):
+        return None
+    slacks = relieve_ends(problem, slacks)
+    solver.monitor.phase = 'largest payload within the limits'
+    reached = [found for near in _motions(problem, solver) if (found := reach_largest_payload(
+        drop_weights(problem), slacks, solver, near)) is not None]
+    for payload, gap, motion in sorted(reached, key=lambda one: -one[0]):
+        certified = _certify(problem, slacks, payload, motion, accuracy, solver)
+        if certified is None:
+            continue
+        lighter, plan = certified
+        near = payload + gap - lighter <= accuracy
+        return replace(
+            free, status=PlanStatus.SOLVED if near else PlanStatus.NOT_CONVERGED, plan=plan,
+            payload=lighter, local_upper=payload + gap, message=(
+                f'{lighter:.6g} kg can be carried within the limits on the way, and a motion with '
+                f'more than {lighter:.6g} kg was not certified, though about {payload:.6g} kg '
+                'seem possible'))
+    return None
+
+
+def hurry_within_limits(task: Task, solver: Solver, accuracy: float,
+                        free: MinDuration) -> MinDuration | None:
+    """
+    Return the shortest duration found within the limits on the way.
+
+    Parameters
+    ----------
+    task : Task
+        The motion.
+    solver : Solver
+        Its monitor may interrupt the search.
+    accuracy : float
+        To which the limit is wanted [s].
+    free : MinDuration
+        The outcome without them; its plan is the fastest motion, which leaves the limits.
+
+    Returns
+    -------
+    MinDuration or None
+        None where no motion is found.
+
+    """
+    if free.plan is None or not applies(free.plan.problem, solver):
+        return None
+    failed, plan = free.plan.task.duration, None
+    for factor in _LONGER:
+        duration = min(factor * free.plan.task.duration, MAX_DURATION)
+        plan = _plan_in(task, duration, free.plan, solver)
+        if plan is not None:
+            break
+        failed = duration
+    if plan is None:
+        return None
+    tries = 0
+    while plan.task.duration - failed > accuracy and tries < _MOST_TRIES:
+        tries += 1
+        shorter = _plan_in(task, (plan.task.duration + failed) / 2, plan, solver)
+        failed = failed if shorter else (plan.task.duration + failed) / 2
+        plan = shorter or plan
+    near = plan.task.duration - failed <= accuracy
+    return replace(
+        free, status=PlanStatus.SOLVED if near else PlanStatus.NOT_CONVERGED, plan=plan,
+        duration=plan.task.duration, local_lower=failed, message=(
+            f'{plan.task.duration:.6g} s are enough within the limits on the way, certified; no '
+            f'motion of this kind was found in {failed:.6g} s'))
+
+
+def _plan_in(task: Task, duration: float, near: Plan, solver: Solver) -> Plan | None:
+    """Return a certified plan within the limits that takes so long, None without one."""
+    plan = plan_path(replace(task, duration=duration, time_weight=0.0), model=near.model,
+                     solver=solver, start_from=near, search='fast')
+    solver.monitor.check()
+    return plan if plan.solved else None
+
+
+def _motions(problem: MotionProblem, solver: Solver) -> Iterator[CollocationSolution | None]:
+    """Yield motions within the limits that a search may start from; None for a straight line."""
+    plan = plan_path(problem.task, model=problem.model, solver=solver, search='fast')
+    solver.monitor.check()
+    if plan.solved and plan.solution is not None:
+        yield plan.solution
+        for kind in plan.kinds[1:]:
+            if kind.motion.solution.nodes.shape[1] == problem.size:
+                yield kind.motion.solution
+    yield None
+
+
+def _certify(problem: MotionProblem, slacks: PathSlacks, payload: float,
+             motion: CollocationSolution, accuracy: float,
+             solver: Solver) -> tuple[float, Plan] | None:
+    """Return the plan with a little less than what was reached, and its payload."""
+    costates = np.ones(problem.size)
+    costates[problem.size // 2:] = _COSTATES
+    near = CollocationSolution(motion.mesh, motion.nodes * costates, motion.stages * costates,
+                               motion.rule)
+    quick = solver.with_settings(max_intervals=min(_MOST_INTERVALS, solver.settings.max_intervals))
+    for share in (1 - accuracy / (3 * payload), *_LESS):
+        if not problem.task.payload_mass <= share * payload:
+            return None
+        try:
+            heavy = problem.with_changes(payload_mass=share * payload)
+            plan = plan_from(heavy, slacks, near, quick)
+        except FlexPlannerError:  # too heavy to hold
+            continue
+        if plan is not None:
+            return share * payload, plan
+    return None

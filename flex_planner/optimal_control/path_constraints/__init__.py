@@ -1,0 +1,32 @@
+"""
+Limits that hold on the whole way: of joints, speeds, regions kept free, moments and deflections.
+
+`path_constraint` says what one is; `path_slacks` makes array functions of several.
+
+"""
+
+from flex_planner.optimal_control.path_constraints.arm_limits import limits_of_arm
+from flex_planner.optimal_control.path_constraints.bending_constraints import (
+    BendingMoment,
+    Deflection,
+)
+from flex_planner.optimal_control.path_constraints.joint_constraints import (
+    JointRange,
+    JointSpeed,
+)
+from flex_planner.optimal_control.path_constraints.obstacles import KeepOut, SelfClearance
+from flex_planner.optimal_control.path_constraints.path_constraint import (
+    PathConstraint,
+    SlackLabel,
+)
+from flex_planner.optimal_control.path_constraints.path_slacks import PathSlacks
+from flex_planner.optimal_control.path_constraints.regions import (
+    Capsule,
+    Circle,
+    HalfPlane,
+    Region,
+)
+
+__all__ = ['BendingMoment', 'Capsule', 'Circle', 'Deflection', 'HalfPlane', 'JointRange',
+           'JointSpeed', 'KeepOut', 'PathConstraint', 'PathSlacks', 'Region', 'SelfClearance',
+           'SlackLabel', 'limits_of_arm']

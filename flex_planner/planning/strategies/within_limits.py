@@ -1,0 +1,189 @@
+"""
+A motion within its limits on the way, from one that leaves them.
+
+The interior-point method takes slacks that are positive, whatever the motion does, and closes the
+gap between both while mu falls; its mesh follows. Then the conditions with the barrier that is
+left are solved exactly, as those of any motion.
+
+"""
+
+from __future__ import annotations
+
+from flex_planner.base.validation import Array
+from flex_planner.collocation import (
+    CollocationResult,
+    CollocationSolution,
+    GaussRule,
+    INTERRUPTED,
+    Solver,
+)
+from flex_planner.collocation.barrier_mesh import follow_barrier
+from flex_planner.collocation.interior_point import (
+    BarrierOutcome,
+    BarrierSchedule,
+    solve_barrier,
+)
+from flex_planner.optimal_control.barrier_problem import MotionBarrier
+from flex_planner.optimal_control.constrained_motion import ConstrainedMotion
+from flex_planner.optimal_control.motion_problem import MotionProblem
+from flex_planner.optimal_control.path_barrier import PathBarrier
+from flex_planner.optimal_control.path_constraints import PathSlacks
+from flex_planner.optimal_control.totals import integrate_totals
+import numpy as np
+
+# of the method, and intervals of its first mesh
+_STAGES, _FEWEST = 4, 40
+# mu in units of the cost per time of the motion that it starts from: at first, where a motion is
+# told from others, and at last; the second of each where the first leads to nothing
+_FIRST, _COARSE, _LAST = (1e-2, 1e-1), 1e-3, (1e-4, 1e-3)
+# at first, from a motion that limits have bent, in units of mu at last
+_NEAR = 10.0
+_TOLERANCE = 1e-2
+# iterations on a mesh: of the interior point, at the end, of a first look from a motion like it
+_PATIENCE, _FINISH, _FIRST_LOOK = 60, 30, 10
+# positions in an interval
+_BETWEEN = 17
+# of the smallest slacks, below which multipliers grow no more than linearly at the end
+_FLOOR = 0.3
+
+
+def approach_limits(problem: MotionProblem, slacks: PathSlacks, near: CollocationSolution,
+                    solver: Solver) -> BarrierOutcome:
+    """
+    Return a motion that keeps its limits at the points of a coarse mesh.
+
+    Parameters
+    ----------
+    problem : MotionProblem
+        Without limits on the way.
+    slacks : PathSlacks
+        Of the limits.
+    near : CollocationSolution
+        A motion of the same task, which may leave the limits.
+    solver : Solver
+        Its monitor may interrupt the work.
+
+    Raises
+    ------
+    StoppedError
+        If the monitor stopped it.
+
+    """
+    barrier, rate = PathBarrier(MotionBarrier(problem), slacks), find_cost_rate(problem, near)
+    guess = near.on_mesh(_first_mesh(problem, solver), GaussRule.of(_STAGES))
+    for first in _FIRST:
+        schedule = _schedule(first * rate, _COARSE * rate, solver)
+        met = solve_barrier(barrier, guess, barrier.guess(guess, schedule.first), schedule,
+                            solver.monitor)
+        if met.converged:
+            break
+    return met
+
+
+def solve_within_limits(problem: MotionProblem, slacks: PathSlacks, met: BarrierOutcome,
+                        solver: Solver, *,
+                        coarse: bool = False) -> tuple[ConstrainedMotion, CollocationResult]:
+    """
+    Return the conditions with a small barrier, and their solution if one was found.
+
+    Parameters
+    ----------
+    problem, slacks, solver
+        As of `approach_limits`.
+    met : BarrierOutcome
+        What that returned.
+    coarse : bool
+        Whether only the larger barrier is tried, that more motions near the limit of the motors
+        are solved with.
+
+    Raises
+    ------
+    StoppedError
+        If the monitor stopped it.
+
+    """
+    rate = find_cost_rate(problem, met.solution)
+    limited = ConstrainedMotion(problem, slacks, _LAST[0] * rate)
+    failed: CollocationResult | None = None
+    for last in _LAST[int(coarse):] if met.converged else ():
+        finer = _follow(problem, slacks, met, last * rate, solver)
+        limited = limited.with_mu(last * rate).floored(finer.solution, _FLOOR)
+        result = (_finish(limited, finer.solution, solver) if finer.converged
+                  else CollocationResult.failed(finer.solution, finer.message))
+        if result.converged and not _keeps(limited, result.solution):
+            limited = limited.floored(result.solution, _FLOOR)
+            result = _finish(limited, result.solution, solver)
+        if result.converged or result.status in INTERRUPTED:
+            return limited, result
+        failed = failed or result
+    return limited, failed or CollocationResult.failed(met.solution, met.message)
+
+
+def solve_again(problem: MotionProblem, slacks: PathSlacks, near: CollocationSolution,
+                solver: Solver) -> tuple[ConstrainedMotion, CollocationResult]:
+    """
+    Return what `solve_within_limits` does, from a motion that limits have bent already.
+
+    Raises
+    ------
+    StoppedError
+        If the monitor stopped it.
+
+    """
+    rate = find_cost_rate(problem, near)
+    limited = ConstrainedMotion(problem, slacks, _LAST[0] * rate).floored(near, _FLOOR)
+    quick = solver.with_settings(stages=_STAGES).patient(_FIRST_LOOK)
+    result = quick.solve(limited, near)
+    kept = result.converged and _keeps(limited, result.solution)
+    if kept or result.status in INTERRUPTED:
+        return limited, result
+    barrier = PathBarrier(MotionBarrier(problem), slacks)
+    guess, mu = near.on_mesh(_first_mesh(problem, solver), GaussRule.of(_STAGES)), limited.mu
+    met = solve_barrier(barrier, guess, barrier.guess(guess, _NEAR * mu),
+                        _schedule(_NEAR * mu, _NEAR * mu, solver), solver.monitor)
+    return solve_within_limits(problem, slacks, met, solver)
+
+
+def _first_mesh(problem: MotionProblem, solver: Solver) -> Array:
+    """Return the times of the first mesh."""
+    count = min(max(_FEWEST, problem.fewest_intervals(_STAGES)), solver.settings.max_intervals)
+    return np.linspace(0, problem.task.duration, count + 1, dtype=np.float64)
+
+
+def _schedule(first: float, last: float, solver: Solver) -> BarrierSchedule:
+    return BarrierSchedule(first=first, last=last, tolerance=_TOLERANCE,
+                           max_iterations=min(_PATIENCE, solver.settings.max_iterations))
+
+
+def _follow(problem: MotionProblem, slacks: PathSlacks, met: BarrierOutcome, last: float,
+            solver: Solver) -> BarrierOutcome:
+    """Return the motion at the end of the barrier, which keeps its limits between points, too."""
+    half, barrier = problem.size // 2, PathBarrier(MotionBarrier(problem), slacks)
+    return follow_barrier(
+        barrier, met.solution, met.y, _schedule(met.mu, min(last, met.mu), solver),
+        solver.monitor, slacks=lambda z: slacks(z[:, :half]), count=slacks.count,
+        most_intervals=solver.settings.max_intervals)
+
+
+def _finish(limited: ConstrainedMotion, near: CollocationSolution,
+           solver: Solver) -> CollocationResult:
+    """Solve the conditions with their barrier from a motion within the limits."""
+    quick = solver.with_settings(stages=_STAGES).patient(_FINISH)
+    result = quick.solve(limited, near)
+    if result.converged or result.status in INTERRUPTED:
+        return result
+    return quick.with_settings(exact=True).solve(limited, near)
+
+
+def _keeps(limited: ConstrainedMotion, solution: CollocationSolution) -> bool:
+    """Return whether a motion keeps its limits between the points of its mesh, too."""
+    half = limited.size // 2
+    between = np.linspace(0, 1, _BETWEEN, dtype=np.float64)
+    states = solution.values_at(between)[..., :half].reshape(-1, half)
+    return bool((limited.slacks(states) > 0).all())
+
+
+def find_cost_rate(problem: MotionProblem, near: CollocationSolution) -> float:
+    """Return the cost per time of a motion, or what the motors may spend if it costs nothing."""
+    cost = integrate_totals(problem, near).cost / problem.task.duration
+    return cost if cost > 0 else MotionBarrier(problem).cost_rate
