@@ -20,6 +20,7 @@ from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.validation import Array
 from flex_planner.capacity.min_duration import find_min_duration
 from flex_planner.optimal_control.task import Task
+from flex_planner.optimal_control.via_points import ViaPoint
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_path import plan_path
 import numpy as np
@@ -113,6 +114,21 @@ def test_saved_plan_comes_back(plan: Plan, tmp_path: Path) -> None:
     assert isinstance(loaded.arm, SpatialArm)
     assert loaded.cost == plan.cost
     assert loaded.svg() == ''
+
+
+def test_joints_keep_limits_and_pass_via_points(plan: Plan) -> None:
+    first, second = plan.arm.joints
+    slow = replace(first, motor=replace(first.motor, max_speed=2.1))
+    task = replace(plan.task, arm=replace(plan.arm, joints=(slow, second)))
+    limited = plan_path(task, search='fast')
+    assert limited.solved
+    speeds = limited.sample(np.linspace(0, task.duration, 400)).rates[:, 0]
+    assert np.abs(speeds).max() == pytest.approx(2.1, rel=1e-3)
+    assert limited.cost > plan.cost
+    passing = plan_path(replace(plan.task, via_points=(
+        ViaPoint(positions=[0.5, 0.5], time=0.4),)), search='fast')
+    assert passing.solved
+    np.testing.assert_allclose(passing.sample([0.4]).coordinates[0, :2], 0.5, atol=1e-9)
 
 
 def test_shortest_duration_is_found_and_nothing_is_proved_of_it() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from flex_planner.arms.planar_only import require_planar
 from flex_planner.base.errors import InvalidTaskError, InvalidValueError
 from flex_planner.base.validation import Array, number
 from flex_planner.control.joint_controller import JointController
@@ -64,7 +65,11 @@ class Robustness:
             If the links are rigid, the motion does not end at rest, it has via points, or the
             payload, of which alone an error is given, has no mass.
 
+        PlanarOnlyError
+            If the arm is a spatial one.
+
         """
+        require_planar(task.arm, 'plans that forgive errors of the model')
         if not task.arm.n_passive:
             raise InvalidTaskError('max_residual is given, but the links of the arm are rigid: '
                                    'there is no vibration')
