@@ -105,6 +105,9 @@ class SpatialArm(Arm):
         n = integer('number of links', len(self.links), at_least=1, at_most=MAX_LINKS)
         if len(self.joints) != n:
             raise InvalidValueError('number of joints', len(self.joints), f'{n}, one per link')
+        if self.nodes:
+            raise InvalidValueError('nodes', 'given', 'left out for a spatial arm: bodies of '
+                                    'links say what sits at their ends')
         object.__setattr__(self, 'name', printable(self.name, LONGEST_NAME))
         object.__setattr__(self, 'source', printable(self.source, keep='\n\t'))
         for name, kind, unit in (('gravity', 'gravity', 'm/s^2'), ('payload_com', 'length', 'm')):

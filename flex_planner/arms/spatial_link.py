@@ -91,6 +91,11 @@ class SpatialLink:
         return False
 
     @property
+    def allowable_moment(self) -> float:
+        """Return infinity: the bending moment of a link in space has no limit."""
+        return math.inf
+
+    @property
     def mode_names(self) -> tuple[str, ...]:
         """Return a name of each mode: ``across1``, ``across2`` for the planes, ``twist``."""
         if self.beam is None:

@@ -83,17 +83,19 @@ class HoldingError(InvalidTaskError):
         Index of the joint, from 0.
     torque, stall : float
         What it needs, with its sign, and the stall torque of its motor [N m].
+    unit : str
+        Of both, N of a joint that slides.
 
     """
 
-    def __init__(self, joint: int, torque: float, stall: float) -> None:
-        self.joint, self.torque, self.stall = joint, torque, stall
-        super().__init__(joint, torque, stall)  # so that it can be pickled
+    def __init__(self, joint: int, torque: float, stall: float, unit: str = 'N m') -> None:
+        self.joint, self.torque, self.stall, self.unit = joint, torque, stall, unit
+        super().__init__(joint, torque, stall, unit)  # so that it can be pickled
 
     def __str__(self) -> str:
-        return (f'joint {self.joint + 1} needs {abs(self.torque):.4g} N m to hold the arm with '
-                f'its payload at the goal, but the stall torque of its motor is '
-                f'{self.stall:.4g} N m')
+        return (f'joint {self.joint + 1} needs {abs(self.torque):.4g} {self.unit} to hold the '
+                f'arm with its payload at the goal, but the stall torque of its motor is '
+                f'{self.stall:.4g} {self.unit}')
 
 
 class UnreachableError(FlexPlannerError):

@@ -22,7 +22,9 @@ FREE_FIELDS = frozenset({'Arm.name', 'Arm.source', 'Arm.payload_inertia',
                          'Link.flexural_rigidity', 'Link.family_assumed', 'Link.allowable_moment',
                          'Motor.stall_torque',
                          'Motor.no_load_speed', 'Motor.max_torque', 'Motor.max_speed',
-                         'Joint.lower_limit', 'Joint.upper_limit'})
+                         'Joint.lower_limit', 'Joint.upper_limit', 'SpatialArm.name',
+                         'SpatialArm.source', 'SpatialArm.notes', 'SpatialArm.payload_inertia',
+                         'SpatialJoint.lower_limit', 'SpatialJoint.upper_limit'})
 _PACKAGES = Path(__file__).parents[1]
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from flex_planner.arms.kinematics import link_deflections
+from flex_planner.arms.joint_units import units_of
+from flex_planner.arms.kinematics import link_deflections, tip_jacobian
+from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.base.errors import InvalidTaskError, NoEquilibriumError
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
@@ -55,9 +57,12 @@ def equilibrium(dynamics: ArmDynamics, positions: Array,
             if np.linalg.eigvalsh(stiffness[0, n:, n:])[0] <= 0:
                 break  # balanced, but it would buckle
             return q, dynamics.static_forces(q[None], p)[0][0, :n]
-    degrees = ', '.join(f'{angle:.4g}' for angle in np.degrees(positions))
+    units = [units_of(joint) for joint in dynamics.arm.joints]
+    shown = ', '.join(f'{unit.scale * value:.4g}'
+                      for unit, value in zip(units, positions, strict=True))
+    unit = ', '.join(dict.fromkeys(unit.position for unit in units))
     raise NoEquilibriumError('no static equilibrium was found at joint angles '
-                             f'({degrees}) deg: the links are too soft for their load')
+                             f'({shown}) {unit}: the links are too soft for their load')
 
 
 def natural_modes(dynamics: ArmDynamics, coordinates: Array, parameters: PhysicalParameters, *,
@@ -130,7 +135,8 @@ def residual_vibration(dynamics: ArmDynamics, state: Array, rest: Array,
 
     The largest distance of any point of a link from its place at rest, or of the stretched arm's
     tip by the twist of an elastic joint, with all modes of the locked arm in phase: what the free
-    vibration may reach but not exceed. What stops joints that still turn acts on them alone, so
+    vibration may reach but not exceed. Of a spatial arm, whose links may twist, that of its tip
+    counts, too. What stops joints that still turn acts on them alone, so
     the momenta of the modes stay as they are, and their rates jump.
 
     Parameters
@@ -160,4 +166,7 @@ def residual_vibration(dynamics: ArmDynamics, state: Array, rest: Array,
     away = [*(np.abs(link_deflections(arm, link, vectors)) @ amplitude
               for link in range(n) if arm.links[link].modes),
             twisting * beyond[list(arm.elastic_joints)]]
+    if isinstance(arm, SpatialArm):
+        moved = np.linalg.norm(tip_jacobian(arm, rest)[:, n:] @ vectors, axis=0)
+        away.append(np.array([moved @ amplitude]))
     return float(np.concatenate(away).max())

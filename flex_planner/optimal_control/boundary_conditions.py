@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from flex_planner.arms.arm import Arm
+from flex_planner.arms.joint_units import units_of
 from flex_planner.base.errors import (
     HoldingError,
     NoEquilibriumError,
@@ -66,7 +68,7 @@ class BoundaryConditions:
         self.start = _start_state(model, task, parameters)
         goal, self.holding_torque = rest_at_end(model, task, 'goal', parameters)
         if holds and task.ends_at_rest:
-            _check_holding(self.holding_torque, parameters)
+            _check_holding(self.holding_torque, parameters, model.arm)
         self.goal = np.concatenate([goal, task.goal_velocities])
         self.goal_weights = np.concatenate([task.goal_position_weights,
                                             task.goal_velocity_weights])
@@ -117,12 +119,12 @@ def _transversality(weights: Array) -> Array:
     return np.hstack([np.diag(states), np.diag(np.where(given, 0.0, 1.0))])
 
 
-def _check_holding(torque: Array, parameters: Parameters) -> None:
+def _check_holding(torque: Array, parameters: Parameters, arm: Arm) -> None:
     """Refuse a goal at which the arm would sink as soon as it has arrived."""
     most = parameters.torque_limits.standstill
     for i, (needed, stall) in enumerate(zip(torque, most, strict=True)):
         if abs(needed) > stall:
-            raise HoldingError(i, float(needed), float(stall))
+            raise HoldingError(i, float(needed), float(stall), units_of(arm.joints[i]).torque)
 
 
 class PayloadEnds:

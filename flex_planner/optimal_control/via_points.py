@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.inverse_kinematics import check_angle_limits, posture_near_point
+from flex_planner.arms.planar_only import require_planar
 from flex_planner.base.errors import (
     InvalidSizeError,
     InvalidValueError,
@@ -122,6 +123,7 @@ def check_via_points(arm: Arm, points: Sequence[ViaPoint], duration: float,
 def _check_place(arm: Arm, via: ViaPoint, name: str, most_angle: float) -> None:
     """Check that joints and tip can be there."""
     if via.point.size:
+        require_planar(arm, 'points on the way')
         vector(f'{name}.point', via.point, 2, at_least=-MAX_COORDINATE, at_most=MAX_COORDINATE,
                unit='m')
         _posture(arm, via, name, None)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 import math
 
+from flex_planner.arms.joint_units import JointUnits, SLIDING, TURNING, units_of
 from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationSolution
 from flex_planner.optimal_control.motion_problem import MotionProblem
@@ -50,6 +51,8 @@ class LimitViolation:
         Of the worst excess [s].
     value, limit : float
         Joint angle [rad] or signed joint speed, and its limit in that direction [rad/s].
+    units : JointUnits
+        Of the joint, for people.
 
     """
 
@@ -58,6 +61,7 @@ class LimitViolation:
     time: float
     value: float
     limit: float
+    units: JointUnits = TURNING
 
     @property
     def excess(self) -> float:
@@ -72,11 +76,14 @@ class LimitViolation:
     def __str__(self) -> str:
         """Return the violation in a sentence."""
         if self.kind is LimitKind.SPEED:
-            return (f'joint {self.joint + 1} turns at {self.value:.4g} rad/s at {self.time:.4g} '
-                    f's, {self.excess:.3g} rad/s beyond its max_speed of {abs(self.limit):.4g}')
-        value, limit, excess = np.degrees([self.value, self.limit, self.excess])
-        return (f'joint {self.joint + 1} is at {value:.5g} deg at {self.time:.4g} s, '
-                f'{excess:.3g} deg beyond its {self.kind.value} of {limit:.5g} deg')
+            speed, does = self.units.speed, 'slides' if self.units is SLIDING else 'turns'
+            return (f'joint {self.joint + 1} {does} at {self.value:.4g} {speed} at '
+                    f'{self.time:.4g} s, {self.excess:.3g} {speed} beyond its max_speed of '
+                    f'{abs(self.limit):.4g}')
+        unit = self.units.position
+        value, limit, excess = self.units.scale * np.array([self.value, self.limit, self.excess])
+        return (f'joint {self.joint + 1} is at {value:.5g} {unit} at {self.time:.4g} s, '
+                f'{excess:.3g} {unit} beyond its {self.kind.value} of {limit:.5g} {unit}')
 
 
 def find_limit_violations(problem: MotionProblem,
@@ -110,7 +117,8 @@ def find_limit_violations(problem: MotionProblem,
         if excess > limit.margin:
             value = limit.bound + limit.sign * excess
             found.append(LimitViolation(joint=limit.joint, kind=limit.kind, time=time,
-                                        value=value, limit=limit.bound))
+                                        value=value, limit=limit.bound,
+                                        units=units_of(problem.task.arm.joints[limit.joint])))
     return tuple(sorted(found, key=lambda one: -one.share))
 
 

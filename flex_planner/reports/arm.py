@@ -7,9 +7,9 @@ import math
 
 from flex_planner.arms.arm import Arm, Joint, Link, Motor
 from flex_planner.arms.inverse_kinematics import workspace
+from flex_planner.arms.joint_units import JointUnits, units_of
 from flex_planner.arms.kinematics import tip_position
 from flex_planner.arms.spatial_arm import SpatialArm
-from flex_planner.arms.spatial_joint import slides
 from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.statics import equilibrium, natural_modes
@@ -24,11 +24,8 @@ from flex_planner.reports.mode_relevance import describe_relevance
 from flex_planner.reports.spatial_arm import (
     describe_place,
     describe_spatial_links,
-    JointUnits,
     say_posture,
-    SLIDING,
     spatial_postures,
-    TURNING,
 )
 import numpy as np
 
@@ -141,7 +138,7 @@ def sections_text(link: Link) -> str:
 
 def _describe_joint(joint: Joint) -> str:
     """Return a joint's motor, gear, friction and limits in one line."""
-    units = SLIDING if slides(joint) else TURNING
+    units = units_of(joint)
     parts = [_torque_limits(joint.motor, units)]
     if math.isfinite(joint.motor.max_speed):
         parts.append(f'at most {joint.motor.max_speed:.4g} {units.speed}')

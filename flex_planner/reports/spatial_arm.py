@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from flex_planner.arms.arm import Arm
+from flex_planner.arms.joint_units import units_of
 from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.arms.spatial_body import SpatialBody
 from flex_planner.arms.spatial_joint import slides, SpatialJoint
@@ -14,22 +14,6 @@ from flex_planner.base.validation import Array
 import numpy as np
 
 _BENT = math.pi / 4
-
-
-class JointUnits(NamedTuple):
-    """Units of a joint's quantities, and the factor to the shown unit of its position."""
-
-    torque: str
-    speed: str
-    inertia: str
-    stiffness: str
-    damping: str
-    position: str
-    scale: float
-
-
-TURNING = JointUnits('N m', 'rad/s', 'kg m^2', 'N m/rad', 'N m s/rad', 'deg', math.degrees(1.0))
-SLIDING = JointUnits('N', 'm/s', 'kg', 'N/m', 'N s/m', 'm', 1.0)
 
 
 def spatial_postures(arm: SpatialArm) -> list[Array]:
@@ -42,7 +26,7 @@ def spatial_postures(arm: SpatialArm) -> list[Array]:
 
 def say_posture(arm: Arm, posture: Array) -> str:
     """Return joint positions in parentheses with their unit."""
-    units = [SLIDING if slides(joint) else TURNING for joint in arm.joints]
+    units = [units_of(joint) for joint in arm.joints]
     values = ', '.join(f'{unit.scale * value:.4g}'
                        for unit, value in zip(units, posture, strict=True))
     return f'({values}) {", ".join(dict.fromkeys(unit.position for unit in units))}'

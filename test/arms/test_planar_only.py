@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from flex_planner.arms.arm_files import plain_arm
@@ -16,7 +17,9 @@ from flex_planner.maps.study import Study
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.holding import knows_holding
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
+from flex_planner.optimal_control.path_constraints import Circle, KeepOut
 from flex_planner.optimal_control.task import Task
+from flex_planner.optimal_control.via_points import ViaPoint
 from flex_planner.planning.proofs import (
     bound_duration,
     bound_payload,
@@ -24,6 +27,7 @@ from flex_planner.planning.proofs import (
     is_payload_bounded,
 )
 from flex_planner.planning.proofs.short_durations import rigid_bound
+from flex_planner.planning.robust.objective import Robustness
 from flex_planner.simulation.comparison import compare
 import numpy as np
 import pytest
@@ -42,6 +46,10 @@ def task() -> Task:
     lambda: mass_matrix(ARM, np.zeros(2), 1.0, 0.0),
     lambda: RigidInertia.of(ARM, 1.0, 0.0),
     lambda: compare(task()),
+    lambda: replace(task(), via_points=(ViaPoint(point=[0.5, 0.1]),)),
+    lambda: replace(task(), path_constraints=(
+        KeepOut(region=Circle(center=(1.0, 1.0), radius=0.1)),)),
+    lambda: Robustness(max_residual=1e-3, stiffness_error=0.1).check(task()),
     lambda: Study(name='map', arm=ARM, quantity=next(iter(Quantity)), axes=(),
                   motion=None),  # type: ignore[arg-type]
 ])

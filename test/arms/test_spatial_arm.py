@@ -53,6 +53,7 @@ BEAM: dict[str, Any] = {'linear_density': 1.0, 'flexural_rigidity': (10.0, 20.0)
      'beam.across is .* must be a direction across the beam'),
     (lambda: replace(yaw_pitch(), gravity=[0, -9.81]), 'gravity has 2 numbers, .* 3 numbers'),
     (lambda: replace(yaw_pitch(), joints=()), 'number of joints is 0, but must be 2'),
+    (lambda: replace(yaw_pitch(), nodes=(Node(),)), "nodes is 'given', but must be left out"),
     (lambda: SpatialArm.of_planar(load_arm('korayem_ei50')),
      r"links\[0\] is 'no uniform clamped beam'"),
 ])

@@ -10,6 +10,7 @@ from flex_planner.arms.arm import Arm, Joint, Link, Motor, Node
 from flex_planner.dynamics import cache_key as module
 from flex_planner.dynamics.cache_key import cache_key
 import pytest
+from spatial_arms import yaw_pitch
 
 
 def test_key_of_an_arm_holds_all_that_is_compiled_and_no_more(workshop_arm: Arm) -> None:
@@ -83,3 +84,15 @@ def test_any_source_of_a_package_changes_the_key(
 def test_optimality_conditions_have_a_library_of_their_own(workshop_arm: Arm) -> None:
     assert cache_key(workshop_arm, 'dynamics') != cache_key(workshop_arm, 'dynamics',
                                                             'optimal_control')
+
+
+def test_names_notes_and_limits_of_spatial_arms_are_not_compiled_in() -> None:
+    arm = yaw_pitch()
+    first, second = arm.joints
+    arms = [arm, dataclasses.replace(arm, name='other', source='elsewhere', notes=('note',),
+                                     payload_inertia=0.1),
+            dataclasses.replace(arm, joints=(dataclasses.replace(first, upper_limit=1.0), second)),
+            dataclasses.replace(arm, joints=(dataclasses.replace(first, slides=True), second)),
+            dataclasses.replace(arm, tip_rotation=(0.1, 0.0, 0.0))]
+    keys = [cache_key(one, 'dynamics') for one in arms]
+    assert [keys.index(key) for key in keys] == [0, 0, 0, 3, 4]

@@ -12,7 +12,13 @@ from flex_planner.arms.arm_files import arm_from_mapping, load_arm
 from flex_planner.arms.joint import Elasticity, Motor
 from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.arms.spatial_beam import SpatialBeam
-from flex_planner.arms.spatial_body import as_matrix, as_point, place_body, turn_rpy
+from flex_planner.arms.spatial_body import (
+    as_matrix,
+    as_point,
+    place_body,
+    SpatialBody,
+    turn_rpy,
+)
 from flex_planner.arms.spatial_joint import SpatialJoint
 from flex_planner.arms.spatial_kinematics import tip_frame, tip_moves
 from flex_planner.arms.spatial_link import SpatialLink
@@ -21,6 +27,7 @@ from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.build_chain import build_chain
 from flex_planner.dynamics.dynamics_functions import build_dynamics_functions, physical_symbols
 from flex_planner.dynamics.physical_parameters import PhysicalParameters
+from flex_planner.dynamics.statics import residual_vibration
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -260,3 +267,18 @@ def test_forces_do_not_depend_on_how_frames_are_named() -> None:
     expected = forces(arm)(*state, PAYLOAD, INERTIA)
     np.testing.assert_allclose(forces(renamed)(*state, PAYLOAD, INERTIA), expected, rtol=0,
                                atol=1e-12 * np.abs(expected).max())
+
+
+def test_twisting_that_swings_the_tip_counts_as_vibration() -> None:
+    beam = SpatialBeam(linear_density=1.0, torsional_rigidity=5.0, polar_inertia=1e-3,
+                       twist_modes=1)
+    arm = SpatialArm(
+        name='crank', gravity=[0, 0, 0], joints=(SpatialJoint(axis=(0, 1, 0)), SpatialJoint()),
+        links=(SpatialLink(end=(1.0, 0, 0), beam=beam),
+               SpatialLink(end=(0, 0.2, 0), tip_body=SpatialBody(mass=0.5))))
+    parameters, twist = PhysicalParameters.of_arm(arm), 1e-3
+    state = np.array([0.0, 0.0, twist, 0.0, 0.0, 0.0])
+    turned = twist * beam.twist(1.0).turn(np.array([1.0]))[0, 0]
+    found = residual_vibration(ArmDynamics.of(arm), state, np.zeros(3), parameters)
+    # the second link stands across the first one, as a crank
+    assert found == pytest.approx(0.2 * turned, rel=1e-9)

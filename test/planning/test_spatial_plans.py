@@ -5,16 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+import re
+from typing import Any
 
 import casadi as ca
 from flex_planner.arms.arm_files import load_arm
+from flex_planner.arms.joint import Motor
 from flex_planner.arms.kinematics import tip_position
 from flex_planner.arms.spatial_arm import SpatialArm
-from flex_planner.arms.spatial_body import as_matrix, as_point, turn_rpy
+from flex_planner.arms.spatial_body import as_matrix, as_point, SpatialBody, turn_rpy
+from flex_planner.arms.spatial_joint import SpatialJoint
+from flex_planner.arms.spatial_link import SpatialLink
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.validation import Array
 from flex_planner.capacity.min_duration import find_min_duration
 from flex_planner.optimal_control.task import Task
+from flex_planner.optimal_control.via_points import ViaPoint
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_path import plan_path
 import numpy as np
@@ -110,12 +116,57 @@ def test_saved_plan_comes_back(plan: Plan, tmp_path: Path) -> None:
     assert loaded.svg() == ''
 
 
+def test_joints_keep_limits_and_pass_via_points(plan: Plan) -> None:
+    first, second = plan.arm.joints
+    slow = replace(first, motor=replace(first.motor, max_speed=2.1))
+    task = replace(plan.task, arm=replace(plan.arm, joints=(slow, second)))
+    limited = plan_path(task, search='fast')
+    assert limited.solved
+    speeds = limited.sample(np.linspace(0, task.duration, 400)).rates[:, 0]
+    assert np.abs(speeds).max() == pytest.approx(2.1, rel=1e-3)
+    assert limited.cost > plan.cost
+    passing = plan_path(replace(plan.task, via_points=(
+        ViaPoint(positions=[0.5, 0.5], time=0.4),)), search='fast')
+    assert passing.solved
+    np.testing.assert_allclose(passing.sample([0.4]).coordinates[0, :2], 0.5, atol=1e-9)
+
+
 def test_shortest_duration_is_found_and_nothing_is_proved_of_it() -> None:
     found = find_min_duration(task_of(yaw_pitch()), search='fast')
     assert found.solved
     assert 0.3 < found.duration < 0.4
     assert found.plan is not None
     assert found.plan.certificate.tip_error < 1e-5
+
+
+def slide(stall: float = np.inf, **joint: float) -> SpatialArm:
+    """Return a mass of 2 kg on an oblique rail."""
+    return SpatialArm(
+        name='slide', gravity=[0, 0, -9.81],
+        joints=(SpatialJoint(axis=(1, 0, 1), slides=True, motor=Motor(stall_torque=stall),
+                             **joint),),
+        links=(SpatialLink(end=(0.1, 0, 0), body=SpatialBody(mass=2.0)),))
+
+
+def test_mass_on_a_rail_has_the_effort_of_the_double_integrator() -> None:
+    weightless = replace(slide(), gravity=[0, 0, 0])
+    found = plan_path(Task(arm=weightless, start_positions=[0.1], goal_positions=[0.7],
+                           duration=0.5, payload_mass=1.0), search='fast')
+    # u = m a with a linear in time: J = 6 m^2 d^2 / T^3
+    assert found.cost == pytest.approx(6 * 3.0**2 * 0.6**2 / 0.5**3, rel=1e-9)
+
+
+def test_ways_and_forces_of_a_rail_are_in_metres_and_newtons() -> None:
+    ends: dict[str, Any] = {'start_positions': [0.0], 'goal_positions': [0.5], 'duration': 0.5}
+    weak = plan_path(Task(arm=slide(stall=10.0), **ends))
+    assert weak.status is PlanStatus.INFEASIBLE
+    # 2 kg on a slope of 45 degrees
+    assert 'joint 1 needs 13.87 N to hold the arm at the goal, its motor gives 10' in weak.message
+    fast = Task(arm=slide(), **{**ends, 'start_velocities': [-2.0]})
+    beyond = plan_path(replace(fast, arm=slide(lower_limit=-0.01)), search='fast')
+    assert beyond.status is PlanStatus.LIMIT_VIOLATED
+    assert re.search(r'joint 1 is at -0.\d+ m at .* beyond its lower limit of -0.01 m',
+                     beyond.message)
 
 
 def test_a_point_of_a_task_has_three_coordinates() -> None:

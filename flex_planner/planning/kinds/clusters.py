@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
+from flex_planner.arms.joint import Joint
+from flex_planner.arms.joint_units import JointUnits, SLIDING, TURNING, units_of
 from flex_planner.base.validation import Array
 from flex_planner.planning.kinds.explorer import ExploredMotion
 import numpy as np
@@ -64,8 +66,8 @@ def merge(kinds: list[KindOfMotion], kind: KindOfMotion,
 
 def kind_of(motion: ExploredMotion) -> KindOfMotion:
     """Return the kind of a motion that was met once."""
-    return KindOfMotion(value=motion.value, sentence=describe_path(motion.angles), met=1,
-                        motion=motion)
+    return KindOfMotion(value=motion.value, met=1, motion=motion,
+                        sentence=describe_path(motion.angles, motion.problem.task.arm.joints))
 
 
 def are_alike(one: Array, other: Array) -> bool:
@@ -73,14 +75,21 @@ def are_alike(one: Array, other: Array) -> bool:
     return bool(np.abs(one - other).max() < _ALIKE)
 
 
-def describe_path(angles: Array) -> str:
-    """Return how the joints move, relative to their own strokes, angles (k, n) [rad]."""
-    swings = [swing for i, angle in enumerate(angles.T, 1) for swing in _swings(i, angle)]
+def describe_path(angles: Array, joints: Sequence[Joint] = ()) -> str:
+    """
+    Return how the joints move, relative to their own strokes, angles (k, n) [rad].
+
+    Joints turn unless they are given and slide.
+
+    """
+    units = [units_of(joint) for joint in joints] or [TURNING] * angles.shape[1]
+    swings = [swing for i, (angle, unit) in enumerate(zip(angles.T, units, strict=True), 1)
+              for swing in _swings(i, angle, unit)]
     largest = sorted(swings, key=lambda swing: swing[0], reverse=True)[:_MOST_SWINGS]
     return '; '.join(words for _, words in largest) or 'every joint goes straight to its goal'
 
 
-def _swings(joint: int, angle: Array) -> list[tuple[float, str]]:
+def _swings(joint: int, angle: Array, units: JointUnits) -> list[tuple[float, str]]:
     """Return the swings of a joint behind its start and beyond its goal, with words."""
     stroke = angle[-1] - angle[0]
     along = (angle - angle[0]) * (1.0 if stroke >= 0 else -1.0)
@@ -88,9 +97,14 @@ def _swings(joint: int, angle: Array) -> list[tuple[float, str]]:
     found = []
     if back > _SWING:
         first = beyond <= _SWING or along.argmin() < along.argmax()
-        found.append((back, f'joint {joint} swings back {np.rad2deg(back):.0f} deg '
+        found.append((back, f'joint {joint} swings back {_say(back, units)} '
                             f'{"first" if first else "behind its start"}'))
     if beyond > _SWING:
-        found.append((beyond, f'joint {joint} goes {np.rad2deg(beyond):.0f} deg too far and '
-                              'returns'))
+        found.append((beyond, f'joint {joint} goes {_say(beyond, units)} too far and returns'))
     return found
+
+
+def _say(way: float, units: JointUnits) -> str:
+    """Return how far a joint moves, in words."""
+    shown = units.scale * way
+    return f'{shown:.2g} m' if units is SLIDING else f'{shown:.0f} {units.position}'

@@ -191,8 +191,8 @@ def prove_not_held(error: HoldingError, payload: float) -> Proof:
     held = f'{payload:.4g} kg' if payload else 'the arm'
     needed, stall = _apart(abs(error.torque), error.stall)
     return Proof(name=ProofName.HOLDING, sentence=(
-        f'joint {error.joint + 1} needs {needed} N m to hold {held} at the goal, its motor gives '
-        f'{stall}: no motion can end there'))
+        f'joint {error.joint + 1} needs {needed} {error.unit} to hold {held} at the goal, its '
+        f'motor gives {stall}: no motion can end there'))
 
 
 def _bound_by_holding(problem: MotionProblem) -> PayloadBound:

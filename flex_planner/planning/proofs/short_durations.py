@@ -10,6 +10,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 from flex_planner.arms.arm import Arm
+from flex_planner.arms.spatial_joint import slides
 from flex_planner.base.errors import InvalidTaskError
 from flex_planner.base.validation import Array
 from flex_planner.optimal_control.arm_model import ArmModel
@@ -44,9 +45,10 @@ def check_duration(problem: MotionProblem) -> None:
     joint, asked = int(strokes.argmax()), problem.task.duration
     least = float(strokes[joint]) / MAX_VELOCITY
     if asked < least:
+        unit = 'm' if slides(problem.task.arm.joints[joint]) else 'rad'
         raise InvalidTaskError(
             f'duration is {asked:g} s, but must be at least {least:.4g} s: joint {joint + 1} '
-            f'turns by {strokes[joint]:.4g} rad, and at {MAX_VELOCITY:g} rad/s at most')
+            f'moves by {strokes[joint]:.4g} {unit}, and at {MAX_VELOCITY:g} {unit}/s at most')
 
 
 def find_doubt(problem: MotionProblem) -> str | None:

@@ -105,12 +105,10 @@ def _other_start(nominal: Execution, dynamics: ArmDynamics,
     other, _ = equilibrium(dynamics, angles, parameters)
     start = np.concatenate([other, np.zeros_like(other)])
     away = nominal.start - np.concatenate([rest, np.zeros_like(rest)])
-    for half in (0, 1):
-        own, theirs = half * planned.n_coordinates, half * arm.n_coordinates
-        first = arm.n_joints + len(arm.elastic_joints)
-        start[theirs:theirs + first] += away[own:own + first]
-        for mine, its in zip(planned.modal_slices, arm.modal_slices, strict=True):
-            count = mine.stop - mine.start
-            start[theirs + its.start:theirs + its.start + count] += (
-                away[own + mine.start:own + mine.stop])
+    n = arm.n_joints
+    # modes of the planned arm are among those of the other one, but not always the first
+    places = np.array([*range(n), *(n + arm.passive_names.index(name)
+                                    for name in planned.passive_names)])
+    for half, part in enumerate(np.split(away, 2)):
+        start[half * arm.n_coordinates + places] += part
     return start
