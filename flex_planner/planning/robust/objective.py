@@ -67,15 +67,11 @@ class Robustness:
         PlanarOnlyError
             If the arm is a spatial one.
 
-        PlanarOnlyError
-            If the arm is a spatial one.
-
         """
         require_planar(task.arm, 'plans that forgive errors of the model')
         if not task.arm.n_passive:
             raise InvalidTaskError('max_residual is given, but the links of the arm are rigid: '
                                    'there is no vibration')
-        require_planar(task.arm, 'motions that forgive errors of the model')
         if not task.ends_at_rest:
             raise InvalidTaskError('max_residual is given, but the motion does not end at rest')
         if task.via_points:
