@@ -20,6 +20,7 @@ from flex_planner.base.sentences import say_reason
 from flex_planner.base.text import printable
 from flex_planner.base.validation import number, vector
 from flex_planner.optimal_control.ends_at_points import ends_at_points
+from flex_planner.optimal_control.path_constraints import read_constraint
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.kinds.clusters import KindOfMotion
 from flex_planner.planning.objectives import Objectives
@@ -101,7 +102,9 @@ def task_from_message(message: MotionTask, arm: Arm, settings: PlannerSettings) 
         position_weights=np.asarray(message.position_weights),
         velocity_weights=np.asarray(message.velocity_weights),
         tolerance=tolerance or settings.tolerance,
-        allow_large_bending=message.allow_large_bending)
+        allow_large_bending=message.allow_large_bending,
+        path_constraints=[read_constraint(f'path_constraints[{i}]', text)
+                          for i, text in enumerate(message.path_constraints)])
 
 
 def objectives_from_message(message: MotionTask) -> Objectives | None:
@@ -157,7 +160,7 @@ def failure_report(code: int, sentence: str) -> PlanReport:
     report = PlanReport(error_code=code, error_msg=printable(sentence))
     for name in ('cost', 'effort', 'energy', 'collocation_residual', 'boundary_error',
                  'hamiltonian_drift', 'tip_error', 'residual_vibration', 'state_error',
-                 'costate_error', 'torque_interpolation_error', *EXECUTION_FIELDS,
+                 'costate_error', 'limit_slack', 'torque_interpolation_error', *EXECUTION_FIELDS,
                  *ROBUSTNESS_FIELDS):
         setattr(report, name, float('inf'))
     return report
@@ -173,6 +176,11 @@ def report_from_plan(plan: Plan) -> PlanReport:
         setattr(report, name, float(getattr(plan, name)))
     for name in plan.certificate.__slots__:
         setattr(report, name, float(getattr(plan.certificate, name)))
+    report.barrier_gap = float(plan.barrier_gap)
+    report.limit_names = [one.name for one in plan.constraints]
+    report.limit_units = [one.unit for one in plan.constraints]
+    for field, name in (('margins', 'margin'), ('shares', 'slack'), ('times', 'time')):
+        setattr(report, f'limit_{field}', [float(getattr(one, name)) for one in plan.constraints])
     report.switching_times = plan.switching_times.tolist()
     report.saturation = plan.saturation.tolist()
     add_warnings(report, plan.warnings)
