@@ -222,18 +222,20 @@ class LimitSearch:
                 self._follow_kind(bare, known, solver)
                 return
         for problem in self._parameter.starts(bare):
-            self.extremals = collect_to_limit(
+            self.extremals = []
+            collect_to_limit(
                 approach_limit(self._parameter, problem, solver, first=known,
-                               target_gap=self._target_gap), self._accuracy)
+                               target_gap=self._target_gap), self._accuracy, self.extremals)
             if self.extremals[0].result.converged or self.extremals[0].interrupted:
                 return
 
     def _follow_kind(self, bare: MotionProblem, known: Extremal, solver: Solver) -> None:
         """Collect extremals of a kind of motion: some with less, for others to start from."""
         before = walk_back(self._parameter, known, self._parameter.value(bare), solver)
-        self.extremals = [*before, *collect_to_limit(
-            approach_limit(self._parameter, bare, solver, first=known,
-                           target_gap=self._target_gap), self._accuracy)]
+        self.extremals = [*before]
+        collect_to_limit(approach_limit(self._parameter, bare, solver, first=known,
+                                        target_gap=self._target_gap), self._accuracy,
+                         self.extremals)
 
     def _transfer(self, bare: MotionProblem, start: SearchStart,
                   solver: Solver) -> Extremal | None:
@@ -281,9 +283,8 @@ class LimitSearch:
         self._announce()
         self.extremals = [Extremal(value=self._parameter.value(bare), price=0.0, result=first,
                                    problem=bare)]
-        self.extremals += collect_to_limit(
-            continue_in_price(self._parameter, bare, first, solver, self._target_gap),
-            self._accuracy)
+        collect_to_limit(continue_in_price(self._parameter, bare, first, solver, self._target_gap),
+                         self._accuracy, self.extremals)
         return None
 
     def _announce(self) -> None:
