@@ -82,7 +82,7 @@ def check_motion(request: RecordedRequest, model: ArmModel | None = None,
         *optimality_findings(model, motion, parameters, limits, effort_delay(request),
                              efforts_settled(request, motion),
                              float(request.report.torque_interpolation_error),
-                              _given_via_times(request, motion), recorded_offset(request))))
+                             _given_via_times(request, motion), recorded_offset(request))))
 
 
 def _states(execution: Execution, motion: RecordedMotion, monitor: Monitor | None) -> Array:
