@@ -28,8 +28,8 @@ def main() -> None:
                                effort_weights=[0.125, 0.125])
     tasks = {
         'no via point': task,
-        'passed at 0.5 s': replace(task, via_points=[ViaPoint(point=POINT, time=0.5)]),
-        'passed when it is best': replace(task, via_points=[ViaPoint(point=POINT)])}
+        'passed at 0.5 s': replace(task, via_points=(ViaPoint(point=POINT, time=0.5),)),
+        'passed when it is best': replace(task, via_points=(ViaPoint(point=POINT),))}
 
     figure = Figure(figsize=(10, 4.5), layout='constrained')
     path, torque = figure.subplots(1, 2)

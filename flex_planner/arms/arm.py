@@ -152,6 +152,11 @@ class Arm:
         return sum(link.length for link in self.links)
 
     @property
+    def link_mass(self) -> float:
+        """Return the mass of all links, without nodes and housings [kg]."""
+        return sum(link.mass for link in self.links)
+
+    @property
     def bends_at_rest(self) -> bool:
         """Return whether gravity bends the arm, so that its tip rests not where it would be."""
         return bool(self.n_passive) and bool(self.gravity.any())

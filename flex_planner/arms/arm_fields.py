@@ -34,6 +34,9 @@ def read_link(section: YamlSection) -> Link:
     if values['mode_family'] == 'clamped_mass':
         for name, kind in (('shape_mass', 'mass'), ('shape_inertia', 'inertia')):
             values[name] = read_quantity(section, name, kind, above=-math.inf)
+    allowed = _allowable_moment(section)
+    if allowed is not None:
+        values['allowable_moment'] = allowed
     if section.has('center_of_mass'):
         given = section.take('center_of_mass')
         values['center_of_mass'] = given if isinstance(given, list) else (given, 0.0)
@@ -41,6 +44,22 @@ def read_link(section: YamlSection) -> Link:
         values['inertia'] = section.take('inertia')
     link: Link = section.build(Link, **values)
     return link
+
+
+def _allowable_moment(section: YamlSection) -> float | None:
+    """Return the largest bending moment of a link, by itself or by the stress it causes."""
+    if section.has('allowable_moment'):
+        return number(section.name('allowable_moment'), section.take('allowable_moment'), above=0,
+                      unit='N m')
+    if not section.has('allowable_stress'):
+        return None
+    stress = number(section.name('allowable_stress'), section.take('allowable_stress'), above=0,
+                    unit='Pa')
+    modulus = number(section.name('section_modulus'), section.take('section_modulus', None),
+                     above=0, unit='m^3')
+    factor = number(section.name('safety_factor'), section.take('safety_factor', 1.0),
+                    at_least=1)
+    return stress * modulus / factor
 
 
 def _uniform(section: YamlSection, bends: bool) -> dict[str, Any]:

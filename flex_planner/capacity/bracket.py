@@ -26,9 +26,10 @@ def bracket_width(accuracy: float, value: float) -> float:
     return max(accuracy, _FINEST * value)
 
 
-def collect_to_limit(extremals: Iterable[Extremal], accuracy: float) -> list[Extremal]:
-    """Return the extremals up to one that is near the limit, or fails, or the last."""
-    return collect_until(extremals, lambda met: is_near_limit(met, accuracy))
+def collect_to_limit(extremals: Iterable[Extremal], accuracy: float,
+                     kept: list[Extremal] | None = None) -> list[Extremal]:
+    """Return the extremals up to one that is near the limit, see `collect_until`."""
+    return collect_until(extremals, lambda met: is_near_limit(met, accuracy), kept)
 
 
 def is_near_limit(extremals: Sequence[Extremal], accuracy: float) -> bool:

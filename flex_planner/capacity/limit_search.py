@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from flex_planner.base.errors import FlexPlannerError
-from flex_planner.base.progress import Monitor
 from flex_planner.capacity.bracket import (
     bracket_width,
     collect_to_limit,
@@ -14,9 +13,9 @@ from flex_planner.capacity.bracket import (
     is_near_limit,
 )
 from flex_planner.capacity.extrapolation import extrapolate_to_limit, Neighbours
+from flex_planner.capacity.known_starts import GRACE, in_grace, plan_near, start_strategy
 from flex_planner.collocation import (
     CollocationResult,
-    CollocationSolution,
     Solver,
     SolverStatus,
 )
@@ -35,17 +34,12 @@ from flex_planner.planning.strategies.free_parameters import FreeParameter, PAYL
 from flex_planner.planning.strategies.homotopies import (
     drop_weights,
     has_weights,
-    raise_weights_from,
     without_weights,
 )
 from flex_planner.planning.strategies.price_continuation import continue_in_price
-from flex_planner.planning.strategies.strategy import Attempt, Strategy
 
-_CONTINUED = 'continuation to the limit'
 # starts for each other way round to a point
 _OTHER_WAY = 3
-# time to certify what a search has when its own is over [s]
-_GRACE = 1.0
 
 
 class Failure(NamedTuple):
@@ -179,7 +173,7 @@ class LimitSearch:
 
     def _certify_at_once(self, problem: MotionProblem) -> tuple[Extremal, Plan] | None:
         """Return the motion nearest to the limit with a plan of a problem like the task's."""
-        short = in_grace(self._solver, _GRACE / 2 if self.weighted else _GRACE)
+        short = in_grace(self._solver, GRACE / 2 if self.weighted else GRACE)
         for extremal in (one for one in reversed(self.extremals) if one.result.converged):
             try:
                 near = self._parameter.with_value(problem, extremal.value)
@@ -227,18 +221,20 @@ class LimitSearch:
                 self._follow_kind(bare, known, solver)
                 return
         for problem in self._parameter.starts(bare):
-            self.extremals = collect_to_limit(
+            self.extremals = []
+            collect_to_limit(
                 approach_limit(self._parameter, problem, solver, first=known,
-                               target_gap=self._target_gap), self._accuracy)
+                               target_gap=self._target_gap), self._accuracy, self.extremals)
             if self.extremals[0].result.converged or self.extremals[0].interrupted:
                 return
 
     def _follow_kind(self, bare: MotionProblem, known: Extremal, solver: Solver) -> None:
         """Collect extremals of a kind of motion: some with less, for others to start from."""
         before = walk_back(self._parameter, known, self._parameter.value(bare), solver)
-        self.extremals = [*before, *collect_to_limit(
-            approach_limit(self._parameter, bare, solver, first=known,
-                           target_gap=self._target_gap), self._accuracy)]
+        self.extremals = [*before]
+        collect_to_limit(approach_limit(self._parameter, bare, solver, first=known,
+                                        target_gap=self._target_gap), self._accuracy,
+                         self.extremals)
 
     def _transfer(self, bare: MotionProblem, start: SearchStart,
                   solver: Solver) -> Extremal | None:
@@ -288,9 +284,8 @@ class LimitSearch:
         self._announce()
         self.extremals = [Extremal(value=self._parameter.value(bare), price=0.0, result=first,
                                    problem=bare)]
-        self.extremals += collect_to_limit(
-            continue_in_price(self._parameter, bare, first, solver, self._target_gap),
-            self._accuracy)
+        collect_to_limit(continue_in_price(self._parameter, bare, first, solver, self._target_gap),
+                         self._accuracy, self.extremals)
         return None
 
     def _announce(self) -> None:
@@ -315,37 +310,3 @@ class LimitSearch:
         except FlexPlannerError:  # too heavy to hold, or no duration
             return None
         return found if found is not None and found.result.converged else None
-
-
-def continue_strategy(start: CollocationSolution) -> Strategy:
-    """Return the strategy that starts from a motion with the weights of the task."""
-    return Strategy(_CONTINUED, lambda problem, solver: Attempt(
-        result=solver.solve(problem, start)), quick=True)
-
-
-def in_grace(solver: Solver, seconds: float = _GRACE) -> Solver:
-    """Return a solver whose time is just enough to certify what a stopped search has."""
-    return solver.watched_by(Monitor(time_limit=seconds, canceled=solver.monitor.canceled))
-
-
-def start_strategy(start: CollocationSolution, extremal: Extremal | None = None) -> Strategy:
-    """Return the strategy that starts from a motion without weights, perhaps the solution."""
-    def attempt(problem: MotionProblem, solver: Solver) -> Attempt:
-        if extremal is not None and _is_solution(extremal, problem, solver):
-            return Attempt(result=extremal.result)
-        return Attempt(result=raise_weights_from(problem, start, solver))
-
-    return Strategy(_CONTINUED, attempt, quick=True)
-
-
-def plan_near(problem: MotionProblem, start: CollocationSolution, solver: Solver) -> Plan:
-    """Return the plan of a problem from a motion nearly its own."""
-    return plan_problem(problem, solver, (start_strategy(start), *QUICK))
-
-
-def _is_solution(extremal: Extremal, problem: MotionProblem, solver: Solver) -> bool:
-    """Return whether an extremal solves a problem, as exactly as it has to be."""
-    one, other = extremal.problem.task, problem.task
-    return (not has_weights(problem) and one.payload_mass == other.payload_mass
-            and one.duration == other.duration and extremal.result.converged
-            and float(extremal.result.errors.max()) <= solver.settings.error_tolerance)

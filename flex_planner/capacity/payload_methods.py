@@ -13,7 +13,8 @@ from dataclasses import replace
 from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.progress import StoppedError
 from flex_planner.capacity.extrapolation import Neighbours
-from flex_planner.capacity.limit_search import LimitSearch, plan_near
+from flex_planner.capacity.known_starts import plan_near
+from flex_planner.capacity.limit_search import LimitSearch
 from flex_planner.capacity.payload_outcome import describe, with_bound
 from flex_planner.capacity.results import MaxPayload, PayloadFront, PayloadMethod, say_lost_weights
 from flex_planner.capacity.within_limits import carry_within_limits

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 from flex_planner.base.progress import StoppedError
 from flex_planner.capacity.incremental import PayloadTrial, raise_payload
-from flex_planner.capacity.limit_search import continue_strategy, in_grace
+from flex_planner.capacity.known_starts import continue_strategy, in_grace
 from flex_planner.capacity.payload_outcome import describe, with_bound
 from flex_planner.capacity.results import MaxPayload, PayloadMethod
 from flex_planner.collocation import CollocationSolution, Solver

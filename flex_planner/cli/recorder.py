@@ -9,6 +9,7 @@ import time
 from flex_planner.base.validation import Array
 from flex_planner.capacity.results import MaxPayload
 from flex_planner.cli.request import Request
+from flex_planner.optimal_control.path_constraints import write_constraint
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.sampling import SampledPlan
@@ -107,7 +108,9 @@ def task_message(request: Request) -> MotionTask:
         position_weights=task.position_weights.tolist(),
         velocity_weights=task.velocity_weights.tolist(),
         effort_weights=task.effort_weights.tolist(), tolerance=task.tolerance,
-        allow_large_bending=task.allow_large_bending, allowed_planning_time=request.time_limit)
+        allow_large_bending=task.allow_large_bending,
+        path_constraints=[write_constraint(one) for one in task.path_constraints],
+        allowed_planning_time=request.time_limit)
     for name in OBJECTIVE_FIELDS if request.objectives else ():
         setattr(message, name, getattr(request.objectives, name).tolist())
     if request.objectives:

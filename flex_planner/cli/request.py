@@ -32,6 +32,7 @@ from flex_planner.cli.options import (
 from flex_planner.cli.via_options import add_via_points, via_points
 from flex_planner.control.joint_controller import JointController
 from flex_planner.optimal_control.ends_at_points import ends_at_points
+from flex_planner.optimal_control.path_constraints import FORMS, read_constraint
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.objectives import Objectives
 from flex_planner.planning.plan import Plan, PlanStatus
@@ -92,7 +93,9 @@ class Request:
                 arm=arm, **_ends(options, arm), **_start(options, arm), duration=options.duration,
                 payload_mass=options.payload_mass, payload_inertia=options.payload_inertia,
                 tolerance=options.tolerance, allow_large_bending=options.allow_large_bending,
-                via_points=via_points(options.via_points, arm), **_weights(options, arm))
+                via_points=via_points(options.via_points, arm),
+                path_constraints=[read_constraint('--limit', text) for text in options.limits],
+                **_weights(options, arm))
             sampled = sampling_settings(options, arm)
             objectives = _objectives(options, task, sampled.controller)
         return cls(task=task, elbow=options.elbow, time_limit=limit,
@@ -157,6 +160,12 @@ def add_task(parser: argparse.ArgumentParser, payload: str) -> None:
     add('--allow-large-bending', action='store_true',
         help='accept links that bend by more than 0.3 of their length, beyond what '
         'the beam model is made for')
+    add('--limit', dest='limits', action='append', default=[], metavar='KIND:VALUES',
+        help='limit that holds on the whole way, in SI units and radians; may be given several '
+        'times: ' + '; '.join(f'{kind}:{meaning.replace(", ", ",")}'
+                              for kind, (_, meaning, _) in FORMS.items())
+        + '. Keep-outs take ;stations=4 (points per link), ;tip_radius=, ;link_radius=, ;name= '
+        'after the values')
     add('--time-limit', type=number_argument, default=_TIME_LIMIT, metavar='S',
         help=f'give up after this time (default: %(default)g, at most {MAX_TIME_LIMIT:g})')
 
@@ -198,6 +207,8 @@ def _option(field: str) -> str:
         return field
     if name in _ANGLES:
         return f'{_ANGLES[name]}{bracket}{index} in radians'
+    if name.startswith('path_constraints'):
+        return f'--limit {field.removeprefix("path_constraints")}'
     return _RENAMED.get(name, f'--{name.replace("_", "-")}') + bracket + index
 
 

@@ -102,11 +102,16 @@ class MotionBarrier:
         middle, half = (lower + upper) / 2, _INSIDE * (upper - lower) / 2
         free = self.motion.model.controls(z, self.motion.p).free_torque
         torque = middle + np.clip(free - middle, -half, half)
-        margins = limits.margins(torque, speeds)
+        slacks = self._find_slacks(z, torque)
+        return np.hstack([torque, slacks, mu / slacks])
+
+    def _find_slacks(self, z: Array, torque: Array) -> Array:
+        """Return what the limits leave for torques (k, n) at points (k, 4 n_t)."""
+        n_t, limits = self.motion.model.arm.n_coordinates, self.motion.parameters.torque_limits
+        margins = limits.margins(torque, z[:, n_t:n_t + self.free])
         if not limits.capped.any():
             margins = margins[:2]
-        slacks = np.hstack([np.where(np.isfinite(each), each, _ENDLESS) for each in margins])
-        return np.hstack([torque, slacks, mu / slacks])
+        return np.hstack([np.where(np.isfinite(each), each, _ENDLESS) for each in margins])
 
 
 class PayloadBarrier(MotionBarrier):
@@ -149,7 +154,7 @@ class PayloadBarrier(MotionBarrier):
     def longest(self, node: Array, step: Array) -> float:
         """Return the share of a step with which the payload stays positive, and is no jump."""
         change, least = float(step[-2]), _LEAST_LEFT * float(node[-2])
-        most = _LARGEST_JUMP * sum(link.mass for link in self.motion.model.arm.links)
+        most = _LARGEST_JUMP * self.motion.model.arm.link_mass
         room = most if change > 0 else min(most, float(node[-2]) - least)
         return min(1.0, room / max(abs(change), 1e-300))
 
@@ -182,3 +187,7 @@ class PayloadBarrier(MotionBarrier):
         return CollocationSolution(solution.mesh, nodes,
                                    np.concatenate([solution.stages, added], axis=-1),
                                    solution.rule)
+
+    def restrict(self, solution: CollocationSolution) -> tuple[float, CollocationSolution]:
+        """Return the payload, and the motion with it."""
+        return self.payload.restrict(solution)

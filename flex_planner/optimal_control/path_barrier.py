@@ -75,11 +75,12 @@ class PathBarrier:
         """Return the final conditions."""
         return self.inner.right(z)
 
-    def guess(self, solution: CollocationSolution, mu: float) -> Array:
-        """Return torques inside their limits, slacks and multipliers for a motion."""
+    def guess(self, solution: CollocationSolution, mu: float,
+              least: float = _FIRST_SLACK) -> Array:
+        """Return torques inside their limits, slacks of at least so much, and multipliers."""
         own = self.inner.guess(solution, mu)
         states = solution.stage_values()[..., :self._half].reshape(-1, self._half)
-        sigma = np.maximum(self.slacks(states), _FIRST_SLACK).reshape(*own.shape[:2], -1)
+        sigma = np.maximum(self.slacks(states), least).reshape(*own.shape[:2], -1)
         return self._join(own, sigma, mu / sigma)
 
     def split(self, y: Array) -> tuple[Array, Array, Array]:

@@ -89,7 +89,7 @@ def _source_lines(source: str) -> list[str]:
 
 def _overview(arm: Arm, payload_mass: float) -> list[str]:
     """Return masses, reach and plane."""
-    beams = sum(link.mass for link in arm.links)
+    beams = arm.link_mass
     nodes = sum(node.mass for node in arm.nodes)
     housings = sum(joint.housing.mass for joint in arm.joints[1:])
     motors = f', housings {housings:.4g} kg' if housings else ''

@@ -102,8 +102,8 @@ def differences(join: Any, before: Array, after: Array) -> Array:
     """Return the derivatives of what does not hold at a via point, by differences."""
     both, m = np.concatenate([before, after]), before.size
     steps = 1e-6 * np.eye(2 * m)
-    return np.stack([(join(0, *np.split(both + step, 2))[0] - join(0, *np.split(both - step, 2))[0])
-                     / 2e-6 for step in steps], axis=1)
+    gaps = [[join(0, *np.split(both + side * step, 2))[0] for side in (1, -1)] for step in steps]
+    return np.stack([(above - below) / 2e-6 for above, below in gaps], axis=1)
 
 
 @pytest.mark.parametrize('via', [POINT, ANGLES, ViaPoint(positions=[math.nan, -2.2], time=0.4)])

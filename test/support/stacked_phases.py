@@ -1,8 +1,8 @@
 """
 A second formulation of via points, for comparison: phases that run beside one another.
 
-The phase before the via point runs forwards over [0, 1], that after it backwards, so that all that
-holds at the via point stands at one end. Multipliers nu of the via point and its time are unknowns.
+The phase before the via point runs forwards over [0, 1], that after it backwards, so that all
+that holds at the via point stands at one end. Multipliers nu and the time are unknowns.
 
 """
 

@@ -10,6 +10,11 @@ from flex_planner.optimal_control.path_constraints.bending_constraints import (
     BendingMoment,
     Deflection,
 )
+from flex_planner.optimal_control.path_constraints.constraint_texts import (
+    FORMS,
+    read_constraint,
+    write_constraint,
+)
 from flex_planner.optimal_control.path_constraints.joint_constraints import (
     JointRange,
     JointSpeed,
@@ -27,6 +32,6 @@ from flex_planner.optimal_control.path_constraints.regions import (
     Region,
 )
 
-__all__ = ['BendingMoment', 'Capsule', 'Circle', 'Deflection', 'HalfPlane', 'JointRange',
+__all__ = ['BendingMoment', 'Capsule', 'Circle', 'Deflection', 'FORMS', 'HalfPlane', 'JointRange',
            'JointSpeed', 'KeepOut', 'PathConstraint', 'PathSlacks', 'Region', 'SelfClearance',
-           'SlackLabel', 'limits_of_arm']
+           'SlackLabel', 'limits_of_arm', 'read_constraint', 'write_constraint']

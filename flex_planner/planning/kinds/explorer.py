@@ -173,7 +173,7 @@ class Explorer:
         """Return the problem with first values of what is free."""
         problem = self._problem
         if self._free is Free.PAYLOAD:
-            first = _FIRST_PAYLOAD * link_mass(problem)
+            first = _FIRST_PAYLOAD * problem.model.arm.link_mass
             return problem.with_changes(payload_mass=min(first, 0.9 * self._most))
         if self._free is Free.DURATION:
             return problem.with_changes(duration=_FIRST_DURATION * problem.task.duration)
@@ -215,14 +215,9 @@ def sample_angles(times: Array, states: Array, n: int) -> Array:
     return np.stack([np.interp(at, times, angle) for angle in states[:, :n].T], axis=1)
 
 
-def link_mass(problem: MotionProblem) -> float:
-    """Return the mass of all links [kg]."""
-    return sum(link.mass for link in problem.model.arm.links)
-
-
 def _heaviest(problem: MotionProblem) -> float:
     """Return a payload beyond which nothing is explored [kg]."""
-    return 1e4 * link_mass(problem)
+    return 1e4 * problem.model.arm.link_mass
 
 
 def _price(problem: MotionProblem, free: Free) -> float:
@@ -235,4 +230,4 @@ def _price(problem: MotionProblem, free: Free) -> float:
     largest = _PRICE * float(parameters.effort_weights @ limited**2) / 2
     if free is Free.DURATION:
         return largest
-    return largest * problem.task.duration / link_mass(problem)
+    return largest * problem.task.duration / problem.model.arm.link_mass

@@ -15,7 +15,6 @@ from flex_planner.optimal_control.direct.unknowns import Free
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.planning.kinds.clusters import cluster, KindOfMotion, merge
 from flex_planner.planning.kinds.effort import SearchEffort
-from flex_planner.planning.kinds.explorer import link_mass
 from flex_planner.planning.kinds.search import (
     explore_near_limit,
     find_kinds,
@@ -88,7 +87,8 @@ class _Limits:
         late = bool(self.shortest) and near * self.shortest[0].value > task.duration
         if not self.heaviest:
             return late
-        links = link_mass(self.bare)  # the price of payload goes with their mass, so does the gap
+        # the price of payload goes with the mass of the links, so does the gap
+        links = self.bare.model.arm.link_mass
         return late or self.heaviest[0].value + links < near * (task.payload_mass + links)
 
     @property

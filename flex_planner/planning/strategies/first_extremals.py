@@ -27,7 +27,7 @@ from flex_planner.planning.strategies.initial_guesses import (
     rigid_problem,
 )
 from flex_planner.planning.strategies.ipopt_continuation import continue_by_ipopt
-from flex_planner.planning.strategies.payload_barrier import is_cheap, reach_limit
+from flex_planner.planning.strategies.limit_barrier import is_cheap, reach_limit
 from flex_planner.planning.strategies.price_continuation import continue_in_price
 
 # largest mesh of a first motion, in units of the coarsest that overlooks nothing
@@ -48,14 +48,14 @@ def approach_limit(parameter: FreeParameter, problem: MotionProblem, solver: Sol
     `transfer_extremal`, spares all that.
 
     """
-    barrier = first is None and parameter is PAYLOAD and target_gap is not no_target
-    if barrier and is_cheap(problem):
-        first = reach_limit(problem, solver, target_gap)
+    barrier = first is None and target_gap is not no_target
+    if barrier and is_cheap(parameter, problem):
+        first = reach_limit(parameter, problem, solver, target_gap)
     if first is None and problem.model.arm.n_passive:
         rigid = _rigid_extremals(parameter, problem, solver)
         first = lift_extremal(parameter, problem, rigid, solver)
-        if first is None and barrier and not is_cheap(problem):
-            first = reach_limit(problem, solver, target_gap)
+        if first is None and barrier and not is_cheap(parameter, problem):
+            first = reach_limit(parameter, problem, solver, target_gap)
         if first is None and rigid and parameter is PAYLOAD:
             price, found = rigid[-1].price, False
             for extremal in continue_by_ipopt(problem, price, solver, target_gap):

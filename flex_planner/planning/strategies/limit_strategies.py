@@ -114,12 +114,19 @@ def continue_in_duration(problem: MotionProblem, solver: Solver) -> Attempt | No
     return Attempt(result=result)
 
 
-def collect_until(extremals: Iterable[Extremal],
-                  done: Callable[[list[Extremal]], bool]) -> list[Extremal]:
-    """Return the extremals up to those that are enough, or one that fails, or the last."""
+def collect_until(extremals: Iterable[Extremal], done: Callable[[list[Extremal]], bool],
+                  kept: list[Extremal] | None = None) -> list[Extremal]:
+    """
+    Return the extremals up to those that are enough, or one that fails, or the last.
+
+    They are added to a list, too, if there is one: it has them also where a monitor stops it.
+
+    """
     met: list[Extremal] = []
     for extremal in extremals:
         met.append(extremal)
+        if kept is not None:
+            kept.append(extremal)
         if not extremal.result.converged or len(met) == _MOST_EXTREMALS or done(met):
             break
     return met

@@ -17,7 +17,7 @@ from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.path_barrier import PathBarrier
 from flex_planner.optimal_control.path_constraints import PathSlacks
 from flex_planner.planning.strategies.interior_point import applies
-from flex_planner.planning.strategies.payload_barrier import barrier_price, moved_mass
+from flex_planner.planning.strategies.limit_barrier import barrier_price, moved_mass
 import numpy as np
 
 _STAGES, _FEWEST = 4, 40

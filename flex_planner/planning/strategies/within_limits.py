@@ -33,14 +33,17 @@ import numpy as np
 
 # of the method, and intervals of its first mesh
 _STAGES, _FEWEST = 4, 40
-# mu in units of the cost per time of the motion that it starts from: at first, where a motion is
-# told from others, and at last; the second of each where the first leads to nothing
-_FIRST, _COARSE, _LAST = (1e-2, 1e-1), 1e-3, (1e-4, 1e-3)
+# mu in units of the cost per time of the motion that it starts from: at first, with the smallest
+# slacks then, where a motion is told from others, and at last; the second of each where the first
+# leads to nothing
+_FIRST, _COARSE, _LAST = ((1e-2, 0.1), (1.0, 0.01)), 1e-3, (1e-4, 1e-3)
 # at first, from a motion that limits have bent, in units of mu at last
 _NEAR = 10.0
 _TOLERANCE = 1e-2
 # iterations on a mesh: of the interior point, at the end, of a first look from a motion like it
 _PATIENCE, _FINISH, _FIRST_LOOK = 60, 30, 10
+# of the mesh at the end: more would take long and are seldom a solution
+_MOST_INTERVALS, _MOST_MESHES = 1000, 8
 # positions in an interval
 _BETWEEN = 17
 # of the smallest slacks, below which multipliers grow no more than linearly at the end
@@ -71,10 +74,10 @@ def approach_limits(problem: MotionProblem, slacks: PathSlacks, near: Collocatio
     """
     barrier, rate = PathBarrier(MotionBarrier(problem), slacks), find_cost_rate(problem, near)
     guess = near.on_mesh(_first_mesh(problem, solver), GaussRule.of(_STAGES))
-    for first in _FIRST:
+    for first, slack in _FIRST:
         schedule = _schedule(first * rate, _COARSE * rate, solver)
-        met = solve_barrier(barrier, guess, barrier.guess(guess, schedule.first), schedule,
-                            solver.monitor)
+        y = barrier.guess(guess, schedule.first, slack)
+        met = solve_barrier(barrier, guess, y, schedule, solver.monitor)
         if met.converged:
             break
     return met
@@ -168,7 +171,10 @@ def _follow(problem: MotionProblem, slacks: PathSlacks, met: BarrierOutcome, las
 def _finish(limited: ConstrainedMotion, near: CollocationSolution,
            solver: Solver) -> CollocationResult:
     """Solve the conditions with their barrier from a motion within the limits."""
-    quick = solver.with_settings(stages=_STAGES).patient(_FINISH)
+    settings = solver.settings
+    quick = solver.with_settings(
+        stages=_STAGES, max_intervals=min(_MOST_INTERVALS, settings.max_intervals),
+        max_meshes=min(_MOST_MESHES, settings.max_meshes)).patient(_FINISH)
     result = quick.solve(limited, near)
     if result.converged or result.status in INTERRUPTED:
         return result

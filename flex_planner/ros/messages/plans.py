@@ -21,6 +21,7 @@ from flex_planner.base.text import printable
 from flex_planner.base.validation import number, vector
 from flex_planner.control.joint_controller import JointController
 from flex_planner.optimal_control.ends_at_points import ends_at_points
+from flex_planner.optimal_control.path_constraints import read_constraint
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.kinds.clusters import KindOfMotion
 from flex_planner.planning.objectives import Objectives
@@ -105,7 +106,9 @@ def task_from_message(message: MotionTask, arm: Arm, settings: PlannerSettings) 
         velocity_weights=np.asarray(message.velocity_weights),
         via_points=via_points_from_message(message, arm),
         tolerance=tolerance or settings.tolerance,
-        allow_large_bending=message.allow_large_bending)
+        allow_large_bending=message.allow_large_bending,
+        path_constraints=[read_constraint(f'path_constraints[{i}]', text)
+                          for i, text in enumerate(message.path_constraints)])
 
 
 def objectives_from_message(message: MotionTask,
@@ -165,8 +168,9 @@ def failure_report(code: int, sentence: str) -> PlanReport:
     report = PlanReport(error_code=code, error_msg=printable(sentence))
     for name in ('cost', 'effort', 'energy', 'collocation_residual', 'boundary_error',
                  'hamiltonian_drift', 'tip_error', 'residual_vibration', 'state_error',
-                 'costate_error', 'via_error', 'torque_interpolation_error', *EXECUTION_FIELDS,
-                 *ROBUSTNESS_FIELDS, 'forgiven_residual', 'forgiven_residual_before'):
+                 'costate_error', 'via_error', 'limit_slack', 'torque_interpolation_error',
+                 *EXECUTION_FIELDS, *ROBUSTNESS_FIELDS, 'forgiven_residual',
+                 'forgiven_residual_before'):
         setattr(report, name, float('inf'))
     return report
 
@@ -181,6 +185,11 @@ def report_from_plan(plan: Plan) -> PlanReport:
         setattr(report, name, float(getattr(plan, name)))
     for name in plan.certificate.__slots__:
         setattr(report, name, float(getattr(plan.certificate, name)))
+    report.barrier_gap = float(plan.barrier_gap)
+    report.limit_names = [one.name for one in plan.constraints]
+    report.limit_units = [one.unit for one in plan.constraints]
+    for field, name in (('margins', 'margin'), ('shares', 'slack'), ('times', 'time')):
+        setattr(report, f'limit_{field}', [float(getattr(one, name)) for one in plan.constraints])
     report.switching_times = plan.switching_times.tolist()
     report.via_times = plan.via_times.tolist()
     report.saturation = plan.saturation.tolist()

@@ -12,7 +12,7 @@ from flex_planner.optimal_control.direct.ipopt import DirectResult
 from flex_planner.optimal_control.direct.unknowns import Free
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.planning.kinds import explorer as module
-from flex_planner.planning.kinds.explorer import ExploredMotion, Explorer, link_mass
+from flex_planner.planning.kinds.explorer import ExploredMotion, Explorer
 from flex_planner.planning.kinds.paths import JointPath
 from flex_planner.planning.kinds.search import starting_paths
 from kinds_support import STANDS
@@ -149,7 +149,7 @@ def test_payload_is_at_most_what_is_of_use() -> None:
     [motion] = explorer.explore([straight(problem)])
     assert motion is not None
     assert motion.value == pytest.approx(0.3, rel=1e-3)
-    assert link_mass(problem) == pytest.approx(0.3)
+    assert problem.model.arm.link_mass == pytest.approx(0.3)
 
 
 @pytest.mark.parametrize('free', Free)

@@ -13,13 +13,14 @@ from flex_planner.optimal_control.task import Task
 from flex_planner.optimal_control.totals import integrate_totals
 from flex_planner.paper.cases import paper_arm, point_to_point
 from flex_planner.planning.strategies.extremals import no_target
+from flex_planner.planning.strategies.free_parameters import DURATION, PAYLOAD
 from flex_planner.planning.strategies.initial_guesses import cold_start
 from flex_planner.planning.strategies.interior_point import (
     pass_barrier,
     pass_barrier_from,
     pass_barrier_from_rigid,
 )
-from flex_planner.planning.strategies.payload_barrier import is_cheap, reach_limit
+from flex_planner.planning.strategies.limit_barrier import is_cheap, reach_limit
 import numpy as np
 import pytest
 
@@ -96,8 +97,8 @@ def test_cancellation_ends_it() -> None:
 def test_payload_comes_to_its_limit_in_one_run(rigidity: float, modes: int, limit: float) -> None:
     task = point_to_point(paper_arm(rigidity, modes) if modes else paper_arm(rigidity), 1.0)
     problem, monitor = problem_of(task), Monitor()
-    assert is_cheap(problem)
-    found = reach_limit(problem, Solver(monitor=monitor).coarse(), lambda value: 1e-2)
+    assert is_cheap(PAYLOAD, problem)
+    found = reach_limit(PAYLOAD, problem, Solver(monitor=monitor).coarse(), lambda value: 1e-2)
     assert found is not None and found.result.converged
     # the limit lies between the payload and the gap above it, which is about the one wanted
     assert found.value - 1e-4 < limit < found.value + found.gap
@@ -105,8 +106,23 @@ def test_payload_comes_to_its_limit_in_one_run(rigidity: float, modes: int, limi
     assert monitor.iteration <= 45
 
 
+@pytest.mark.parametrize(('rigidity', 'modes', 'shortest'), [
+    (np.inf, 0, 0.64209), (5.0, 2, 0.64950)])
+def test_duration_comes_to_its_limit_in_one_run(rigidity: float, modes: int,
+                                                shortest: float) -> None:
+    task = point_to_point(paper_arm(rigidity, modes) if modes else paper_arm(rigidity), 1.0)
+    problem, monitor = problem_of(task), Monitor()
+    assert is_cheap(DURATION, problem)
+    found = reach_limit(DURATION, problem, Solver(monitor=monitor).coarse(), lambda value: 1e-3)
+    assert found is not None and found.result.converged
+    # between the gap below the duration and the duration, 5e-5 within which the price walk ends
+    assert found.value - found.gap < shortest < found.value + 5e-5
+    assert found.gap < 1e-2
+    assert monitor.iteration <= 45
+
+
 def test_light_clamped_arm_starts_a_little_below_what_the_barrier_reached() -> None:
-    found = reach_limit(clamped(50.0), Solver().coarse(), no_target)
+    found = reach_limit(PAYLOAD, clamped(50.0), Solver().coarse(), no_target)
     assert found is not None and found.result.converged
     assert 5.3 < found.value < 5.689
 
@@ -114,4 +130,5 @@ def test_light_clamped_arm_starts_a_little_below_what_the_barrier_reached() -> N
 def test_motors_without_limits_have_no_limit_to_reach() -> None:
     arm = paper_arm(np.inf)
     endless = replace(arm, joints=tuple(replace(joint, motor=Motor()) for joint in arm.joints))
-    assert reach_limit(problem_of(point_to_point(endless, 1.0)), Solver(), no_target) is None
+    problem = problem_of(point_to_point(endless, 1.0))
+    assert reach_limit(PAYLOAD, problem, Solver(), no_target) is None

@@ -55,8 +55,9 @@ def test_report_of_a_folder_of_recordings_is_that_of_the_newest(
     for name in ('plan_path_20260101T000000_000000000_0002', 'my_own',
                  'find_max_payload_20260101T000000_000000001_0001'):
         shutil.copytree(plan, tmp_path / name)
-        for file in (tmp_path / name).glob('*.mcap'):
-            file.rename(file.with_name(f'{name}_0.mcap'))
+        (tmp_path / name / f'{plan.name}_0.mcap').rename(tmp_path / name / f'{name}_0.mcap')
+        metadata = tmp_path / name / 'metadata.yaml'
+        metadata.write_text(metadata.read_text().replace(plan.name, name))
     # what cannot be read is no recording yet
     (tmp_path / 'plan_path_20270101T000000_000000000_0001').mkdir()
     page = tmp_path / 'page.html'
