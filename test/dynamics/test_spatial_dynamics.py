@@ -106,8 +106,8 @@ def tilted() -> SpatialArm:
              replace(arm.links[1], beam=None, end=(0.1, 0.2, 0.0)))
     joints = (*arm.joints, SpatialJoint(axis=(1, -2, 0.5), rotation=((0, 0, 1), (1, 0, 0),
                                                                      (0, 1, 0))))
-    return replace(arm, links=links, joints=joints, tip_rotation=((0, -1, 0), (1, 0, 0),
-                                                                 (0, 0, 1)))
+    return replace(arm, links=links, joints=joints,
+                   tip_rotation=((0, -1, 0), (1, 0, 0), (0, 0, 1)))
 
 
 ARMS = {'3R': lambda: flexible_3r(2, 1), 'tudor': tudor, 'panda': panda, 'oblique': oblique,
