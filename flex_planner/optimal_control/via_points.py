@@ -230,4 +230,3 @@ def say_via_points(points: Sequence[ViaPoint], times: Array) -> Iterator[str]:
 
 def _say_angle(angle: float) -> str:
     return f'{np.degrees(angle):.6g}' if np.isfinite(angle) else 'any'
-

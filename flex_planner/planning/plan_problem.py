@@ -93,39 +93,34 @@ def _solve_at_via_times(
     """
     Solve a task whose via points have free times: at times that are near, then at the best.
 
-    Where no quick strategy leads to a motion at such times they may be too demanding; then via
+    Where no quick strategy leads from such times to the best they may be too demanding; then via
     points are moved with free times.
 
     """
-    warm = [strategy for strategy in strategies if strategy.name == WARM_START]
-    near = TimedMotion(problem, CollocationResult.failed(problem.straight_line(
-        solver.settings.intervals, solver.settings.rule), 'not looked for'))
-    if not warm:
-        solver.monitor.phase = 'motion without via points'
-        near = choose_via_times(problem, solver)
+    near = choose_via_times(problem, solver)
+    warm = any(strategy.name == WARM_START for strategy in strategies)
     quick = [strategy for strategy in strategies if strategy.quick] or strategies
-    name, attempt = try_strategies(near.problem, solver, quick, tried)
-    if attempt.result.converged:
-        solver.monitor.phase = 'times of via points freed'
-        found = free_via_times(near.problem, attempt.result, solver)
+    homes = [problem, near.problem] if warm else [near.problem, problem]
+    found, names, failures = near, list[str](), list[str]()
+    for home in homes if near.problem is not problem else homes[:1]:
+        name, attempt = try_strategies(home, solver, quick, tried)
+        found = (free_via_times(home, attempt.result, solver) if attempt.result.converged
+                 else TimedMotion(home, attempt.result))
         if found.result.converged or found.result.status in INTERRUPTED_STATUS:
             return found.problem, name, Attempt(result=found.result)
-    if warm:
-        near = choose_via_times(problem, solver)
+        names, failures = [*names, name], [*failures, found.result.message]
     solver.monitor.phase = _MOVED
     moved = move_free_via_points(near, solver)
     if moved.result.converged or moved.result.status in INTERRUPTED_STATUS:
         return moved.problem, _MOVED, Attempt(result=moved.result)
     slow = [strategy for strategy in strategies if strategy not in quick]
-    if attempt.result.converged or not slow:
-        return near.problem, name, Attempt(result=moved.result)
-    names, failure = f'{name}, {_MOVED}', f'{attempt.result.message}; {moved.result.message}'
     name, attempt = try_strategies(near.problem, solver, slow, tried)
     if attempt.result.converged:
         found = free_via_times(near.problem, attempt.result, solver)
         return found.problem, name, Attempt(result=found.result)
-    return near.problem, f'{names}, {name}', replace(attempt, result=replace(
-        attempt.result, message=f'{failure}; {attempt.result.message}'))
+    message = '; '.join(dict.fromkeys([*failures, moved.result.message, attempt.result.message]))
+    return near.problem, ', '.join(dict.fromkeys([*names, _MOVED, name])), replace(
+        attempt, result=replace(attempt.result, message=message))
 
 
 def _look_for_cheaper(plan: Plan, attempt: Attempt, solver: Solver,

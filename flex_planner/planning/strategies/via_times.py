@@ -64,6 +64,7 @@ def choose_via_times(problem: MotionProblem, solver: Solver) -> TimedMotion:
     The result is that motion, if there is one: times are as they were without.
 
     """
+    solver.monitor.phase = 'motion without via points'
     result = solve_bare(without_via_points(problem), solver)
     times = _nearest_times(problem, result.solution) if result.converged else None
     return TimedMotion(problem if times is None else problem.with_via_times(times), result)
@@ -137,6 +138,7 @@ def free_via_times(problem: MotionProblem, result: CollocationResult,
         Of the motion.
 
     """
+    solver.monitor.phase = 'times of via points freed'
     first = FreeViaTimesProblem(problem)
     start = first.extend(place_junctions(problem, result.solution))
     jumps = first.jumps(start)
