@@ -129,6 +129,10 @@ def test_casadi_is_imported_only_to_derive_and_to_compile() -> None:
         'dynamics.moving_frame', 'dynamics.torque_bounds',
         'optimal_control.direct.programme', 'optimal_control.free_rates',
         'optimal_control.barrier_conditions',
+        'optimal_control.path_constraints.obstacles',
+        'optimal_control.path_constraints.path_slacks',
+        'optimal_control.path_constraints.regions',
+        'optimal_control.path_constraints.symbolic_arm',
         'optimal_control.pontryagin',
         'optimal_control.rate_jacobian', 'optimal_control.running_cost',
         'optimal_control.torque_limits'}
