@@ -169,7 +169,7 @@ def _follow(problem: MotionProblem, slacks: PathSlacks, met: BarrierOutcome, las
 
 
 def _finish(limited: ConstrainedMotion, near: CollocationSolution,
-           solver: Solver) -> CollocationResult:
+            solver: Solver) -> CollocationResult:
     """Solve the conditions with their barrier from a motion within the limits."""
     settings = solver.settings
     quick = solver.with_settings(
