@@ -105,8 +105,10 @@ def judge(task: Task, constraint: PathConstraint, starts: list[Plan]) -> float:
     C, _, B = ca.collocation_coeff(points.tolist())
     step = T / _INTERVALS
     q, v, a = (ca.SX.sym(name, 2, K) for name in 'qva')
-    rows, cost, bounds = [], 0, []
-    first = (ca.DM(task.start_positions), ca.DM(task.start_velocities[:2]))
+    rows: list[Any] = []
+    bounds: list[Any] = []
+    cost: Any = 0
+    first: tuple[Any, Any] = (ca.DM(task.start_positions), ca.DM(task.start_velocities[:2]))
     weights = np.array(B).ravel()
     stall, slope = _motors(task)
     for k in range(_INTERVALS):

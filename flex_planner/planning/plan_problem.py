@@ -144,7 +144,7 @@ def _look_for_cheaper(plan: Plan, attempt: Attempt, solver: Solver,
 
 
 def conclude(problem: MotionProblem, strategy: str, attempt: Attempt,
-                      solver: Solver) -> Plan:
+             solver: Solver) -> Plan:
     """Return the plan of another motion of the same task, in the time that is best for it."""
     if problem.task.time_weight:
         problem, result = free_duration(problem, attempt.result, solver)

@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import replace
 import math
 from pathlib import Path
+from typing import Any
 
 from factories import TaskFactory
 from flex_planner.arms.arm import Arm, Joint, Link
@@ -278,7 +279,8 @@ def test_slack_at_an_end_may_be_nothing(rigid_model: ArmModel, paper_task: TaskF
     arm, task = rigid_model.arm, paper_task(rigid_model.arm, 3.0)
     start = float(task.start_positions[1])
     free = solution_of(plan_path(task, model=rigid_model, search='fast')).nodes[:, 1]
-    side = {'lower_limit': start} if free.min() < start - 1e-3 else {'upper_limit': start}
+    side: dict[str, Any] = ({'lower_limit': start} if free.min() < start - 1e-3
+                            else {'upper_limit': start})
     assert not (free.min() >= start or free.max() <= start) or math.isclose(start, free.max())
     joints = arm.joints[0], replace(arm.joints[1], **side)
     plan = plan_path(replace(task, arm=replace(arm, joints=joints)), model=rigid_model,

@@ -60,8 +60,8 @@ def extremum(plan: Plan, column: int, sign: float) -> tuple[float, float]:
 
 
 # random counter-example: the elbow swings through -174 deg between two postures at -120
-SWINGING = {'start_positions': np.radians([120, -120]),
-            'goal_positions': np.radians([-120, -120]), 'duration': 3.0}
+SWINGING: dict[str, Any] = {'start_positions': np.radians([120, -120]),
+                            'goal_positions': np.radians([-120, -120]), 'duration': 3.0}
 
 
 @pytest.fixture(scope='module')

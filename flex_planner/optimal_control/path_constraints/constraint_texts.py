@@ -53,9 +53,10 @@ FORMS: dict[str, tuple[int, str, Callable[[_Values, _Options], PathConstraint]]]
 }
 """Kinds of limits: how many values, which, and how they are made."""
 # options by kind, and what they are
-_OPTIONS = {'keep_out': {'tip_radius': float, 'stations': int, 'link_radius': float, 'name': str},
-            'self_clearance': {'link_radius': float, 'stations': int},
-            'bending_moment': {'stations': tuple}, 'deflection': {'stations': tuple}}
+_OPTIONS: dict[str, dict[str, type]] = {
+    'keep_out': {'tip_radius': float, 'stations': int, 'link_radius': float, 'name': str},
+    'self_clearance': {'link_radius': float, 'stations': int},
+    'bending_moment': {'stations': tuple}, 'deflection': {'stations': tuple}}
 
 
 def read_constraint(field: str, text: str) -> PathConstraint:
@@ -94,7 +95,8 @@ def read_constraint(field: str, text: str) -> PathConstraint:
 def write_constraint(constraint: PathConstraint) -> str:
     """Return the text of a limit, which `read_constraint` makes the same of."""
     kind, values = _describe(constraint)
-    options = next((known for name, known in _OPTIONS.items() if kind.startswith(name)), {})
+    options: dict[str, type] = next((known for name, known in _OPTIONS.items()
+                                     if kind.startswith(name)), {})
     given = [(name, getattr(constraint, name)) for name in options]
     shown = [f'{name}={"/".join(map(repr, value)) if isinstance(value, tuple) else value}'
              for name, value in given if value != '']
@@ -120,7 +122,7 @@ def _describe(constraint: PathConstraint) -> tuple[str, list[float]]:
 
 def _option(field: str, text: str, kind: str, part: str) -> tuple[str, Any]:
     """Return the name and the value of an option."""
-    known: dict[str, Any] = next((options for name, options in _OPTIONS.items()
+    known: dict[str, type] = next((options for name, options in _OPTIONS.items()
                                   if kind.startswith(name)), {})
     name, _, value = part.partition('=')
     name = name.strip().replace('-', '_')

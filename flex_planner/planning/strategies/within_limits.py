@@ -111,8 +111,8 @@ def solve_within_limits(problem: MotionProblem, slacks: PathSlacks, met: Barrier
     for last in _LAST[int(coarse):] if met.converged else ():
         finer = _follow(problem, slacks, met, last * rate, solver)
         limited = limited.with_mu(last * rate).floored(finer.solution, _FLOOR)
-        result = (_finish(limited, finer.solution, solver) if finer.converged
-                  else CollocationResult.failed(finer.solution, finer.message))
+        # where the interior point goes to and fro, Newton's method may still settle
+        result = _finish(limited, finer.solution, solver)
         if result.converged and not _keeps(limited, result.solution):
             limited = limited.floored(result.solution, _FLOOR)
             result = _finish(limited, result.solution, solver)
@@ -169,7 +169,7 @@ def _follow(problem: MotionProblem, slacks: PathSlacks, met: BarrierOutcome, las
 
 
 def _finish(limited: ConstrainedMotion, near: CollocationSolution,
-           solver: Solver) -> CollocationResult:
+            solver: Solver) -> CollocationResult:
     """Solve the conditions with their barrier from a motion within the limits."""
     settings = solver.settings
     quick = solver.with_settings(

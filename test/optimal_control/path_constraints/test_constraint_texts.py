@@ -49,5 +49,3 @@ def test_texts_are_read_and_written(text: str, constraint: PathConstraint) -> No
 def test_other_texts_are_refused_with_what_is_expected(text: str, said: str) -> None:
     with pytest.raises(InvalidValueError, match=said):
         read_constraint('limit', text)
-
-

@@ -23,10 +23,13 @@ from flex_planner.base.errors import (
 from flex_planner.base.progress import Monitor
 from flex_planner.collocation import Solver, SolverSettings
 from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
+from flex_planner.optimal_control.path_constraints import JointSpeed
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.robustness import assess_robustness
 from flex_planner.planning.sampling import sample_plan, SampledPlan, SamplingSettings
+from flex_planner.planning.verdict import judge
 from flex_planner.planning.warnings import WarningKind
 from flex_planner.recording import definition_folder
 from flex_planner.ros.messages.plans import (
@@ -263,12 +266,33 @@ def test_report_of_a_limit_on_the_way_has_its_code(rigid_arm: Arm, rigid_model: 
     joint = replace(rigid_arm.joints[0], motor=Motor(stall_torque=8.0, no_load_speed=3.5,
                                                      max_speed=0.9))
     slow = replace(rigid_arm, joints=(joint, rigid_arm.joints[1]))
-    plan = plan_path(paper_task(slow), model=rigid_model)
+    # the free motion; a plan would keep the limit
+    free = plan_path(paper_task(rigid_arm), model=rigid_model)
+    limited = paper_task(slow)
+    plan = judge(replace(free, task=limited, problem=MotionProblem(
+        rigid_model, limited, task_parameters(limited))))
     report = report_from_plan(plan)
     assert report.error_code == PlanReport.LIMIT_VIOLATED
     assert report.error_msg.startswith('solved, but the motion leaves a limit of the arm on its '
                                        'way: joint 1 turns at 1.022 rad/s at ')
     assert report.cost == plan.cost
+
+
+def test_limits_of_a_request_are_kept_and_reported(rigid_arm: Arm, rigid_model: ArmModel,
+                                                   paper_task: Any) -> None:
+    message = task(duration=1.0, path_constraints=['joint_speed:1,0.8'])
+    asked = task_from_message(message, rigid_arm, PlannerSettings())
+    assert asked.path_constraints == (JointSpeed(joint=1, limit=0.8),)
+    limited = paper_task(rigid_arm, path_constraints=asked.path_constraints)
+    report = report_from_plan(plan_path(limited, model=rigid_model, search='fast'))
+    assert report.error_code == PlanReport.NONE
+    assert report.limit_names == ['speed of joint 1 forwards', 'speed of joint 1 backwards']
+    assert list(report.limit_units) == ['rad/s', 'rad/s']
+    assert 0 < report.limit_margins[0] < 1e-3 and 0 < report.limit_times[0] < 1
+    assert -1e-6 < report.limit_slack <= report.limit_shares[1]
+    assert 0 < report.barrier_gap < 1e-3
+    with pytest.raises(InvalidValueError, match=r'path_constraints\[0\] is '):
+        task_from_message(task(path_constraints=['wall']), rigid_arm, PlannerSettings())
 
 
 @pytest.mark.parametrize(('monitor', 'code', 'word'), [
