@@ -337,7 +337,7 @@ def test_bad_accuracy_is_named_with_its_bound(rigid_model: ArmModel, paper_task:
 
 @both_stops
 @pytest.mark.parametrize(('phase', 'iterations'), [
-    ('duration at a rising price', 0), ('duration at a rising price', 20),
+    ('duration at a rising price', 0), ('duration at a rising price', 23),
     ('continuation to the limit', 0),
     ('continuation to the limit', 1)])
 def test_search_is_stopped_wherever_it_is(rigid_model: ArmModel, paper_task: TaskFactory,
