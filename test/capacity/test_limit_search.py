@@ -163,7 +163,9 @@ def test_search_over_kinds_is_stopped_wherever_it_is(rigid_model: ArmModel,
 def test_heaviest_motion_met_is_certified_when_time_is_up(rigid_model: ArmModel,
                                                           paper_task: TaskFactory) -> None:
     task, payloads = paper_task(rigid_model.arm), list[float]()
-    for calls in (25, 100):  # while a barrier leads to the limit, and when it is met
+    ended = moments(lambda monitor: followed(task, model=rigid_model, monitor=monitor))
+    # while a barrier leads to the limit, and while the motion there is certified
+    for calls in (25, ended['continuation to the limit', True]):
         found = followed(task, model=rigid_model,
                          monitor=stopped_after(calls, PlanStatus.TIMEOUT))
         assert_stopped(found, PlanStatus.TIMEOUT, certified=True)
