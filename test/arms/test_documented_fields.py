@@ -15,9 +15,10 @@ DOCS = Path(__file__).parents[2] / 'docs' / 'arm_files.md'
 LINKS: list[dict[str, Any]] = [
     {'length': 0.5, 'mass': 1.0, 'flexural_rigidity': 40.0, 'modes': 2, 'hub_radius': 0.02,
      'rigid_base': 0.01, 'rigid_tip': 0.01, 'mode_family': 'clamped_mass', 'shape_mass': 0.5,
-     'shape_inertia': 0.01, 'damping_ratio': [0.01, 0.02]},
+     'shape_inertia': 0.01, 'damping_ratio': [0.01, 0.02], 'allowable_moment': 50.0},
     {'length': 0.5, 'density': 2700.0, 'youngs_modulus': 7e10, 'modes': 1,
-     'section': {'width': 0.04, 'thickness': 0.005}, 'mode_family': 'clamped_free'},
+     'section': {'width': 0.04, 'thickness': 0.005}, 'mode_family': 'clamped_free',
+     'allowable_stress': 1e8, 'section_modulus': 1.7e-7, 'safety_factor': 1.5},
     {'length': 0.5, 'linear_density': 1.0, 'youngs_modulus': 7e10, 'modes': 1,
      'second_moment_of_area': 1e-9, 'mode_family': 'clamped_free'},
     {'sections': [{'length': 0.2, 'linear_density': 2.0, 'rigid': True},
