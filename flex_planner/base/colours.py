@@ -23,6 +23,8 @@ PLANNED, CARRIED_OUT = '#222222', '#c2185b'
 CARRIED, REFUSED = '#2a8a3e', '#b3261e'
 # what is only there to compare with: limits, arrivals, the arm on its way
 ASIDE, ARM = '#777777', '#b9b9b9'
+# points that a motion passes on its way
+VIA = '#b8860b'
 
 
 def coordinate_colour(index: int) -> str:

@@ -21,6 +21,7 @@ MAX_CELLS = 100_000_000
 MAX_COORDINATE = 1e3
 _TILE_CELLS, _LEAST_BLOCKS = 25, 4
 _MAX_SCALE = 1e3
+_MAX_LIMIT = 1e9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,6 +69,8 @@ AXES: Mapping[str, AxisKind] = MappingProxyType({
     'velocity_weight': AxisKind(title='weight of the joint speeds', at_least=0, at_most=1e9),
     'payload_scale': AxisKind(title='carried payload over planned payload', at_least=0,
                               at_most=_MAX_SCALE),
+    'limit_value': AxisKind(title='value of a limit on the way', at_least=-_MAX_LIMIT,
+                            at_most=_MAX_LIMIT),
 })
 
 

@@ -75,6 +75,8 @@ class CellSolver:
         """
         Return the solution of the task of a cell, starting from cells near it.
 
+        With limits on the way every cell is solved for itself.
+
         Raises
         ------
         FlexPlannerError
@@ -84,6 +86,8 @@ class CellSolver:
 
         """
         study, model = self._study, self._model
+        if study.motion.limits:  # the kind that is best may be another one there
+            start = NearCells()
         try:
             problem = MotionProblem(model, task, task_parameters(task))
         except HoldingError:  # there is no motion, and the plan says why

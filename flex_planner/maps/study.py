@@ -29,6 +29,7 @@ from flex_planner.maps.end_points import middle_posture
 from flex_planner.maps.quantities import check_axes, check_motors, Quantity
 from flex_planner.maps.simulated_arm import SimulatedArm
 from flex_planner.maps.study_files import read_fields
+from flex_planner.maps.study_limits import check_limit_axis
 from flex_planner.maps.study_motion import StudyMotion
 from flex_planner.optimal_control.task import Task
 from flex_planner.simulation.mismatch import Mismatch
@@ -68,7 +69,7 @@ class Study:
         Carries out the plans, for RESIDUAL_VIBRATION.
     keep_motions : bool
         Whether the motions are kept with the numbers, as starts for others; those of
-        MIN_DURATION never are.
+        MIN_DURATION, or with limits on the way, never are.
     text : str
         The study file as read.
 
@@ -98,6 +99,7 @@ class Study:
         require_planar(self.arm, 'maps')
         check_motors(self.quantity, self.arm)
         check_axes(self.quantity, self.arm, self.axes)
+        check_limit_axis(self.motion.limits, self.axes)
         for end in self.motion.ends:
             end.check(self.arm, self.axes)
         self._check_numbers()
@@ -151,8 +153,14 @@ class Study:
 
     @property
     def keeps_motions(self) -> bool:
-        """Return whether motions are kept: those of shortest duration start no requests."""
-        return self.keep_motions and self.quantity is not Quantity.MIN_DURATION
+        """
+        Return whether motions are kept: those of shortest duration start no requests.
+
+        Nor do those that limits bend: requests without such limits would follow their kind.
+
+        """
+        return (self.keep_motions and self.quantity is not Quantity.MIN_DURATION
+                and not self.motion.limits)
 
     def values(self, index: tuple[int, ...]) -> dict[str, float]:
         """Return the values of the axes at a cell, by name."""

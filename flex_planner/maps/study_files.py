@@ -114,6 +114,8 @@ def _motion(top: YamlSection, axes: tuple[Axis, ...]) -> StudyMotion:
         if top.has(key)}
     if 'duration' not in {*given, *(axis.name for axis in axes)}:
         raise InvalidValueError('duration', None, 'given')
+    if top.has('limits'):
+        given['limits'] = _texts('limits', top.take('limits'))
     return StudyMotion(start=start, goal=goal, **given)
 
 
@@ -141,6 +143,13 @@ def _numbers(field: str, values: object) -> Array:
             isinstance(entry, (int, float)) and not isinstance(entry, bool) for entry in values):
         raise InvalidValueError(field, values, 'a list of numbers')
     return np.array(values, dtype=np.float64)
+
+
+def _texts(field: str, values: object) -> tuple[str, ...]:
+    """Return a list of texts."""
+    if not isinstance(values, list) or not all(isinstance(entry, str) for entry in values):
+        raise InvalidValueError(field, values, 'a list of texts such as keep_out:0.52,0.25,0.1')
+    return tuple(values)
 
 
 def _block_shape(top: YamlSection, axes: tuple[Axis, ...]) -> tuple[int, ...]:

@@ -9,6 +9,7 @@ from typing import Any
 from flex_planner.arms.arm import Arm
 from flex_planner.base.validation import Array
 from flex_planner.maps.end_points import End
+from flex_planner.maps.study_limits import read_limits
 from flex_planner.optimal_control.task import Task
 import numpy as np
 
@@ -26,6 +27,8 @@ class StudyMotion:
         As of `Task`, where no axis gives them. The duration is a first guess for MIN_DURATION.
     elbow : int
         Of every posture, see `posture_near_point`.
+    limits : tuple of str
+        On the way, besides those of the arm; see `read_limits`.
 
     """
 
@@ -37,6 +40,7 @@ class StudyMotion:
     velocity_weights: Array = field(default_factory=lambda: np.zeros(0))
     tolerance: float = 1e-3
     elbow: int = -1
+    limits: tuple[str, ...] = ()
 
     @property
     def ends(self) -> tuple[End, End]:
@@ -56,5 +60,6 @@ class StudyMotion:
             arm=arm, start_positions=start, goal_positions=goal, **points,
             duration=values.get('duration', self.duration), payload_mass=self.payload(values),
             effort_weights=self.effort_weights, tolerance=self.tolerance,
+            path_constraints=read_limits(self.limits, values, arm),
             velocity_weights=(self.velocity_weights if weight is None
                               else np.full(arm.n_joints, weight)))

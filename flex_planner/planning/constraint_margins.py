@@ -16,12 +16,11 @@ from flex_planner.optimal_control.constrained_motion import ConstrainedMotion, s
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.path_constraints import PathSlacks
 import numpy as np
-from numpy.typing import NDArray
 
 # by which a slack may be passed: less is rounding
 MARGIN = 1e-6
 # a limit is active where less than this share of its scale is left
-_ACTIVE = 0.01
+ACTIVE = 0.01
 # positions in an interval of the mesh, and around the smallest sample: each time the step is an
 # eighth
 _POSITIONS = np.linspace(0, 1, 25, dtype=np.float64)
@@ -118,7 +117,7 @@ def _margin(k: int, slacks: PathSlacks, solution: CollocationSolution, times: Ar
     label, nearest = slacks.labels[k], int(values.argmin())
     time, least = float(times[nearest]), float(values[nearest])
     step = float(np.diff(solution.mesh).max()) / (_POSITIONS.size - 1)
-    for _ in range(_ZOOMS if least < _ACTIVE else 0):
+    for _ in range(_ZOOMS if least < ACTIVE else 0):
         near = np.clip(time + step * _AROUND, solution.mesh[0], solution.mesh[-1])
         found = slacks(solution(near)[:, :half])[:, k]
         if found.min() <= least:
@@ -127,12 +126,12 @@ def _margin(k: int, slacks: PathSlacks, solution: CollocationSolution, times: Ar
     return ConstraintMargin(
         name=label.name, constraint=slacks.owners()[k], unit=label.unit,
         margin=least * label.scale, slack=least, time=time,
-        active=_find_intervals(times, values < _ACTIVE), price=price / label.scale)
+        active=find_active(times, values), price=price / label.scale)
 
 
-def _find_intervals(times: Array, active: NDArray[np.bool_]) -> tuple[tuple[float, float], ...]:
-    """Return the times between which samples are active."""
-    padded = np.concatenate([[False], active, [False]])
+def find_active(times: Array, slacks: Array) -> tuple[tuple[float, float], ...]:
+    """Return the times between which a limit is active, from its slack (k,) at times (k,)."""
+    padded = np.concatenate([[False], slacks < ACTIVE, [False]])
     edges = np.flatnonzero(padded[1:] != padded[:-1]).reshape(-1, 2)
     return tuple((float(times[first]), float(times[last - 1])) for first, last in edges)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from flex_planner.base.colours import ASIDE, coordinate_colour, REFUSED
+from flex_planner.base.colours import ASIDE, coordinate_colour, REFUSED, VIA
 from flex_planner.base.validation import Array
 from flex_planner.optimal_control.path_constraints import (
     JointRange,
@@ -16,6 +16,7 @@ from flex_planner.planning.constraint_margins import ConstraintMargin
 from flex_planner.planning.region_outlines import find_keep_outs, outline_region
 from flex_planner.plotting.figures import plain
 from matplotlib.axes import Axes
+import numpy as np
 
 _SHADE, _FILL = 0.15, 0.3
 # of the height of a diagram: bounds further away are left out
@@ -48,6 +49,33 @@ def shade_active(axes: Axes, margins: Sequence[ConstraintMargin]) -> None:
         for first, last in margin.active:
             axes.axvspan(first, last, color=REFUSED, alpha=_SHADE, linewidth=0,
                          label=f'at its limit: {plain(margin.name)}')
+
+
+def mark_via_times(axes: Axes, via_times: Array) -> None:
+    """Mark the times (k,) at which via points are passed in a diagram over time [s]."""
+    for time in via_times:
+        axes.axvline(time, color=VIA, linestyle='-.', linewidth=1, label='via points')
+
+
+def draw_via_points(axes: Axes, times: Array, path: Array, via_times: Array) -> None:
+    """
+    Mark where the tip is at via points in a picture of its path.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        In metres.
+    times : numpy.ndarray, shape (k,)
+        Of the path [s].
+    path : numpy.ndarray, shape (k, 2)
+        Of the tip [m].
+    via_times : numpy.ndarray, shape (m,)
+        When via points are passed [s].
+
+    """
+    if via_times.size:
+        x, y = (np.interp(via_times, times, column) for column in path.T)
+        axes.plot(x, y, 'D', color=VIA, label='via points')
 
 
 def draw_speed_limits(axes: Axes, constraints: Sequence[PathConstraint]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from flex_planner.arms.arm import Arm
@@ -22,6 +22,8 @@ from flex_planner.plotting.limits import (
     draw_angle_limits,
     draw_keep_outs,
     draw_speed_limits,
+    draw_via_points,
+    mark_via_times,
     shade_active,
 )
 from flex_planner.plotting.spatial_motion import draw_path_in_space, label, position_scale
@@ -62,6 +64,8 @@ class Motion:
         Limits on the way, those of the arm included.
     margins : tuple of ConstraintMargin
         How near the motion comes to them.
+    via_times : numpy.ndarray, shape (m,)
+        When it passes its via points [s].
 
     """
 
@@ -74,6 +78,7 @@ class Motion:
     joint_names: Sequence[str] = ()
     constraints: tuple[PathConstraint, ...] = ()
     margins: tuple[ConstraintMargin, ...] = ()
+    via_times: Array = field(default_factory=lambda: np.zeros(0))
 
     @classmethod
     def of(cls, plan: Plan, joint_names: Sequence[str] = (), count: int = _SAMPLES) -> Motion:
@@ -81,7 +86,7 @@ class Motion:
         samples = plan.uniform_samples(count)
         return cls(arm=plan.arm, times=samples.times, coordinates=samples.coordinates,
                    rates=samples.rates, torques=samples.torques, tip=samples.tip,
-                   joint_names=joint_names, margins=plan.constraints,
+                   joint_names=joint_names, margins=plan.constraints, via_times=plan.via_times,
                    constraints=(*limits_of_arm(plan.arm), *plan.task.path_constraints))
 
     @property
@@ -161,7 +166,7 @@ def draw_angles(axes: Axes, motion: Motion, execution: Execution | None = None) 
                  scale * execution.positions if execution else None)
     settle_limits(axes, _LEAST_ANGLE)
     draw_angle_limits(axes, motion.constraints, position_scale(motion.arm))
-    shade_active(axes, motion.margins)
+    _mark_way(axes, motion)
     finish(axes, 'joint angles', label(motion.arm, 'angle [deg]', 'way [mm]'))
 
 
@@ -171,7 +176,7 @@ def draw_speeds(axes: Axes, motion: Motion, execution: Execution | None = None) 
                  execution.speeds if execution else None)
     settle_limits(axes, _LEAST_SPEED)
     draw_speed_limits(axes, motion.constraints)
-    shade_active(axes, motion.margins)
+    _mark_way(axes, motion)
     finish(axes, 'joint speeds', label(motion.arm, 'speed [rad/s]', '[m/s]'))
 
 
@@ -185,10 +190,16 @@ def draw_torques(axes: Axes, motion: Motion, execution: Execution | None = None)
     low, high = limits_beside(np.concatenate(shown), bounds, _LEAST_TORQUE)
     _draw_bounds(axes, motion, bounds, (low, high))
     axes.set_ylim(low, high)
-    shade_active(axes, motion.margins)
+    _mark_way(axes, motion)
     axes.ticklabel_format(axis='y', useOffset=False)
     finish(axes, 'motor torques and their bounds',
            label(motion.arm, 'torque [N m]', 'force [N]'))
+
+
+def _mark_way(axes: Axes, motion: Motion) -> None:
+    """Mark when limits are active, and when via points are passed, in a diagram over time."""
+    shade_active(axes, motion.margins)
+    mark_via_times(axes, motion.via_times)
 
 
 def _draw_joints(axes: Axes, motion: Motion, values: Array, execution: Execution | None,
@@ -241,6 +252,7 @@ def draw_tip(axes: Axes, motion: Motion, execution: Execution | None = None) -> 
     axes.plot(*motion.tip.T, color=PLANNED, label='tip, planned', **beneath)
     if execution is not None:
         axes.plot(*execution.tip.T, color=CARRIED_OUT, linewidth=1.2, label='tip, simulated')
+    draw_via_points(axes, motion.times, motion.tip, motion.via_times)
     axes.plot(*motion.tip[0], 'o', color=PLANNED, label='start')
     axes.plot(*motion.tip[-1], 's', color=PLANNED, label='goal')
     axes.set_aspect('equal', adjustable='datalim')
@@ -256,7 +268,7 @@ def draw_modes(axes: Axes, motion: Motion) -> None:
                      [name.replace('_', ', ') for name in arm.passive_names],
                      [coordinate_colour(n + j) for j in range(arm.n_passive)])
         settle_limits(axes, _LEAST_BENDING)
-        shade_active(axes, motion.margins)
+        _mark_way(axes, motion)
     else:
         say(axes, 'rigid links')
     twists = any('twist' in name for name in arm.passive_names)

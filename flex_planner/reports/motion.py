@@ -13,6 +13,7 @@ from flex_planner.planning.certificate import Certificate
 from flex_planner.planning.kinds.clusters import KindOfMotion
 from flex_planner.planning.plan import Peaks, Plan
 from flex_planner.planning.warnings import PlanWarning
+from flex_planner.reports.limits import limit_rows
 import numpy as np
 
 Row = tuple[str, str]
@@ -110,6 +111,7 @@ def motion_rows(plan: Plan, peaks: Peaks) -> list[Row]:
         ('motors on their limit', _saturation(plan)),
         *(('passes', sentence) for sentence in say_via_points(plan.task.via_points,
                                                               plan.via_times)),
+        *limit_rows(plan),
         *certificate_rows(plan.certificate)]
 
 

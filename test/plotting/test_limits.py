@@ -1,4 +1,4 @@
-"""Limits on the way in pictures of a motion."""
+"""Limits on the way and via points in pictures of a motion."""
 
 from __future__ import annotations
 
@@ -53,3 +53,16 @@ def test_regions_bounds_and_active_times_are_drawn(rigid_arm: Arm) -> None:
     (legend,) = drawn.legends
     names = {text.get_text() for text in legend.get_texts()}
     assert {'post', 'at its limit: tip from post', 'limits on the way'} <= names
+
+
+def test_via_points_are_marked_in_time_and_on_the_path(rigid_arm: Arm) -> None:
+    shown = motion(rigid_arm)
+    drawn = draw_motion(replace(shown, via_times=np.array([shown.times[4], 0.725])))
+    angles, speeds, torques, tip, *_ = drawn.axes
+    for axes in (angles, speeds, torques):
+        marks = [line.get_xdata()[0] for line in axes.lines if line.get_label() == 'via points']
+        assert marks == [shown.times[4], 0.725]
+    (dots,) = (line for line in tip.lines if line.get_label() == 'via points')
+    np.testing.assert_allclose(np.array(dots.get_xydata()), [
+        shown.tip[4], (shown.tip[14] + shown.tip[15]) / 2])
+    assert 'via points' in {text.get_text() for text in drawn.legends[0].get_texts()}

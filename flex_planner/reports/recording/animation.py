@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import link_points, payload_position
-from flex_planner.base.colours import ARM, FLEXIBLE, PLANNED
+from flex_planner.base.colours import ARM, FLEXIBLE, PLANNED, REFUSED
 from flex_planner.base.validation import Array
+from flex_planner.optimal_control.path_constraints import PathConstraint
+from flex_planner.planning.region_outlines import find_keep_outs, outline_region
 from flex_planner.reports.recording.contents import RecordedMotion
 import numpy as np
 
@@ -16,7 +19,8 @@ _FRAMES, _STATIONS, _DIGITS = 201, 13, 4
 _MARGIN = 0.06
 
 
-def animation(arm: Arm, motion: RecordedMotion) -> dict[str, Any]:
+def animation(arm: Arm, motion: RecordedMotion,
+              constraints: Sequence[PathConstraint] = ()) -> dict[str, Any]:
     """
     Return what arm.js draws of a motion.
 
@@ -26,12 +30,15 @@ def animation(arm: Arm, motion: RecordedMotion) -> dict[str, Any]:
         n joints.
     motion : RecordedMotion
         From its first sample, which may hold the arm, to the arrival.
+    constraints : sequence of PathConstraint
+        Limits on the way, of which the regions that are kept free are shown.
 
     Returns
     -------
     dict
         ``times`` (F,) [s]; ``links`` (F, n, 2 k), of each link the points x, y, x, y ... from its
         joint to its end [mm]; ``payload`` (F, 2) [mm]; ``tip`` (2 m,), its recorded path [mm];
+        ``keep_outs``, of each region the corners of its outline [mm];
         which links are ``flexible``; colours; ``box``, left, low, width and height [mm].
 
     """
@@ -45,9 +52,12 @@ def animation(arm: Arm, motion: RecordedMotion) -> dict[str, Any]:
         'times': times.round(6).tolist(),
         'links': [[_flat(link) for link in frame] for frame in points],
         'payload': [_flat(place) for place in payload], 'tip': _flat(motion.tip),
+        'keep_outs': [_flat(outline_region(one.region, arm.reach))
+                      for one in find_keep_outs(constraints)],
         'flexible': [bool(link.modes) for link in arm.links],
         'loaded': bool(motion.payload_mass),
-        'colours': {'flexible': FLEXIBLE, 'rigid': '#444444', 'aside': ARM, 'tip': PLANNED},
+        'colours': {'flexible': FLEXIBLE, 'rigid': '#444444', 'aside': ARM, 'tip': PLANNED,
+                    'refused': REFUSED},
         'box': _flat(np.concatenate([low - margin, high - low + 2 * margin]))}
 
 

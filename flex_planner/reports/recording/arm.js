@@ -48,9 +48,13 @@ class Arm {
     return drawing('circle', this.plane, { r: size * this.unit, fill: colour });
   }
 
-  // What does not move: the arm at both ends, the path of the tip, the base.
+  // What does not move: the arm at both ends, the path of the tip, the base, what is kept free.
   addStill() {
-    const { links, tip, colours } = this.spec;
+    const { links, tip, colours, keep_outs: regions } = this.spec;
+    for (const region of regions) {
+      drawing('polygon', this.plane, { points: region.join(' '), fill: colours.refused,
+        'fill-opacity': 0.3 });
+    }
     for (const frame of [links[0], links[links.length - 1]]) {
       for (const link of frame) this.line(link, colours.aside, 0.6);
     }

@@ -15,6 +15,11 @@ from flex_planner.base.validation import Array
 from flex_planner.base.yaml_text import parse_yaml, YamlTextError
 from flex_planner.control.joint_reference import JointReference
 from flex_planner.optimal_control.parameters import Parameters
+from flex_planner.optimal_control.path_constraints import (
+    limits_of_arm,
+    PathConstraint,
+    read_constraint,
+)
 from flex_planner.recording import (
     Decoder,
     Definition,
@@ -31,6 +36,7 @@ import numpy as np
 _PACKAGE = 'flex_planner_interfaces'
 _TYPES = f'{_PACKAGE}/msg/'
 _NANOSECOND = 1e-9
+_LIMIT_FIELDS = ('names', 'margins', 'units', 'shares', 'times')
 _WANTED = ('MotionTask', 'PlanReport', 'PayloadSearch', 'FlexibleTrajectory')
 
 
@@ -212,11 +218,14 @@ class RecordedRequest:
 
     def _check(self) -> None:
         """Raise one of many exceptions unless what is derived from the messages can be."""
+        if len({len(getattr(self.report, f'limit_{name}', ())) for name in _LIMIT_FIELDS}) > 1:
+            raise ValueError('its limits on the way differ in number')
         tolerance = self.tolerance
         if self.motion is not None and not tolerance >= 0:
             raise ValueError(f'the tolerance is {tolerance}')
         if self.motion is not None:
             self.parameters  # noqa: B018 - refuses what is out of bounds
+            self.path_constraints  # noqa: B018 - as well
 
     @property
     def solved(self) -> bool:
@@ -244,6 +253,16 @@ class RecordedRequest:
             effort_weights=weights(self.report.effort_weights, n),
             position_weights=weights(self.task.position_weights, n_t),
             velocity_weights=weights(self.report.velocity_weights, n_t))
+
+    @property
+    def path_constraints(self) -> tuple[PathConstraint, ...]:
+        """Return the limits on the way of arm and task; in older recordings tasks have none."""
+        asked = []
+        for i, text in enumerate(getattr(self.task, 'path_constraints', ())):
+            asked.append(read_constraint(f'path_constraints[{i}]', str(text)))
+            asked[-1].check(f'path_constraints[{i}]', self.arm)
+        return tuple(one for one in (*limits_of_arm(self.arm), *asked)
+                     if self.arm.n_modes or not one.bends)
 
 
 def _scenario(path: Path | str) -> Mapping[str, Any]:

@@ -28,7 +28,8 @@ from flex_planner.reports.recording.animation import animation
 from flex_planner.reports.recording.contents import RecordedRequest
 from flex_planner.reports.recording.findings import MotionCheck
 from flex_planner.reports.recording.frequencies import NaturalFrequencies
-from flex_planner.reports.recording.plots import Plot, plots, Series
+from flex_planner.reports.recording.plot_data import Plot, Series
+from flex_planner.reports.recording.plots import plots
 from flex_planner.reports.recording.report_table import ReportTable
 from flex_planner.reports.recording.tables import tables, verdict
 
@@ -50,7 +51,8 @@ def report_page(request: RecordedRequest, check: MotionCheck | None = None) -> s
         file=_escape(f'{shown_path(request.path.name)}, report of flex_planner {VERSION}'),
         verdict=_escape(verdict(request, check)), hidden='' if drawn else 'hidden',
         data=_json(_content(tables(request, check, frequencies), drawn) | {
-            'arm': request.motion and animation(request.arm, request.motion)}),
+            'arm': request.motion and animation(request.arm, request.motion,
+                                                request.path_constraints)}),
         script=''.join((_FOLDER / name).read_text(encoding='utf-8') for name in _SCRIPTS))
 
 
@@ -87,7 +89,7 @@ def _content(shown_tables: list[ReportTable], drawn: list[Plot]) -> dict[str, An
         """Return a line of a plot."""
         return {'name': series.name, 'x': axis(series.x), 'y': _numbers(series.y),
                 'colour': series.colour, 'dashed': series.dashed,
-                'dots': series.dots, 'bound': series.bound}
+                'dots': series.dots, 'bound': series.bound, 'filled': series.filled}
 
     shown = [{**{name: getattr(plot, name) for name in _PLAIN},
               'bands': None if plot.bands is None else asdict(plot.bands),

@@ -308,7 +308,7 @@ class Plot {
     });
   }
 
-  drawSeries(pen, { xs, y, colour, dashed, dots }) {
+  drawSeries(pen, { xs, y, colour, dashed, dots, filled }) {
     Object.assign(pen, { strokeStyle: colour, fillStyle: colour, lineWidth: dashed ? 1 : 1.7 });
     pen.setLineDash(dashed ? [5, 4] : []);
     pen.beginPath();
@@ -323,6 +323,11 @@ class Plot {
       if (dots) pen.arc(this.px(x), this.py(y[i]), 4, 0, 2 * Math.PI);
       gap = false;
     });
+    if (filled) {
+      pen.globalAlpha = 0.3;
+      pen.fill();
+      pen.globalAlpha = 1;
+    }
     if (dots) pen.fill(); else pen.stroke();
     pen.setLineDash([]);
   }

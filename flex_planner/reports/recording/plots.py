@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 from flex_planner.base.colours import (
@@ -21,6 +20,8 @@ from flex_planner.optimal_control.torque_limits import TorqueLimits
 from flex_planner.reports.recording.contents import RecordedMotion, RecordedRequest
 from flex_planner.reports.recording.findings import MotionCheck
 from flex_planner.reports.recording.frequencies import NaturalFrequencies
+from flex_planner.reports.recording.limit_plots import add_limits
+from flex_planner.reports.recording.plot_data import Bands, Plot, Series
 from flex_planner.reports.recording.spectra import spectrum
 import numpy as np
 from numpy.typing import NDArray
@@ -29,95 +30,11 @@ _TIME = 'time [s]'
 _MILLI, _TINY = 1e3, 1e-300
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Series:
-    """
-    A line of a plot.
-
-    Attributes
-    ----------
-    name : str
-        In the legend.
-    x, y : numpy.ndarray, shape (k,)
-        The points; what is not finite is a gap.
-    colour : str
-        As CSS has it; lines of one colour belong together.
-    dashed, dots : bool
-        Drawn so instead of as a line.
-    bound : bool
-        Whether it is only there to compare others with: it may lie beyond the plot.
-
-    """
-
-    name: str
-    x: Array
-    y: Array
-    colour: str
-    dashed: bool = False
-    dots: bool = False
-    bound: bool = False
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Bands:
-    """
-    Ranges along x that are marked from top to bottom.
-
-    Attributes
-    ----------
-    name : str
-        In the legend.
-    labels : list of str
-        At each range.
-    ranges : list of [low, high]
-        In the unit of x.
-
-    """
-
-    name: str
-    labels: list[str]
-    ranges: list[list[float]]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Plot:
-    """
-    A plot.
-
-    Attributes
-    ----------
-    key, title, x_label, y_label : str
-        Its names.
-    series : list of Series
-        Its lines.
-    group : str
-        Plots of one group are zoomed together; empty for none.
-    log, equal : bool
-        Logarithmic upwards; the same scale in both directions.
-    least : float
-        Range upwards that is shown at least, so that rounding errors look like none.
-    bands : Bands or None
-        What is marked.
-
-    """
-
-    key: str
-    title: str
-    x_label: str
-    y_label: str
-    series: list[Series] = field(default_factory=list)
-    group: str = ''
-    log: bool = False
-    equal: bool = False
-    least: float = 0.0
-    bands: Bands | None = None
-
-
 def plots(request: RecordedRequest, check: MotionCheck | None = None,
           frequencies: NaturalFrequencies | None = None) -> list[Plot]:
     """Return the plots of a report; those of the motion only where there is one."""
-    found = [] if request.motion is None else _motion_plots(request, request.motion, check,
-                                                            _bands(frequencies))
+    found = [] if request.motion is None else add_limits(request, request.motion, _motion_plots(
+        request, request.motion, check, _bands(frequencies)))
     return [*found, *([] if request.search is None else _search_plots(request.search))]
 
 

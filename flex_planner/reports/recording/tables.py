@@ -17,6 +17,7 @@ from flex_planner.reports.recording.findings import MotionCheck
 from flex_planner.reports.recording.forgiveness import forgiveness_tables
 from flex_planner.reports.recording.frequencies import NaturalFrequencies
 from flex_planner.reports.recording.report_table import Cells, ReportTable
+from flex_planner.reports.recording.way_limits import limit_tables
 import numpy as np
 
 _CERTIFICATE = {
@@ -43,7 +44,7 @@ def tables(request: RecordedRequest, check: MotionCheck | None = None,
     found = [_task(request), _outcome(request), *_kinds(request), *_warnings(request.report)]
     if request.solved:
         found += [_certificate(request), *_execution(request)]
-    found += forgiveness_tables(request)
+    found += [*limit_tables(request), *forgiveness_tables(request)]
     if check is not None:
         found.append(check_table(check))
     if request.motion is not None:

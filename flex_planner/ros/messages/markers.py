@@ -18,16 +18,18 @@ from visualization_msgs.msg import Marker, MarkerArray
 _INSTANTS = 9
 _STATIONS = 20  # points per link
 _LONGEST_PATH = 500  # points
+_SOON = 2e-9  # [s], as times of samples are rounded
 _LINK, _PATH, _START, _GOAL = (0.2, 0.4, 0.8), (0.9, 0.5, 0.1), (0.2, 0.7, 0.2), (0.8, 0.2, 0.2)
 
 
 def motion_markers(arm: Arm, reference: SampledPlan, frame: str,
-                   constraints: Sequence[PathConstraint] = ()) -> MarkerArray:
+                   constraints: Sequence[PathConstraint] = (),
+                   via_times: Sequence[float] | Array = ()) -> MarkerArray:
     """
     Return the bent links at nine instants, the later the less transparent, and the tip's path.
 
-    Namespaces: ``links``, ``tip_path``, ``start``, ``goal`` and ``keep_out``. What a plan before
-    has left is deleted first.
+    Namespaces: ``links``, ``tip_path``, ``start``, ``goal``, ``keep_out`` and
+    ``via_points``. What a plan before has left is deleted first.
 
     Parameters
     ----------
@@ -39,6 +41,8 @@ def motion_markers(arm: Arm, reference: SampledPlan, frame: str,
         Of the base.
     constraints : sequence of PathConstraint
         Of the task: the outlines of regions that are kept free are shown.
+    via_times : array_like, shape (m,)
+        When via points are passed, from the start of the motion: a ball is where the tip is [s].
 
     """
     times, tip, width = reference.times_ns, reference.samples.tip, _reach(arm) / 100
@@ -55,6 +59,9 @@ def motion_markers(arm: Arm, reference: SampledPlan, frame: str,
                 _ball('goal', tip[-1], (*_GOAL, 1.0), 3 * width)]
     markers += [_line('keep_out', i, outline_region(one.region, _reach(arm)), (*_GOAL, 1.0),
                       width) for i, one in enumerate(find_keep_outs(constraints))]
+    passed = np.searchsorted(times * 1e-9, reference.start_hold + np.array(via_times) - _SOON)
+    markers += [_ball('via_points', tip[k], (*_PATH, 1.0), 2 * width, i)
+                for i, k in enumerate(passed)]
     for marker in markers:
         marker.header.frame_id = frame
     return MarkerArray(markers=markers)
@@ -80,8 +87,9 @@ def _line(namespace: str, number: int, points: Array, color: tuple[float, ...],
     return marker
 
 
-def _ball(namespace: str, place: Array, color: tuple[float, ...], size: float) -> Marker:
-    marker = _marker(namespace, 0, Marker.SPHERE, color)
+def _ball(namespace: str, place: Array, color: tuple[float, ...], size: float,
+          number: int = 0) -> Marker:
+    marker = _marker(namespace, number, Marker.SPHERE, color)
     marker.pose.position = Point(x=float(place[0]), y=float(place[1]), z=0.0)
     marker.scale.x = marker.scale.y = marker.scale.z = size
     return marker

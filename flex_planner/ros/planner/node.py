@@ -192,7 +192,7 @@ class PlannerNode(Node):  # type: ignore[misc]
         if plan is None or reference is None:
             return
         markers = motion_markers(plan.arm, reference, settings.base_frame,
-                                 plan.task.path_constraints)
+                                 plan.task.path_constraints, plan.via_times)
         self._joints.publish(outcome.trajectory.joint_trajectory)
         self._flexible.publish(outcome.trajectory)
         self._markers.publish(markers)
