@@ -19,7 +19,7 @@ import numpy as np
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Certificate:
     """
-    How exactly a plan meets its conditions; ``inf`` where nothing was found out.
+    How exactly a plan meets its conditions; ``inf`` where nothing was found out, a slack ``nan``.
 
     Attributes
     ----------
