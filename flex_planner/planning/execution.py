@@ -191,7 +191,8 @@ class Execution:
 
     def arrive(self, reference: Reference, monitor: Monitor | None = None) -> Array:
         """Return the state on arrival, shape (2 n_t,); NaN if the arm has run away."""
-        return self.carry_out(reference, monitor).states[-1]
+        state: Array = self.carry_out(reference, monitor).states[-1]
+        return state
 
     def carry_out(self, reference: Reference, monitor: Monitor | None = None) -> ControlledMotion:
         """Return the motion up to the arrival; NaN from where the arm has run away."""

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 from factories import TaskFactory
+from flex_planner.base.errors import InvalidValueError
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.constrained_motion import ConstrainedMotion
 from flex_planner.optimal_control.path_constraints import (
@@ -93,6 +95,15 @@ def test_via_point_beyond_a_limit_is_impossible(
     assert plan.status is PlanStatus.INFEASIBLE
     assert plan.message.startswith('via point 1 breaks a limit that holds on the whole way: '
                                    + words)
+
+
+@pytest.mark.parametrize(('field', 'one'), [
+    ('path_constraints', JointSpeed(joint=1, limit=1.0)), ('path_constraints', None),
+    ('via_points', FREE), ('via_points', None)])
+def test_one_entry_instead_of_a_list_is_refused(rigid_model: ArmModel, paper_task: TaskFactory,
+                                                field: str, one: Any) -> None:
+    with pytest.raises(InvalidValueError, match=f'{field} is .*must be a list of'):
+        paper_task(rigid_model.arm, **{field: one})
 
 
 def test_via_point_says_nothing_of_limits_that_it_does_not_decide(
