@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 import math
+from typing import Any
 
 from flex_planner.base.errors import InvalidSizeError, InvalidValueError, NotFiniteError
 from flex_planner.base.sentences import count_of
@@ -162,3 +163,11 @@ def vector(
                unit=unit)
     array.setflags(write=False)
     return array
+
+
+def listed(field: str, value: Iterable[Any], of: str) -> tuple[Any, ...]:
+    """Return what a list has; InvalidValueError for what is none, such as one entry alone."""
+    try:
+        return tuple(value)
+    except TypeError:
+        raise InvalidValueError(field, value, f'a list {of}') from None

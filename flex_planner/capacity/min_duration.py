@@ -132,6 +132,7 @@ def _search(task: Task, search: LimitSearch, neighbours: Neighbours,
         within = hurry_within_limits(task, search.solver, accuracy, found)
         if within is not None:
             return within
+        found = replace(found, local_lower=0.0)  # what ends is a motion beyond the limits
     if not plan.solved:
         return _certified_so_far(search, found)
     if not search.is_near:

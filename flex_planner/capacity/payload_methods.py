@@ -80,6 +80,7 @@ def _follow(search: LimitSearch, problem: MotionProblem, solver: Solver,
         within = carry_within_limits(problem, solver, accuracy, found)
         if within is not None:
             return within
+        found = replace(found, local_upper=np.inf)  # what ends is a motion beyond the limits
     held = None if near else _hold(problem, search, found, solver)
     if held is not None or not plan.solved:
         return _certified_so_far(search, held or found)

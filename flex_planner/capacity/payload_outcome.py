@@ -26,6 +26,8 @@ def describe(found: MaxPayload) -> MaxPayload:
         return found
     joint, shares = found.limiting_joint, found.plan.saturation
     joint = int(shares.argmax()) if joint is None else joint
+    if found.within_limits:  # which may limit the payload without any motor
+        return replace(found, limiting_joint=joint if shares[joint] > 0 else None)
     found = replace(found, limiting_joint=joint)
     if found.status is not PlanStatus.SOLVED:
         return replace(found, message=f'{found.message} ({found.payload:.6g} kg are certified)')

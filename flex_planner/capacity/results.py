@@ -69,6 +69,9 @@ class LimitResult:
         made rigid. Empty where it started from a given motion, or followed one kind only.
     starts : int
         How many starts were explored.
+    within_limits : bool
+        Whether limits on the way bend the motion: the other end of the bracket is where no motion
+        within them was found, which is no bound.
     warm : bool
         Whether it went on from the motion that it was given to start from.
     iterations : int
@@ -85,6 +88,7 @@ class LimitResult:
     extremals: tuple[Extremal, ...] = field(default=(), repr=False)
     kinds: tuple[KindOfMotion, ...] = field(default=(), repr=False)
     starts: int = 0
+    within_limits: bool = False
     warm: bool = False
     iterations: int = 0
     planning_time: float = 0.0
@@ -139,7 +143,7 @@ class MaxPayload(LimitResult):
     local_upper : float
         Upper end: where this kind of motion ends, see `Extremal.gap`, or by the incremental method
         a payload with which no motion was found; ``inf`` if unknown. Motions of another kind may
-        carry more [kg].
+        carry more. Within limits on the way (`within_limits`) an estimate, no bound [kg].
     proved_upper : float
         What no motion of the task exceeds; ``inf`` if nothing is proved [kg].
     proof : Proof or None
@@ -185,6 +189,8 @@ class MaxPayload(LimitResult):
         """Return what `local_upper` is, in words that it follows."""
         if self.held:
             return 'the goal cannot be held with'
+        if self.within_limits:
+            return 'within the limits on the way the search ended near'
         if self.method is PayloadMethod.INCREMENTAL:
             return 'no motion was found with'
         return 'this kind of motion ends at'
@@ -202,7 +208,8 @@ class MinDuration(LimitResult):
         none [s].
     local_lower : float
         Lower end: where this kind of motion ends, see `Extremal.gap`; 0 if unknown. Motions of
-        another kind may be shorter [s].
+        another kind may be shorter. Within limits on the way a duration in which no motion was
+        found [s].
     proved_lower : float
         What no motion of the task falls below; 0 if nothing is proved [s].
 
@@ -222,7 +229,9 @@ class MinDuration(LimitResult):
         found = f'{self.duration:.6g} s' if np.isfinite(self.duration) else 'none found'
         rows = [('shortest duration', found)]
         if self.local_lower:
-            rows.append(('this kind of motion ends at', f'{self.local_lower:.6g} s'))
+            ends = ('within the limits on the way none was found in' if self.within_limits else
+                    'this kind of motion ends at')
+            rows.append((ends, f'{self.local_lower:.6g} s'))
         if self.proved_lower:
             rows.append(('proved: no motion takes', f'less than {self.proved_lower:.6g} s'))
         return rows

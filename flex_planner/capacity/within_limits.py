@@ -80,7 +80,7 @@ def carry_within_limits(problem: MotionProblem, solver: Solver, accuracy: float,
         near = payload + gap - lighter <= accuracy
         return replace(
             free, status=PlanStatus.SOLVED if near else PlanStatus.NOT_CONVERGED, plan=plan,
-            payload=lighter, local_upper=payload + gap, message=(
+            payload=lighter, local_upper=payload + gap, within_limits=True, message=(
                 f'{lighter:.6g} kg can be carried within the limits on the way, and a motion with '
                 f'more than {lighter:.6g} kg was not certified, though about {payload:.6g} kg '
                 'seem possible'))
@@ -129,7 +129,7 @@ def hurry_within_limits(task: Task, solver: Solver, accuracy: float,
     near = plan.task.duration - failed <= accuracy
     return replace(
         free, status=PlanStatus.SOLVED if near else PlanStatus.NOT_CONVERGED, plan=plan,
-        duration=plan.task.duration, local_lower=failed, message=(
+        duration=plan.task.duration, local_lower=failed, within_limits=True, message=(
             f'{plan.task.duration:.6g} s are enough within the limits on the way, certified; no '
             f'motion of this kind was found in {failed:.6g} s'))
 

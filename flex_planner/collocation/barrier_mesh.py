@@ -101,7 +101,7 @@ def _find_cuts(problem: BarrierProblem, met: BarrierOutcome, slacks: Slacks,
     sigma, lam = y[..., middle - count:middle], y[..., -count:]
     steep = np.abs(np.diff(np.log(sigma), axis=1)).max(axis=1) > _STEEPEST
     matters = lam.max(axis=1) > _MATTERS * lam.max(axis=(0, 1))
-    cuts: Array = passed | (steep & matters).any(axis=1)
+    cuts: Array = (passed | (steep & matters).any(axis=1)) & (solution.steps > 0)
     return cuts
 
 

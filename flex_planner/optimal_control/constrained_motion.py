@@ -42,7 +42,8 @@ class ConstrainedMotion(MotionProblem):
 
     def __init__(self, motion: MotionProblem, slacks: PathSlacks, mu: float,
                  floor: Array | None = None) -> None:
-        super().__init__(motion.model, motion.task, motion.parameters)
+        super().__init__(motion.model, motion.task, motion.parameters,
+                         via_times=motion.junctions if motion.junctions.size else None)
         self.slacks, self.mu = slacks, mu
         self.floor: Array = np.zeros(slacks.count) if floor is None else floor
 
@@ -92,6 +93,10 @@ class ConstrainedMotion(MotionProblem):
         """Return the problem of the same task changed in payload or duration."""
         return ConstrainedMotion(super().with_changes(**changes), self.slacks, self.mu,
                                  self.floor)
+
+    def with_via_times(self, times: Array) -> ConstrainedMotion:
+        """Return the same problem with its via points passed at other times (K,) [s]."""
+        return ConstrainedMotion(super().with_via_times(times), self.slacks, self.mu, self.floor)
 
     def with_mu(self, mu: float) -> ConstrainedMotion:
         """Return the same problem with another barrier."""
@@ -152,9 +157,11 @@ def eliminate_slacks(slacks: PathSlacks, states: Array, sigma: Array, multiplier
 
     """
     values, slopes, curvature = slacks.linearise(states, multipliers)
-    ratio = multipliers / sigma
-    return (_pull(slopes, mu / sigma - ratio * (values - sigma)),
-            curvature - _stiffen(slopes, ratio))
+    # where no motion keeps the limits sigma vanishes: who calls sees that this is not finite
+    with np.errstate(over='ignore', invalid='ignore'):
+        ratio = multipliers / sigma
+        return (_pull(slopes, mu / sigma - ratio * (values - sigma)),
+                curvature - _stiffen(slopes, ratio))
 
 
 def step_slacks(slacks: PathSlacks, states: Array, sigma: Array, multipliers: Array,

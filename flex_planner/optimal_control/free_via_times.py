@@ -62,7 +62,9 @@ class FreeViaTimesProblem:
         return np.hstack([phase * rate, phase, np.zeros_like(phase)]), jacobian
 
     def compiled_rate(self) -> CompiledRate | None:
-        """Return both as machine code, None without a compiler."""
+        """Return both as machine code, None without a compiler or for limits on the way."""
+        if self.motion.compiled_rate() is None:
+            return None
         return self.motion.model.compiled_rate('free_times', self.motion.p)
 
     def switches(self, t: Array, z: Array) -> Array:

@@ -39,6 +39,7 @@ class PathBarrier:
         self.size: int = inner.size
         self.free: int = inner.free
         self.explicit: Indices = inner.explicit
+        self.junctions = inner.junctions
         self._half: int = inner.motion.size // 2
 
     def scale(self, mu: float) -> Array:
@@ -74,6 +75,10 @@ class PathBarrier:
     def right(self, z: Array) -> tuple[Array, Array]:
         """Return the final conditions."""
         return self.inner.right(z)
+
+    def join(self, junction: int, before: Array, after: Array) -> tuple[Array, Array]:
+        """Return what holds at a via point."""
+        return self.inner.join(junction, before, after)
 
     def guess(self, solution: CollocationSolution, mu: float,
               least: float = _FIRST_SLACK) -> Array:

@@ -10,7 +10,7 @@ from flex_planner.arms.arm import Arm
 from flex_planner.arms.inverse_kinematics import check_angle_limits
 from flex_planner.arms.planar_only import require_planar
 from flex_planner.base.errors import InvalidValueError
-from flex_planner.base.validation import Array, number, vector
+from flex_planner.base.validation import Array, listed, number, vector
 from flex_planner.optimal_control.ends_at_points import ends_at_points, MAX_COORDINATE
 from flex_planner.optimal_control.path_constraints.joint_constraints import (
     JointRange,
@@ -245,7 +245,7 @@ class Task:
 
     def _set_constraints(self) -> None:
         """Check the limits on the way."""
-        given = tuple(self.path_constraints)
+        given = listed('path_constraints', self.path_constraints, 'of limits on the way')
         for i, one in enumerate(given):
             name = f'path_constraints[{i}]'
             if not isinstance(one, PathConstraint):
@@ -257,7 +257,8 @@ class Task:
 
     def _set_via_points(self) -> None:
         """Check the via points."""
-        points = check_via_points(self.arm, tuple(self.via_points), self.duration,
+        points = check_via_points(self.arm, listed('via_points', self.via_points, 'of via points'),
+                                  self.duration,
                                   MAX_JOINT_ANGLE)
         object.__setattr__(self, 'via_points', points)
         if points and self.time_weight:

@@ -19,7 +19,7 @@ import numpy as np
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Certificate:
     """
-    How exactly a plan meets its conditions; ``inf`` where nothing was found out.
+    How exactly a plan meets its conditions; ``inf`` where nothing was found out, a slack ``nan``.
 
     Attributes
     ----------
@@ -44,8 +44,9 @@ class Certificate:
         largest error of one times the reach of the arm; 0 without via points [m].
     limit_slack : float
         Smallest slack of all limits on the way, at the nodes of the mesh in the re-simulation, as
-        a share of the limit's scale; ``inf`` without limits. `Plan.constraints` has those of the
-        motion as it is planned, between the nodes, too.
+        a share of the limit's scale; ``inf`` without limits, ``nan`` where it is not known.
+        `Plan.constraints` has those of the motion as it is planned, between the nodes, too, and
+        `ExecutionCertificate.limits` that of the motion under a joint controller.
 
     """
 
@@ -57,7 +58,7 @@ class Certificate:
     state_error: float = np.inf
     costate_error: float = np.inf
     via_error: float = np.inf
-    limit_slack: float = np.inf
+    limit_slack: float = np.nan
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,12 +7,14 @@ from dataclasses import dataclass, fields, replace
 from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
-from flex_planner.control.controlled_motion import ControlledArm, locked_bending
+from flex_planner.control.controlled_motion import ControlledArm, ControlledMotion, locked_bending
 from flex_planner.control.feedback_stability import feedback_growth
 from flex_planner.control.joint_controller import Gains, JointController
 from flex_planner.control.joint_reference import Reference
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.physical_parameters import PhysicalParameters
+from flex_planner.optimal_control.path_constraints import PathSlacks
+from flex_planner.planning.executed_limits import ExecutedSlack, find_executed_slack
 from flex_planner.planning.plan import Plan
 import numpy as np
 
@@ -28,7 +30,8 @@ class ExecutionCertificate:
     """
     Where a joint controller brings the arm with the published points; ``inf`` if it runs away.
 
-    All of it at the first update of the controller at or after the planned arrival.
+    All of it at the first update of the controller at or after the planned arrival, but for the
+    limits on the way, which are looked at until then.
 
     Attributes
     ----------
@@ -44,6 +47,8 @@ class ExecutionCertificate:
     feedback_growth : float
         How fast deviations grow under the PD at the postures of the motion, negative if they die
         away [1/s].
+    limits : ExecutedSlack
+        What limits on the way leave of the motion, with the PD.
     controller : JointController
         That did it.
 
@@ -56,6 +61,12 @@ class ExecutionCertificate:
     open_loop_residual_vibration: float = np.inf
     open_loop_amplification: float = np.inf
     feedback_growth: float = np.inf
+    limits: ExecutedSlack = ExecutedSlack(np.nan)
+
+    @property
+    def limit_slack(self) -> float:
+        """Return the smallest slack on the way; inf without limits, nan if it is not known."""
+        return self.limits.slack
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -180,8 +191,12 @@ class Execution:
 
     def arrive(self, reference: Reference, monitor: Monitor | None = None) -> Array:
         """Return the state on arrival, shape (2 n_t,); NaN if the arm has run away."""
-        state: Array = self.arm.follow(reference, self.start, self.duration, monitor).states[-1]
+        state: Array = self.carry_out(reference, monitor).states[-1]
         return state
+
+    def carry_out(self, reference: Reference, monitor: Monitor | None = None) -> ControlledMotion:
+        """Return the motion up to the arrival; NaN from where the arm has run away."""
+        return self.arm.follow(reference, self.start, self.duration, monitor)
 
     def tip(self, state: Array) -> Array:
         """Return the tip in a state, shape (2,) [m]."""
@@ -211,7 +226,8 @@ class Execution:
 
 
 def certify_execution(execution: Execution, reference: Reference, positions: Array,
-                      monitor: Monitor | None = None) -> ExecutionCertificate:
+                      monitor: Monitor | None = None, *,
+                      slacks: PathSlacks | None = None) -> ExecutionCertificate:
     """
     Return the certificate of a trajectory.
 
@@ -225,6 +241,8 @@ def certify_execution(execution: Execution, reference: Reference, positions: Arr
         Joint angles of the motion, at which the stability of the PD is looked at [rad].
     monitor : Monitor, optional
         May stop it.
+    slacks : PathSlacks, optional
+        Of the limits on the way; none by default.
 
     Raises
     ------
@@ -232,7 +250,8 @@ def certify_execution(execution: Execution, reference: Reference, positions: Arr
         If the monitor stopped it.
 
     """
-    arrived, free = execution.arrive(reference, monitor), execution.open_loop
+    motion, free = execution.carry_out(reference, monitor), execution.open_loop
+    arrived = motion.states[-1]
     drifted = free.arrive(reference, monitor)
     return ExecutionCertificate(
         controller=execution.controller, tip_error=execution.tip_error(arrived),
@@ -240,4 +259,5 @@ def certify_execution(execution: Execution, reference: Reference, positions: Arr
         open_loop_tip_error=free.tip_error(drifted),
         open_loop_residual_vibration=free.vibration(drifted),
         open_loop_amplification=free.amplification(reference, drifted, monitor),
-        feedback_growth=feedback_growth(execution.arm, positions))
+        feedback_growth=feedback_growth(execution.arm, positions),
+        limits=find_executed_slack(slacks, motion))

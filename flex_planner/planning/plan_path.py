@@ -39,6 +39,7 @@ from flex_planner.planning.stiff_links import find_stiff_links
 from flex_planner.planning.strategies.catalogue import CATALOGUE
 from flex_planner.planning.strategies.initial_guesses import restart, warm_start
 from flex_planner.planning.strategies.strategy import Strategy
+from flex_planner.planning.via_limits import check_via_points
 from flex_planner.planning.warnings import find_arm_warnings
 from flex_planner.planning.weight_search import adapt_weights, check_objectives
 import numpy as np
@@ -116,7 +117,7 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
     doubt = find_doubt(problem)
     if doubt is not None:
         return _not_found(problem, doubt)
-    broken = check_ends(problem)
+    broken = check_ends(problem) or check_via_points(problem)
     if broken:
         return _not_possible(problem, broken)
     plan = (_plan_as_rigid(problem, solver, start_from, objectives, strategies, effort)

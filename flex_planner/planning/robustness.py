@@ -109,7 +109,7 @@ def robustness_warnings(certificate: ExecutionCertificate, robustness: Robustnes
         Of the arm [m].
 
     """
-    found = _execution_warnings(certificate, reach)
+    found = [*_execution_warnings(certificate, reach), *_passed_limit(certificate)]
     if certificate.open_loop_amplification > _AMPLIFIED:
         found.append(PlanWarning(kind=WarningKind.OPEN_LOOP_UNSTABLE, sentence=(
             'without feedback the motion is unstable: an error '
@@ -145,6 +145,17 @@ def _execution_warnings(certificate: ExecutionCertificate, reach: float) -> list
         f'{_millimetres(certificate.tip_error)} from its goal and '
         f'{_millimetres(certificate.residual_vibration)} of vibration, where the plan leaves '
         'none: a faster controller or a calmer motion leaves less'))]
+
+
+def _passed_limit(certificate: ExecutionCertificate) -> list[PlanWarning]:
+    """Warn of a limit on the way that the arm passes under its controller."""
+    tightest = certificate.limits
+    if tightest.kept or not tightest.name:
+        return []
+    return [PlanWarning(kind=WarningKind.LIMIT_PASSED, value=tightest.slack, time=tightest.time,
+                        sentence=(
+        f'under the joint controller the arm passes a limit that the plan keeps: {tightest}; a '
+        'faster controller, a calmer motion, or limits with some room keep it'))]
 
 
 def _millimetres(length: float) -> str:

@@ -18,6 +18,7 @@ from flex_planner.base.validation import Array, number
 from flex_planner.control.default_gains import default_gains
 from flex_planner.control.joint_controller import JointController
 from flex_planner.control.joint_reference import JointReference
+from flex_planner.optimal_control.constrained_motion import slacks_of
 from flex_planner.planning.certificate import CertificateLimits
 from flex_planner.planning.execution import (
     certify_execution,
@@ -193,7 +194,8 @@ def sample_plan(plan: Plan, settings: SamplingSettings,
     execution = Execution.of(plan, settings.controller_of(plan), settings.begin_of(plan))
     sampled = _close_enough(plan, settings, execution, watch)
     postures = plan.uniform_samples(_POSTURES).coordinates[:, :plan.arm.n_joints]
-    certificate = certify_execution(execution, sampled.reference, postures, watch)
+    certificate = certify_execution(execution, sampled.reference, postures, watch,
+                                    slacks=slacks_of(plan.problem))
     return replace(sampled, execution=certificate)
 
 

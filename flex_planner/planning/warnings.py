@@ -52,6 +52,7 @@ class WarningKind(Enum):
     MODE_FAMILY_ASSUMED = 'a link does not say how it is fixed'
     TOO_FEW_MODES = 'too few modes'
     ARRIVES_ELSEWHERE = 'the controller leads the arm elsewhere'
+    LIMIT_PASSED = 'the controller leads the arm beyond a limit'
     SENSITIVE_TO_MODES = 'sensitive to the number of modes'
     SENSITIVE_TO_STIFFNESS = 'sensitive to the stiffness'
     SENSITIVE_TO_PAYLOAD = 'sensitive to the payload'

@@ -17,13 +17,23 @@ import numpy as np
 def execution_rows(certificate: ExecutionCertificate) -> list[Row]:
     """Return the certificate of a trajectory."""
     controller = describe_controller(certificate.controller)
-    return [
+    rows = [
         ('published trajectory', f'carried out with {controller}'),
         ('  executed tip error', millimetres(certificate.tip_error)),
         ('  executed residual vibration', millimetres(certificate.residual_vibration)),
         ('  without feedback', f'tip error {millimetres(certificate.open_loop_tip_error)}, '
          f'residual vibration {millimetres(certificate.open_loop_residual_vibration)}; a small '
          f'error at the start grows to {certificate.open_loop_amplification:.2g} times its size')]
+    return rows + _limit_rows(certificate)
+
+
+def _limit_rows(certificate: ExecutionCertificate) -> list[Row]:
+    """Return what limits on the way leave of the executed motion; none without limits."""
+    if not np.isfinite(certificate.limit_slack):
+        return []
+    tightest = certificate.limits
+    return [('  executed limits', str(tightest) if tightest.name else
+             f'{certificate.limit_slack:.2g} of the scale of the tightest is left')]
 
 
 def robustness_rows(robustness: RobustnessReport, arm: Arm) -> list[Row]:

@@ -188,6 +188,8 @@ def _bracket(found: MaxPayload) -> str:
         return f'{below}; {found.local_upper:.6g} kg cannot be held at the goal'
     if found.trials:
         return f'{below}; no solution at {found.local_upper:.6g} kg'
+    if found.within_limits:
+        return f'{below}; {found.upper_means} {found.local_upper:.6g} kg, which is no bound'
     return f'{below}; this kind of motion ends at {found.local_upper:.6g} kg'
 
 

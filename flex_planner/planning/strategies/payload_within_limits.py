@@ -12,6 +12,7 @@ from flex_planner.base.errors import FlexPlannerError
 from flex_planner.collocation import CollocationSolution, GaussRule, Solver
 from flex_planner.collocation.barrier_mesh import follow_barrier
 from flex_planner.collocation.interior_point import BarrierSchedule
+from flex_planner.collocation.junctions import double_nodes
 from flex_planner.optimal_control.barrier_problem import PayloadBarrier
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.path_barrier import PathBarrier
@@ -66,7 +67,8 @@ def reach_largest_payload(problem: MotionProblem, slacks: PathSlacks, solver: So
     both = PathBarrier(barrier, slacks)
     count = min(max(_FEWEST, problem.fewest_intervals(_STAGES)), solver.settings.max_intervals)
     rule, half = GaussRule.of(_STAGES), problem.size // 2
-    mesh = np.linspace(0, problem.task.duration, count + 1, dtype=np.float64)
+    mesh = double_nodes(np.linspace(0, problem.task.duration, count + 1, dtype=np.float64),
+                        problem.junctions)
     start = problem.straight_line(count, rule) if near is None else near.on_mesh(mesh, rule)
     guess = barrier.extend(start)
     scale = price * moved_mass(problem) / problem.task.duration

@@ -23,12 +23,15 @@ from flex_planner.collocation.interior_point import (
     BarrierSchedule,
     solve_barrier,
 )
+from flex_planner.collocation.junctions import double_nodes
 from flex_planner.optimal_control.barrier_problem import MotionBarrier
 from flex_planner.optimal_control.constrained_motion import ConstrainedMotion
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.path_barrier import PathBarrier
 from flex_planner.optimal_control.path_constraints import PathSlacks
 from flex_planner.optimal_control.totals import integrate_totals
+from flex_planner.optimal_control.via_points import free_times
+from flex_planner.planning.strategies.via_times import free_via_times
 import numpy as np
 
 # of the method, and intervals of its first mesh
@@ -116,6 +119,7 @@ def solve_within_limits(problem: MotionProblem, slacks: PathSlacks, met: Barrier
         if result.converged and not _keeps(limited, result.solution):
             limited = limited.floored(result.solution, _FLOOR)
             result = _finish(limited, result.solution, solver)
+        limited, result = _at_best_times(limited, result, solver)
         if result.converged or result.status in INTERRUPTED:
             return limited, result
         failed = failed or result
@@ -137,6 +141,7 @@ def solve_again(problem: MotionProblem, slacks: PathSlacks, near: CollocationSol
     limited = ConstrainedMotion(problem, slacks, _LAST[0] * rate).floored(near, _FLOOR)
     quick = solver.with_settings(stages=_STAGES).patient(_FIRST_LOOK)
     result = quick.solve(limited, near)
+    limited, result = _at_best_times(limited, result, quick)
     kept = result.converged and _keeps(limited, result.solution)
     if kept or result.status in INTERRUPTED:
         return limited, result
@@ -148,9 +153,10 @@ def solve_again(problem: MotionProblem, slacks: PathSlacks, near: CollocationSol
 
 
 def _first_mesh(problem: MotionProblem, solver: Solver) -> Array:
-    """Return the times of the first mesh."""
+    """Return the times of the first mesh, those of via points twice."""
     count = min(max(_FEWEST, problem.fewest_intervals(_STAGES)), solver.settings.max_intervals)
-    return np.linspace(0, problem.task.duration, count + 1, dtype=np.float64)
+    return double_nodes(np.linspace(0, problem.task.duration, count + 1, dtype=np.float64),
+                        problem.junctions)
 
 
 def _schedule(first: float, last: float, solver: Solver) -> BarrierSchedule:
@@ -179,6 +185,15 @@ def _finish(limited: ConstrainedMotion, near: CollocationSolution,
     if result.converged or result.status in INTERRUPTED:
         return result
     return quick.with_settings(exact=True).solve(limited, near)
+
+
+def _at_best_times(limited: ConstrainedMotion, result: CollocationResult,
+                   solver: Solver) -> tuple[ConstrainedMotion, CollocationResult]:
+    """Return the motion that passes via points with free times when it is best within limits."""
+    if not (result.converged and free_times(limited.task.via_points)):
+        return limited, result
+    timed = free_via_times(limited, result, solver)
+    return limited.with_via_times(timed.problem.junctions), timed.result
 
 
 def _keeps(limited: ConstrainedMotion, solution: CollocationSolution) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from flex_planner.control.default_gains import default_gains
 from flex_planner.control.joint_controller import EffortHold, Gains, JointController
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
+from flex_planner.planning.executed_limits import ExecutedSlack
 from flex_planner.planning.execution import ExecutionCertificate, RobustnessReport
 from flex_planner.planning.published_motion import start_ramp
 from flex_planner.reports.recording.contents import RecordedMotion, RecordedRequest
@@ -49,7 +50,8 @@ def recorded_execution(request: RecordedRequest) -> ExecutionCertificate | None:
         open_loop_tip_error=float(report.open_loop_tip_error),
         open_loop_residual_vibration=float(report.open_loop_residual_vibration),
         open_loop_amplification=float(report.open_loop_amplification),
-        feedback_growth=float(report.feedback_growth))
+        feedback_growth=float(report.feedback_growth),
+        limits=ExecutedSlack(float(getattr(report, 'executed_limit_slack', np.nan))))
 
 
 def recorded_robustness(request: RecordedRequest) -> RobustnessReport | None:

@@ -52,7 +52,7 @@ def tables(request: RecordedRequest, check: MotionCheck | None = None,
     if frequencies is not None:
         found.append(_frequencies(frequencies))
     if request.search is not None:
-        found += [_search(request.search), *_trials(request.search)]
+        found += [_search(request.search, request.report), *_trials(request.search)]
     if len(request.report.tried_weights):
         found.append(_objectives(request.report))
     return [*found, *arm_tables(request.arm), _settings(request), *_left_out(request)]
@@ -230,13 +230,15 @@ def _frequencies(frequencies: NaturalFrequencies) -> ReportTable:
                    for k, (free, locked) in enumerate(pairs, 1)))
 
 
-def _search(search: Any) -> ReportTable:
+def _search(search: Any, report: Any) -> ReportTable:
     """Return method and result of the search for the maximum payload."""
+    bent = getattr(report, 'barrier_gap', 0.0) > 0  # by limits on the way
+    ends = 'within the limits on the way it ended near' if bent else 'this kind of motion ends at'
     return ReportTable(title='Search for the maximum payload', rows=(
         ('method', 'payload as an unknown at a rising price' if search.method == search.DIRECT
          else 'payload raised step by step'),
         ('largest payload', f'{search.payload:.6g} kg'),
-        ('this kind of motion ends at' if search.method == search.DIRECT
+        (ends if search.method == search.DIRECT
          else 'no motion was found with', f'{search.payload_upper:.6g} kg'),
         ('proved', search.proof or '–'),
         ('accuracy asked for', f'{search.payload_accuracy:g} kg'),

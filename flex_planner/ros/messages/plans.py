@@ -75,7 +75,8 @@ EXECUTION_FIELDS = {
     'executed_tip_error': 'tip_error', 'executed_residual_vibration': 'residual_vibration',
     'open_loop_tip_error': 'open_loop_tip_error',
     'open_loop_residual_vibration': 'open_loop_residual_vibration',
-    'open_loop_amplification': 'open_loop_amplification', 'feedback_growth': 'feedback_growth'}
+    'open_loop_amplification': 'open_loop_amplification', 'feedback_growth': 'feedback_growth',
+    'executed_limit_slack': 'limit_slack'}
 ROBUSTNESS_FIELDS = {
     'vibration_if_more_modes': 'more_modes',
     'vibration_if_stiffness_differs': 'stiffness_differs',
@@ -168,10 +169,12 @@ def failure_report(code: int, sentence: str) -> PlanReport:
     report = PlanReport(error_code=code, error_msg=printable(sentence))
     for name in ('cost', 'effort', 'energy', 'collocation_residual', 'boundary_error',
                  'hamiltonian_drift', 'tip_error', 'residual_vibration', 'state_error',
-                 'costate_error', 'via_error', 'limit_slack', 'torque_interpolation_error',
+                 'costate_error', 'via_error', 'torque_interpolation_error',
                  *EXECUTION_FIELDS, *ROBUSTNESS_FIELDS, 'forgiven_residual',
                  'forgiven_residual_before'):
         setattr(report, name, float('inf'))
+    for name in ('limit_slack', 'executed_limit_slack'):  # infinite would be without limits
+        setattr(report, name, float('nan'))
     return report
 
 

@@ -316,6 +316,9 @@ def test_outcomes_without_a_plan_are_not_publishable() -> None:
         assert outcome.report.error_code == code
         assert word in outcome.report.error_msg
         assert {getattr(outcome.report, name) for name in NUMBERS} == {math.inf}
+        # infinite would mean that there were no limits to pass
+        assert math.isnan(outcome.report.limit_slack)
+        assert math.isnan(outcome.report.executed_limit_slack)
 
 
 # Plans to messages
@@ -341,6 +344,7 @@ def test_report_tells_what_a_controller_makes_of_the_trajectory(plan: Plan,
     add_reference(report, plan, replace(reference, robustness=robustness))
     assert report.executed_tip_error == execution.tip_error < 1e-5
     assert report.executed_residual_vibration == execution.residual_vibration
+    assert report.executed_limit_slack == execution.limit_slack == math.inf  # without limits
     assert report.open_loop_tip_error == execution.open_loop_tip_error
     assert report.open_loop_residual_vibration == execution.open_loop_residual_vibration
     assert report.open_loop_amplification == execution.open_loop_amplification
