@@ -5,8 +5,10 @@ from __future__ import annotations
 from flex_planner.arms.arm import Arm
 from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.sentences import join_words
+from flex_planner.collocation import Solver
 from flex_planner.dynamics.statics import natural_modes
 from flex_planner.optimal_control.motion_problem import MotionProblem
+from flex_planner.planning.strategies.friction_homotopy import find_easier_speed
 from flex_planner.planning.warnings import find_arm_warnings, WarningKind
 import numpy as np
 
@@ -14,9 +16,22 @@ import numpy as np
 _SHORT = 2.0
 
 
-def suggest_changes(problem: MotionProblem) -> str:
-    """Return a sentence about what makes a motion easier to find."""
-    return f'what may help: {join_words(_changes(problem), "or")}'
+def suggest_changes(problem: MotionProblem, solver: Solver | None = None) -> str:
+    """
+    Return a sentence about what makes a motion easier to find.
+
+    Parameters
+    ----------
+    problem : MotionProblem
+        Of the motion that was not found.
+    solver : Solver, optional
+        Tries, if it is given, whether softer friction leads to a motion; its monitor may stop it.
+
+    """
+    easier = None if solver is None else find_easier_speed(problem, solver)
+    friction = [] if easier is None else [
+        f'a larger coulomb_speed (with {easier:.2g} times as much there is a motion)']
+    return f'what may help: {join_words([*friction, *_changes(problem)], "or")}'
 
 
 def _changes(problem: MotionProblem) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from flex_planner.base.errors import FlexPlannerError
-from flex_planner.collocation import Solver
+from flex_planner.collocation import INTERRUPTED, Solver
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.planning.kinds.clusters import KindOfMotion
 from flex_planner.planning.kinds.explorer import ExploredMotion
@@ -19,6 +19,8 @@ from flex_planner.planning.strategies.ipopt_continuation import transcribe_at_pr
 _LIFTED = 2
 # a motion is of its kind if its value is no worse than this share
 KEPT = 0.01
+# shares by which a value is eased where its price leaves Newton's method no way
+_EASIER = (1e-3, 3e-3, 6e-3)
 # rigid motions that are lifted in turn: at these shares of the price
 _CHEAPER = (1 / 2, 1 / 8, 1 / 64)
 # by so much the price falls from one motion of a front to the one before; so many are enough
@@ -58,12 +60,38 @@ def solve_best_kind(parameter: FreeParameter, problem: MotionProblem,
 
 def _solve_rigid(parameter: FreeParameter, problem: MotionProblem, motion: ExploredMotion,
                  solver: Solver) -> Extremal | None:
-    """Return the rigid arm's motion at the price of its kind; None if that is left."""
+    """
+    Return the rigid arm's motion at the price of its kind, or with a little less than its value.
+
+    A price so high moves the value far with every error of a guess; motions of given values are
+    nearer. None if the kind is left.
+
+    """
     start = SearchStart(value=motion.value, price=motion.price, solution=motion.solution)
     found = transfer_extremal(parameter, problem, start, solver)
-    if found is None or found.interrupted:
+    if found is not None and (found.interrupted or not parameter.falls_short(
+            found.value, motion.value, KEPT)):
         return found
-    return None if parameter.falls_short(found.value, motion.value, KEPT) else found
+    tried = (_solve_eased(parameter, problem, motion, share, solver) for share in _EASIER)
+    return next((one for one in tried if one is not None), None)
+
+
+def _solve_eased(parameter: FreeParameter, problem: MotionProblem, motion: ExploredMotion,
+                 share: float, solver: Solver) -> Extremal | None:
+    """Return the rigid arm's motion with a value that is eased by a share; None without one."""
+    value = parameter.ease(motion.value, share)
+    if not parameter.improves(value, parameter.value(problem)):
+        return None
+    try:
+        near = parameter.with_value(problem, value)
+        guess = motion.solution.stretched(near.task.duration / motion.solution.mesh[-1])
+        result = solver.solve(near, guess)
+        price = parameter.price(near, result.solution) if result.converged else 0.0
+    except FlexPlannerError:  # too heavy to hold
+        return None
+    if not (result.converged or result.status in INTERRUPTED):
+        return None
+    return Extremal(value=value, price=price, result=result, problem=near)
 
 
 def _lift(parameter: FreeParameter, problem: MotionProblem, motion: ExploredMotion,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from flex_planner.planning.kinds.kinds_strategy import explore_kinds
+from flex_planner.planning.strategies.friction_homotopy import sharpen_friction
 from flex_planner.planning.strategies.homotopies import (
     lower_vibration_price,
     raise_weights,
@@ -33,6 +34,7 @@ CATALOGUE: tuple[Strategy, ...] = (
     Strategy('homotopy in the weights', raise_weights, quick=True),
     Strategy('coarse mesh first', coarse_mesh, quick=True),
     Strategy('homotopy in via points', move_via_points, quick=True),
+    Strategy('homotopy in Coulomb friction', sharpen_friction, quick=True, cost=0.25),
     *BARRIER,
     Strategy('homotopy in vibration weights', lower_vibration_price),
     Strategy('homotopy in stiffness', soften_links),

@@ -85,10 +85,13 @@ class FreeParameter(ABC):
     def improves(self, value: float, other: float) -> bool:
         """Return whether a value is nearer to the limit than another."""
 
+    def ease(self, value: float, share: float) -> float:
+        """Return a value that is further from the limit by a share."""
+        return value * (1 - share if self.improves(1.0, 0.0) else 1 + share)
+
     def falls_short(self, value: float, wanted: float, share: float) -> bool:
         """Return whether a value is further from the limit than another by more than a share."""
-        less = 1 - share if self.improves(1.0, 0.0) else 1 + share
-        return self.improves(less * wanted, value)
+        return self.improves(self.ease(wanted, share), value)
 
     @abstractmethod
     def is_possible(self, value: float) -> bool:

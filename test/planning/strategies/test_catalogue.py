@@ -12,11 +12,13 @@ from flex_planner.planning.strategies.strategy import Strategy
 from plan_checks import problem_of, SAME_COST
 import pytest
 
-# what adds nothing to a task: there are no via points, and the rigid arm does not bend
+# what adds nothing to a task: there are neither via points nor Coulomb friction, and the rigid arm
+# does not bend
+NEITHER = {'homotopy in via points', 'homotopy in Coulomb friction'}
 NOTHING_TO_ADD = {
     'rigid': {'rigid motion first', 'interior point from the rigid motion',
-              'homotopy in vibration weights', 'homotopy in stiffness', 'homotopy in via points'},
-    'ei5': {'homotopy in via points'}}
+              'homotopy in vibration weights', 'homotopy in stiffness', *NEITHER},
+    'ei5': NEITHER}
 BY_NAME = {strategy.name: strategy for strategy in CATALOGUE}
 each_strategy = pytest.mark.parametrize('strategy', CATALOGUE, ids=list(BY_NAME))
 
