@@ -19,8 +19,9 @@ import numpy as np
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Certificate:
     """
-    How exactly a plan meets its conditions; ``inf`` where nothing was found out, of a slack
-    ``-inf``.
+    How exactly a plan meets its conditions.
+
+    ``inf`` where nothing was found out, of a slack ``-inf``.
 
     Attributes
     ----------
