@@ -19,7 +19,9 @@ import numpy as np
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Certificate:
     """
-    How exactly a plan meets its conditions; ``inf`` where nothing was found out, a slack ``nan``.
+    How exactly a plan meets its conditions.
+
+    ``inf`` where nothing was found out, of a slack ``-inf``.
 
     Attributes
     ----------
@@ -44,7 +46,7 @@ class Certificate:
         largest error of one times the reach of the arm; 0 without via points [m].
     limit_slack : float
         Smallest slack of all limits on the way, at the nodes of the mesh in the re-simulation, as
-        a share of the limit's scale; ``inf`` without limits, ``nan`` where it is not known.
+        a share of the limit's scale; ``inf`` without limits, ``-inf`` where it is not known.
         `Plan.constraints` has those of the motion as it is planned, between the nodes, too, and
         `ExecutionCertificate.limits` that of the motion under a joint controller.
 
@@ -58,7 +60,7 @@ class Certificate:
     state_error: float = np.inf
     costate_error: float = np.inf
     via_error: float = np.inf
-    limit_slack: float = np.nan
+    limit_slack: float = -np.inf
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -29,8 +29,8 @@ class ExecutedSlack(NamedTuple):
     Attributes
     ----------
     slack : float
-        As a share of the limit's scale, < 0 where the limit is passed; inf without limits, nan
-        where the arm has run away.
+        As a share of the limit's scale, < 0 where the limit is passed; inf without limits,
+        -inf where the arm has run away or nothing is known.
     name : str
         Of the limit; empty without limits.
     margin : float
@@ -56,7 +56,7 @@ class ExecutedSlack(NamedTuple):
     def __str__(self) -> str:
         """Return the smallest slack in words."""
         if not self.name:
-            return 'no limits' if np.isinf(self.slack) else 'not known'
+            return 'no limits' if self.slack > 0 else 'not known'
         side = 'left' if self.slack >= 0 else 'beyond the limit'
         return f'{self.name}: {abs(self.margin):.3g} {self.unit} {side} at {self.time:.4g} s'
 
@@ -76,7 +76,7 @@ def find_executed_slack(slacks: PathSlacks | None, motion: ControlledMotion) -> 
     if slacks is None:
         return ExecutedSlack(np.inf)
     if not np.isfinite(motion.states).all():
-        return ExecutedSlack(np.nan)
+        return ExecutedSlack(-np.inf)
     times, states = _between_updates(motion)
     values = slacks(states)
     at, k = np.unravel_index(int(values.argmin()), values.shape)

@@ -61,11 +61,11 @@ class ExecutionCertificate:
     open_loop_residual_vibration: float = np.inf
     open_loop_amplification: float = np.inf
     feedback_growth: float = np.inf
-    limits: ExecutedSlack = ExecutedSlack(np.nan)
+    limits: ExecutedSlack = ExecutedSlack(-np.inf)
 
     @property
     def limit_slack(self) -> float:
-        """Return the smallest slack on the way; inf without limits, nan if it is not known."""
+        """Return the smallest slack on the way; inf without limits, -inf if not known."""
         return self.limits.slack
 
 

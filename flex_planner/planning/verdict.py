@@ -11,6 +11,7 @@ from flex_planner.planning.constraint_margins import find_margins
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.warnings import find_warnings
 from flex_planner.planning.way_limits import find_limit_violations
+import numpy as np
 
 # of the scale of a limit, by which the re-simulated motion may pass it
 _DRIFT = 1e-4
@@ -69,7 +70,7 @@ def find_refusal(problem: MotionProblem,
 def _find_drift(plan: Plan) -> tuple[PlanStatus, str] | None:
     """Refuse a motion that is planned within its limits, but re-simulated beyond one."""
     slack = plan.certificate.limit_slack
-    if not slack < -_DRIFT:  # not known without a certificate, which is judged by others
+    if slack >= -_DRIFT or np.isneginf(slack):  # which is not known: no certificate to go by
         return None
     return PlanStatus.CERTIFICATE_FAILED, (
         f'the re-simulated motion passes a limit on the way by {-slack:.2g} of its scale, but may '

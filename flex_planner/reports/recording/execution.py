@@ -51,7 +51,7 @@ def recorded_execution(request: RecordedRequest) -> ExecutionCertificate | None:
         open_loop_residual_vibration=float(report.open_loop_residual_vibration),
         open_loop_amplification=float(report.open_loop_amplification),
         feedback_growth=float(report.feedback_growth),
-        limits=ExecutedSlack(float(getattr(report, 'executed_limit_slack', np.nan))))
+        limits=ExecutedSlack(float(getattr(report, 'executed_limit_slack', -np.inf))))
 
 
 def recorded_robustness(request: RecordedRequest) -> RobustnessReport | None:

@@ -173,8 +173,8 @@ def failure_report(code: int, sentence: str) -> PlanReport:
                  *EXECUTION_FIELDS, *ROBUSTNESS_FIELDS, 'forgiven_residual',
                  'forgiven_residual_before'):
         setattr(report, name, float('inf'))
-    for name in ('limit_slack', 'executed_limit_slack'):  # infinite would be without limits
-        setattr(report, name, float('nan'))
+    for name in ('limit_slack', 'executed_limit_slack'):  # inf would be without limits
+        setattr(report, name, float('-inf'))
     return report
 
 
