@@ -16,8 +16,8 @@ from flex_planner.planning.plan import PlanStatus
 from flex_planner.planning.plan_problem import plan_problem
 from flex_planner.planning.strategies.catalogue import QUICK
 from flex_planner.planning.strategies.friction_homotopy import sharpen_friction, soften_friction
-from plan_checks import problem_of
 import numpy as np
+from plan_checks import problem_of
 import pytest
 
 STRIP: dict[str, Any] = {'modes': 1, 'mode_family': 'clamped_free', 'damping_ratio': (0.01,)}
