@@ -40,6 +40,10 @@ from flex_planner.planning.strategies.price_continuation import continue_in_pric
 
 # starts for each other way round to a point
 _OTHER_WAY = 3
+# plans of these leave other ways to one
+_FAILED = (PlanStatus.NOT_CONVERGED, PlanStatus.CERTIFICATE_FAILED)
+# motions that are planned where a search has ended, the nearest to the limit first
+_MOST_PLANS = 6
 
 
 class Failure(NamedTuple):
@@ -138,43 +142,52 @@ class LimitSearch:
         """
         Return the plan with the value of the last extremal.
 
-        Where the value leaves Newton's method no way, the price may: the last extremal is then
-        replaced by the same motion, solved as exactly as a plan.
+        Where the value leaves Newton's method no way, or what it leads to does not pass its
+        certificate, the price may: the last extremal is then replaced by the same motion, solved
+        as exactly as a plan.
 
         """
         first = start_strategy(self.last.result.solution,
                                self.last if self.extrapolated else None)
         plan = plan_problem(self._at(self.last), self._solver, (first,))
-        if plan.status is not PlanStatus.NOT_CONVERGED:
+        if plan.status not in _FAILED:
             return plan
         again = self._solve_more_exactly(self.last)
         if again is not None:
             strategy = start_strategy(again.result.solution, again)
             found = plan_problem(self._at(again), self._solver, (strategy,))
-            if found.status is not PlanStatus.NOT_CONVERGED:
+            if found.status not in _FAILED:
                 self.extremals[-1] = again
                 return found
         found = plan_problem(self._at(self.last), self._solver, QUICK)
-        if found.status is PlanStatus.NOT_CONVERGED:
-            return replace(found, message=f'{plan.message}; {found.message}')
-        return found
+        if found.status not in _FAILED:
+            return found
+        return replace(plan, message=f'{plan.message}; {found.message}')
 
-    def certify_so_far(self) -> tuple[Extremal, Plan] | None:
+    def certify_so_far(self, *, stopped: bool) -> tuple[Extremal, Plan] | None:
         """
-        Return the motion nearest to the limit with a plan; None if there is none at once.
+        Return the motion nearest to the limit with a plan; None if there is none.
 
         Where the weights of the task leave none, the plan is without them.
 
+        Parameters
+        ----------
+        stopped : bool
+            Whether the search is out of time, so that a plan has to be found at once.
+
         """
-        known = self._certify_at_once(self._problem)
+        known = self._certify(self._problem, stopped=stopped)
         if known is None and self.weighted:
-            known = self._certify_at_once(without_weights(self._problem))
+            known = self._certify(without_weights(self._problem), stopped=stopped)
         return known
 
-    def _certify_at_once(self, problem: MotionProblem) -> tuple[Extremal, Plan] | None:
+    def _certify(self, problem: MotionProblem, *,
+                 stopped: bool) -> tuple[Extremal, Plan] | None:
         """Return the motion nearest to the limit with a plan of a problem like the task's."""
-        short = in_grace(self._solver, GRACE / 2 if self.weighted else GRACE)
-        for extremal in (one for one in reversed(self.extremals) if one.result.converged):
+        grace = GRACE / 2 if self.weighted else GRACE
+        short = in_grace(self._solver, grace) if stopped else self._solver
+        solved = [one for one in reversed(self.extremals) if one.result.converged]
+        for extremal in solved if stopped else solved[:_MOST_PLANS]:
             try:
                 near = self._parameter.with_value(problem, extremal.value)
                 plan = plan_near(near, extremal.result.solution, short)

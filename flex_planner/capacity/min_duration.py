@@ -150,11 +150,15 @@ def _search(task: Task, search: LimitSearch, neighbours: Neighbours,
 
 def _certified_so_far(search: LimitSearch, found: MinDuration) -> MinDuration:
     """Return the outcome of a search that failed with the shortest duration it can certify."""
-    known = None if found.status is PlanStatus.CANCELED else search.certify_so_far()
+    if found.status is PlanStatus.CANCELED:
+        return found
+    known = search.certify_so_far(stopped=found.status is PlanStatus.TIMEOUT)
     if known is None:
         return found
     extremal, plan = known
-    return replace(found, plan=plan, duration=extremal.value,
+    status = (PlanStatus.NOT_CONVERGED if found.status is PlanStatus.CERTIFICATE_FAILED
+              else found.status)  # what was certified is slower than what was not
+    return replace(found, status=status, plan=plan, duration=extremal.value,
                    local_lower=max(0.0, extremal.value - extremal.gap),
                    message=f'{found.message}{say_lost_weights(found.task, plan)} '
                            f'({extremal.value:.6g} s are certified)')

@@ -161,11 +161,13 @@ def _certified_so_far(search: LimitSearch, found: MaxPayload) -> MaxPayload:
     """Return the outcome of a search that failed with the heaviest payload that it can certify."""
     if found.status is PlanStatus.CANCELED or found.plan is not None and found.plan.solved:
         return found
-    known = search.certify_so_far()
+    known = search.certify_so_far(stopped=found.status is PlanStatus.TIMEOUT)
     if known is None:
         return found
     extremal, plan = known
-    return replace(found, plan=plan, payload=extremal.value,
+    status = (PlanStatus.NOT_CONVERGED if found.status is PlanStatus.CERTIFICATE_FAILED
+              else found.status)  # what was certified carries less than what was not
+    return replace(found, status=status, plan=plan, payload=extremal.value,
                    local_upper=extremal.value + extremal.gap,
                    message=f'{found.message}{say_lost_weights(found.task, plan)}')
 

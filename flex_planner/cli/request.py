@@ -39,6 +39,7 @@ from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.point_times import MAX_SAMPLES
 from flex_planner.planning.robust.objective import Robustness
 from flex_planner.planning.sampling import SamplingSettings
+from flex_planner.reports.motion import list_failures
 import numpy as np
 
 MAX_TIME_LIMIT, _TIME_LIMIT = 3600.0, 60.0  # [s]
@@ -120,7 +121,8 @@ def say_failure(outcome: Plan | MaxPayload, time_limit: float) -> str:
     reason = outcome.message
     if outcome.status is PlanStatus.TIMEOUT:
         reason = f'--time-limit is {time_limit:g} s'
-    return say_reason(outcome.status.value, reason)
+    sentence = say_reason(outcome.status.value, reason)
+    return list_failures(sentence, outcome) if isinstance(outcome, Plan) else sentence
 
 
 def add_task(parser: argparse.ArgumentParser, payload: str) -> None:

@@ -202,7 +202,14 @@ def _conclude(problem: MotionProblem, strategy: str, attempt: Attempt, solver: S
         return _certify(plan, result, solver)
     if failed is PlanStatus.NOT_FOUND:  # it says which payload or duration was found instead
         return plan
-    return replace(plan, message=f'{plan.message}; {suggest_changes(problem)}')
+    return replace(plan, message=_explain_failure(plan, solver))
+
+
+def _explain_failure(plan: Plan, solver: Solver) -> str:
+    """Return what may help, how many strategies failed, and how each of them did."""
+    count = len(plan.strategy.split(', '))
+    failed = [f'{count} strategies found no motion'] if count > 1 else []
+    return '; '.join([suggest_changes(plan.problem, solver), *failed, plan.message])
 
 
 def _certify(plan: Plan, result: CollocationResult, solver: Solver) -> Plan:

@@ -115,6 +115,13 @@ def motion_rows(plan: Plan, peaks: Peaks) -> list[Row]:
         *certificate_rows(plan.certificate)]
 
 
+def list_failures(text: str, plan: Plan) -> str:
+    """Return a sentence about a plan with each strategy that failed on a line of its own."""
+    for name in dict.fromkeys(one.name for one in plan.tried):
+        text = text.replace(f'; {name}: ', f'\n  {name}: ')
+    return text
+
+
 def kind_rows(kinds: Sequence[KindOfMotion], starts: int, before: str, after: str) -> list[Row]:
     """Return the kinds of motion that were met, the best first, with what each is worth."""
     if not kinds:

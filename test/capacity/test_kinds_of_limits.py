@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 from counter_examples import HEAVIEST, level_arm, level_task
 from flex_planner.base.errors import InvalidTaskError, NoEquilibriumError
@@ -12,7 +13,8 @@ from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.capacity.min_duration import find_min_duration
 from flex_planner.capacity.results import MaxPayload, PayloadMethod
 from flex_planner.planning.kinds.clusters import kind_of
-from flex_planner.planning.plan import PlanStatus
+from flex_planner.planning.plan import Plan, PlanStatus
+from flex_planner.planning.plan_problem import plan_problem
 from flex_planner.planning.proofs import PayloadBound, Proof, ProofName
 from known_limits import lifted_to, one_link
 import numpy as np
@@ -158,3 +160,24 @@ def test_goal_that_cannot_be_held_is_told_with_its_proof() -> None:
     found = followed(lifted_to(0.0, 2.0, payload_mass=0.5))
     assert found.status is PlanStatus.INFEASIBLE
     assert found.message.startswith('joint 1 needs 6.377 N m')
+
+
+def test_plan_that_fails_its_certificate_is_replaced_by_another_or_by_one_with_less(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    failures = [1]
+
+    def fail(*args: Any, **options: Any) -> Plan:
+        failures[0] -= 1
+        plan = plan_problem(*args, **options)
+        return plan if failures[0] < 0 else replace(
+            plan, status=PlanStatus.CERTIFICATE_FAILED, message='the tip misses')
+
+    monkeypatch.setattr(limit_search, 'plan_problem', fail)
+    other = followed(level_task('S12'))
+    assert other.solved, other.message
+    failures[0] = 1000
+    less = followed(level_task('S12'))
+    assert less.status is PlanStatus.NOT_CONVERGED
+    assert less.plan is not None and less.plan.solved
+    assert less.payload == less.plan.task.payload_mass > 0.99 * other.payload
+    assert less.message.startswith('the tip misses')

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from flex_planner import load_arm, plan_path, Task
+from flex_planner.cli.request import say_failure
 from flex_planner.collocation import Solver
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
@@ -32,10 +33,18 @@ def failed() -> Plan:
 
 def test_failure_says_what_may_help(failed: Plan) -> None:
     assert failed.status is PlanStatus.NOT_CONVERGED
-    assert failed.message.endswith(
+    count = len(failed.strategy.split(', '))
+    assert failed.message.startswith(
         'what may help: rotor_inertia and gear_ratio of the motors, a longer duration than 1 s '
         '(0.74 periods of the lowest vibration), damping of the links, less payload or '
-        'velocity_weights, a price on fast bending')
+        'velocity_weights, a price on fast bending; '
+        f'{count} strategies found no motion; cold start: ')
+
+
+def test_each_strategy_that_failed_has_a_line_in_the_terminal(failed: Plan) -> None:
+    first, *lines = say_failure(failed, 60.0).split('\n')
+    assert first.endswith(f'; {len(lines)} strategies found no motion')
+    assert [line.split(': ')[0].strip() for line in lines] == failed.strategy.split(', ')
 
 
 def test_failure_lists_what_was_tried_with_times_and_iterations(failed: Plan) -> None:

@@ -49,9 +49,11 @@ def planned(model: ArmModel, task: Task, *named: tuple[str, Attempting], **other
 
 def why(plan: Plan) -> str:
     """Return why a plan was not found, without what may help."""
-    reason, _, help_ = plan.message.partition('; what may help: ')
-    assert help_
-    return reason
+    help_, _, reason = plan.message.partition('; ')
+    assert help_.startswith('what may help: ')
+    count, _, failures = reason.partition(' strategies found no motion; ')
+    assert not failures or int(count) == len(plan.strategy.split(', '))
+    return failures or reason
 
 
 def unsolved(plan: Plan) -> bool:
@@ -81,7 +83,7 @@ def test_all_failures_are_told_with_their_names(
     assert why(plan) == 'first: lost; second: lost too'
     assert 'does not show that the motion is impossible' in plan.status.value
     assert unsolved(plan)
-    with pytest.raises(ValueError, match='the plan has no solution: first: lost'):
+    with pytest.raises(ValueError, match='the plan has no solution: what may help: '):
         plan.uniform_samples(2)
 
 
@@ -210,9 +212,11 @@ def test_free_duration_is_never_refused_for_its_guess(
 # Stopped, and out of limits
 
 BY_IPOPT = ('direct collocation', 'kinds of motion')
+# without Coulomb friction there is nothing to stop; see test_friction_homotopy
+STOPPABLE = [each for each in CATALOGUE if each.name != 'homotopy in Coulomb friction']
 
 
-@pytest.mark.parametrize('strategy', CATALOGUE, ids=[each.name for each in CATALOGUE])
+@pytest.mark.parametrize('strategy', STOPPABLE, ids=[each.name for each in STOPPABLE])
 def test_every_strategy_is_canceled_between_its_iterations(
         ei5_model: ArmModel, paper_task: TaskFactory,
         strategy: Strategy) -> None:
@@ -275,7 +279,7 @@ def test_mesh_limit_is_told(ei50_model: ArmModel, paper_task: TaskFactory) -> No
                    ('cold start', cold_start), solver=Solver(SolverSettings(max_intervals=60)))
     assert plan.status is PlanStatus.NOT_CONVERGED
     assert unsolved(plan)
-    assert plan.message.startswith('cold start: an error of ')
+    assert why(plan).startswith('cold start: an error of ')
     assert why(plan).endswith('is left on 60 intervals, 1.0e-06 was asked for')
 
 

@@ -61,6 +61,23 @@ def test_rigid_motion_at_the_price_of_its_kind_is_solved(
         assert min(ends) < limit < max(ends)
 
 
+def test_rigid_motion_that_its_price_does_not_lead_to_is_solved_with_a_little_less(
+        rigid: MotionProblem, kinds: dict[Free, KindOfMotion],
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, 'transfer_extremal', lambda *_: None)
+    for parameter, limit in ((PAYLOAD, HEAVIEST['rigid']), (DURATION, SHORTEST['rigid'])):
+        kind = kinds[parameter.unknown]
+        found = solved(parameter, rigid, kind)
+        assert found.result.converged
+        assert parameter.improves(kind.value, found.value)
+        assert found.value == pytest.approx(kind.value, rel=6e-3)
+        assert parameter.value(found.problem) == found.value
+        # its own price leads on to the limit
+        assert 0 < found.price < kind.motion.price
+        ends = (found.value, found.value + (1 if parameter is PAYLOAD else -1) * found.gap)
+        assert min(ends) < limit < max(ends)
+
+
 def test_rigid_motion_is_lifted_to_the_arm_that_bends(
         flexible: MotionProblem, kinds: dict[Free, KindOfMotion]) -> None:
     for parameter, limit in ((PAYLOAD, HEAVIEST['ei5']), (DURATION, SHORTEST['ei5'])):

@@ -7,7 +7,8 @@ from typing import Any
 
 from flex_planner import Arm, Task
 from flex_planner.arms.arm import Joint, Link, Motor, Node
-from flex_planner.collocation import Solver
+from flex_planner.base.progress import Monitor
+from flex_planner.collocation import Solver, SolverStatus
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.planning.advice import suggest_changes
@@ -78,3 +79,12 @@ def test_advice_names_friction_where_softer_friction_leads_to_a_motion(
         problem: MotionProblem) -> None:
     assert suggest_changes(problem, Solver()).startswith(
         'what may help: a larger coulomb_speed (with 19 times as much there is a motion), ')
+
+
+def test_it_is_canceled_between_its_iterations(problem: MotionProblem) -> None:
+    for last in (0, 1, 30):
+        monitor = Monitor()
+        monitor.canceled = lambda count=last, watch=monitor: watch.iteration >= count
+        attempt = sharpen_friction(problem, Solver(monitor=monitor))
+        assert attempt is not None
+        assert (attempt.result.status, monitor.iteration) == (SolverStatus.CANCELED, last)
