@@ -3,8 +3,7 @@ An allowable stress of the links, and what it costs: effort, and payload.
 
 The links are tubes clamped to their motors. The stress in them is their bending moment divided by
 the section modulus; what the material bears, divided by a safety factor, is a limit on the whole
-way.
-In an arm file the fields are allowable_stress, section_modulus and safety_factor.
+way. In an arm file the fields are allowable_stress, section_modulus and safety_factor.
 
     tools/run python examples/allowable_stress.py
 
@@ -40,8 +39,8 @@ def main() -> None:
 
     for factor in (1.0, 2.0):
         found = find_max_payload(task(factor), accuracy=0.02, search='fast')
-        words = f'{found.payload:.2f} kg' if found.solved else found.message
-        print(f'largest payload with safety factor {factor:g}: {words}')
+        largest = f'{found.payload:.2f} kg' if found.solved else found.message
+        print(f'largest payload with safety factor {factor:g}: {largest}')
 
 
 def task(factor: float = 1.0) -> Task:

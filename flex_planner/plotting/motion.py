@@ -32,7 +32,7 @@ import numpy as np
 
 _MILLI = 1e3
 _POSTURES, _STATIONS, _SAMPLES = 6, 15, 2001
-_COLUMNS = 8
+_COLUMNS, _FEWER_COLUMNS = 8, 6  # fewer beside names of limits, which are long
 # the least heights of diagrams: what is less is rounding, or of no consequence
 _LEAST_ANGLE, _LEAST_SPEED = 0.1, 1e-3  # [deg], [rad/s]
 _LEAST_TORQUE, _LEAST_BENDING = 1e-3, 1e-2  # [N m], [mm]
@@ -153,7 +153,8 @@ def draw_motion(motion: Motion | Plan, execution: Execution | None = None) -> Pi
         draw_tip(axes[1, 0], motion, execution)
     draw_modes(axes[1, 1], motion)
     draw_distance(axes[1, 2], motion, execution)
-    explain_lines(figure, axes.ravel(), _COLUMNS)
+    met = any(one.active for one in motion.margins)
+    explain_lines(figure, axes.ravel(), _FEWER_COLUMNS if met else _COLUMNS)
     figure.suptitle(plain(motion.arm.name))
     return figure
 
