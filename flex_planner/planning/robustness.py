@@ -152,7 +152,7 @@ def _passed_limit(certificate: ExecutionCertificate) -> list[PlanWarning]:
     tightest = certificate.limits
     if tightest.kept or not tightest.name:
         return []
-    sentence = (f'under the joint controller the arm passes a limit that the plan keeps: '
+    sentence = ('under the joint controller the arm passes a limit that the plan keeps: '
                 f'{tightest}; a faster controller, a calmer motion, or limits with some room keep '
                 'it')
     return [PlanWarning(kind=WarningKind.LIMIT_PASSED, value=tightest.slack, time=tightest.time,
