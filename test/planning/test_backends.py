@@ -13,7 +13,7 @@ from flex_planner.planning.strategies.strategy import Strategy
 import pytest
 from scipy_backend import CountingBackend, FINE, solve_by_scipy
 
-# by IPOPT, and by our own method alone; for tasks with via points, arms with Coulomb friction
+# by IPOPT, by our own method alone, and without via points or Coulomb friction not at all
 OTHERS = ('direct collocation', 'kinds of motion', 'interior point',
           'interior point from the rigid motion', 'homotopy in via points',
           'homotopy in Coulomb friction')
