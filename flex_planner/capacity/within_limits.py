@@ -3,7 +3,8 @@ The largest payload and the shortest duration of motions that limits on the way 
 
 Without such limits a search follows a price, see `limit_search`. Where its motion leaves them, the
 payload is found with the limits as a barrier, and a motion with a little less is planned and
-certified; durations are tried, shorter and shorter ones, each from the motion before.
+certified. Where that fails payloads are tried, heavier and heavier ones, and so are durations,
+shorter and shorter ones, each from the motion before.
 
 """
 
@@ -13,6 +14,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from flex_planner.base.errors import FlexPlannerError
+from flex_planner.base.progress import StoppedError
 from flex_planner.capacity.results import MaxPayload, MinDuration
 from flex_planner.collocation import CollocationSolution, Solver
 from flex_planner.optimal_control.constrained_motion import relieve_ends, slacks_of
@@ -21,6 +23,7 @@ from flex_planner.optimal_control.path_constraints import PathSlacks
 from flex_planner.optimal_control.task import MAX_DURATION, Task
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_path import plan_path
+from flex_planner.planning.plan_problem import STOP_STATUS
 from flex_planner.planning.plan_within_limits import plan_from
 from flex_planner.planning.strategies.homotopies import drop_weights
 from flex_planner.planning.strategies.interior_point import applies
@@ -70,7 +73,9 @@ def carry_within_limits(problem: MotionProblem, solver: Solver, accuracy: float,
         return None
     slacks = relieve_ends(problem, slacks)
     solver.monitor.phase = 'largest payload within the limits'
-    reached = [found for near in _motions(problem, solver) if (found := reach_largest_payload(
+    first = plan_path(problem.task, model=problem.model, solver=solver, search='fast')
+    solver.monitor.check()
+    reached = [found for near in _motions(first) if (found := reach_largest_payload(
         drop_weights(problem), slacks, solver, near)) is not None]
     for payload, gap, motion in sorted(reached, key=lambda one: -one[0]):
         certified = _certify(problem, slacks, payload, motion, accuracy, solver)
@@ -84,7 +89,7 @@ def carry_within_limits(problem: MotionProblem, solver: Solver, accuracy: float,
                 f'{lighter:.6g} kg can be carried within the limits on the way, and a motion with '
                 f'more than {lighter:.6g} kg was not certified, though about {payload:.6g} kg '
                 'seem possible'))
-    return None
+    return _carry_more(problem.task, first, solver, accuracy, free) if first.solved else None
 
 
 def hurry_within_limits(task: Task, solver: Solver, accuracy: float,
@@ -136,22 +141,51 @@ def hurry_within_limits(task: Task, solver: Solver, accuracy: float,
 
 def _plan_in(task: Task, duration: float, near: Plan, solver: Solver) -> Plan | None:
     """Return a certified plan within the limits that takes so long, None without one."""
-    plan = plan_path(replace(task, duration=duration, time_weight=0.0), model=near.model,
-                     solver=solver, start_from=near, search='fast')
+    return _plan_near(replace(task, duration=duration, time_weight=0.0), near, solver)
+
+
+def _plan_near(task: Task, near: Plan, solver: Solver) -> Plan | None:
+    """Return a certified plan within the limits from one of a similar task, None without one."""
+    plan = plan_path(task, model=near.model, solver=solver, start_from=near, search='fast')
     solver.monitor.check()
     return plan if plan.solved else None
 
 
-def _motions(problem: MotionProblem, solver: Solver) -> Iterator[CollocationSolution | None]:
+def _motions(plan: Plan) -> Iterator[CollocationSolution | None]:
     """Yield motions within the limits that a search may start from; None for a straight line."""
-    plan = plan_path(problem.task, model=problem.model, solver=solver, search='fast')
-    solver.monitor.check()
     if plan.solved and plan.solution is not None:
         yield plan.solution
         for kind in plan.kinds[1:]:
-            if kind.motion.solution.nodes.shape[1] == problem.size:
+            if kind.motion.solution.nodes.shape[1] == plan.problem.size:
                 yield kind.motion.solution
     yield None
+
+
+def _carry_more(task: Task, plan: Plan, solver: Solver, accuracy: float,
+                free: MaxPayload) -> MaxPayload:
+    """Return the outcome with the heaviest payload of those tried, from a plan with a lighter."""
+    failed, tries, status = free.local_upper, 0, PlanStatus.NOT_CONVERGED
+    try:
+        while failed - plan.task.payload_mass > accuracy and tries < _MOST_TRIES:
+            tries += 1
+            payload = (plan.task.payload_mass + failed) / 2
+            heavier = _plan_near(replace(task, payload_mass=payload), plan, solver)
+            failed, plan = (payload, plan) if heavier is None else (failed, heavier)
+    except StoppedError as error:
+        status = STOP_STATUS[error.reason]
+        if status is PlanStatus.CANCELED:
+            raise
+    carried = plan.task.payload_mass
+    return replace(
+        free, status=status, plan=plan, payload=carried, local_upper=failed, within_limits=True,
+        message=(f'{carried:.6g} kg can be carried within the limits on the way; no motion with '
+                 f'{failed:.6g} kg was found from there, which does not show that there is none'))
+
+
+def _quick(solver: Solver) -> Solver:
+    """Return a solver for motions near their limit."""
+    return solver.with_settings(
+        max_intervals=min(_MOST_INTERVALS, solver.settings.max_intervals))
 
 
 def _certify(problem: MotionProblem, slacks: PathSlacks, payload: float,
@@ -162,7 +196,7 @@ def _certify(problem: MotionProblem, slacks: PathSlacks, payload: float,
     costates[problem.size // 2:] = _COSTATES
     near = CollocationSolution(motion.mesh, motion.nodes * costates, motion.stages * costates,
                                motion.rule)
-    quick = solver.with_settings(max_intervals=min(_MOST_INTERVALS, solver.settings.max_intervals))
+    quick = _quick(solver)
     for share in (1 - accuracy / (3 * payload), *_LESS):
         if not problem.task.payload_mass <= share * payload:
             return None

@@ -17,6 +17,7 @@ from factories import TaskFactory
 from flex_planner.arms.arm import Arm, Joint, Link
 from flex_planner.base.errors import InvalidTaskError
 from flex_planner.base.progress import Monitor, StopReason
+from flex_planner.capacity import within_limits
 from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.capacity.min_duration import find_min_duration
 from flex_planner.capacity.results import PayloadMethod
@@ -227,6 +228,19 @@ def test_largest_payload_within_limits(rigid_model: ArmModel, paper_task: TaskFa
     assert found.payload <= payload + 1e-3 <= found.local_upper + 1e-3 + 1e-3
     assert found.payload == pytest.approx(payload, abs=5e-3)
     assert found.plan is not None
+    assert all(one.kept for one in found.plan.constraints)
+
+
+def test_payloads_are_tried_where_the_barrier_leads_to_none(
+        rigid_model: ArmModel, paper_task: TaskFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(within_limits, 'reach_largest_payload', lambda *given: None)
+    task = replace(paper_task(rigid_model.arm), path_constraints=(POST,))
+    found = find_max_payload(task, model=rigid_model, search='fast', accuracy=0.1)
+    assert found.status is PlanStatus.NOT_CONVERGED
+    assert 'which does not show that there is none' in found.message
+    assert 5.4 < found.payload < 5.607 + 1e-3
+    assert found.plan is not None
+    assert found.plan.solved
     assert all(one.kept for one in found.plan.constraints)
 
 
