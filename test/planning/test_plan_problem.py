@@ -61,7 +61,7 @@ def unsolved(plan: Plan) -> bool:
     numbers = [plan.cost, plan.effort, plan.energy,
                *(getattr(plan.certificate, entry.name) for entry in fields(Certificate))]
     return (not plan.solved and plan.solution is None and plan.mesh_intervals == 0
-            and all(number == math.inf for number in numbers))
+            and all(math.isinf(number) for number in numbers))  # a slack is -inf
 
 
 def test_strategies_are_tried_until_one_solves_to_the_first_that_solves(
