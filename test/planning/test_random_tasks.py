@@ -129,7 +129,7 @@ def check_unsolved(plan: Plan) -> None:
     if plan.solution is None:
         numbers = [plan.cost, plan.effort, plan.energy, *(
             getattr(plan.certificate, entry.name) for entry in fields(Certificate))]
-        assert all(number == math.inf for number in numbers)
+        assert all(math.isinf(number) for number in numbers)  # a slack is -inf
     else:
         violations = CertificateLimits().violations(plan.certificate)
         assert bool(violations) == (plan.status not in REFUSED)
