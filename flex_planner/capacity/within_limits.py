@@ -125,12 +125,12 @@ def hurry_within_limits(task: Task, solver: Solver, accuracy: float,
         failed = duration
     if plan is None:
         return None
-    tries = 0
-    while plan.task.duration - failed > accuracy and tries < _MOST_TRIES:
-        tries += 1
-        shorter = _plan_in(task, (plan.task.duration + failed) / 2, plan, solver)
-        failed = failed if shorter else (plan.task.duration + failed) / 2
-        plan = shorter or plan
+    for _ in range(_MOST_TRIES):
+        if plan.task.duration - failed <= accuracy:
+            break
+        duration = (plan.task.duration + failed) / 2
+        shorter = _plan_in(task, duration, plan, solver)
+        failed, plan = (duration, plan) if shorter is None else (failed, shorter)
     near = plan.task.duration - failed <= accuracy
     return replace(
         free, status=PlanStatus.SOLVED if near else PlanStatus.NOT_CONVERGED, plan=plan,
@@ -164,10 +164,11 @@ def _motions(plan: Plan) -> Iterator[CollocationSolution | None]:
 def _carry_more(task: Task, plan: Plan, solver: Solver, accuracy: float,
                 free: MaxPayload) -> MaxPayload:
     """Return the outcome with the heaviest payload of those tried, from a plan with a lighter."""
-    failed, tries, status = free.local_upper, 0, PlanStatus.NOT_CONVERGED
+    failed, status = free.local_upper, PlanStatus.NOT_CONVERGED
     try:
-        while failed - plan.task.payload_mass > accuracy and tries < _MOST_TRIES:
-            tries += 1
+        for _ in range(_MOST_TRIES):
+            if failed - plan.task.payload_mass <= accuracy:
+                break
             payload = (plan.task.payload_mass + failed) / 2
             heavier = _plan_near(replace(task, payload_mass=payload), plan, solver)
             failed, plan = (payload, plan) if heavier is None else (failed, heavier)
@@ -182,12 +183,6 @@ def _carry_more(task: Task, plan: Plan, solver: Solver, accuracy: float,
                  f'{failed:.6g} kg was found from there, which does not show that there is none'))
 
 
-def _quick(solver: Solver) -> Solver:
-    """Return a solver for motions near their limit."""
-    return solver.with_settings(
-        max_intervals=min(_MOST_INTERVALS, solver.settings.max_intervals))
-
-
 def _certify(problem: MotionProblem, slacks: PathSlacks, payload: float,
              motion: CollocationSolution, accuracy: float,
              solver: Solver) -> tuple[float, Plan] | None:
@@ -196,7 +191,7 @@ def _certify(problem: MotionProblem, slacks: PathSlacks, payload: float,
     costates[problem.size // 2:] = _COSTATES
     near = CollocationSolution(motion.mesh, motion.nodes * costates, motion.stages * costates,
                                motion.rule)
-    quick = _quick(solver)
+    quick = solver.with_settings(max_intervals=min(_MOST_INTERVALS, solver.settings.max_intervals))
     for share in (1 - accuracy / (3 * payload), *_LESS):
         if not problem.task.payload_mass <= share * payload:
             return None

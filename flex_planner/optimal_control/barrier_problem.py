@@ -93,7 +93,8 @@ class MotionBarrier:
     def guess(self, solution: CollocationSolution, mu: float) -> Array:
         """Return torques inside their limits, slacks and multipliers for a motion."""
         z = solution.stage_values().reshape(-1, solution.nodes.shape[1])
-        return self._centre(z, mu).reshape(*solution.stages.shape[:2], -1)
+        own = z[:, :self.motion.size]  # without what else is free
+        return self._centre(own, mu).reshape(*solution.stages.shape[:2], -1)
 
     def _centre(self, z: Array, mu: float) -> Array:
         n_t, n = self.motion.model.arm.n_coordinates, self.motion.model.arm.n_joints
@@ -169,11 +170,6 @@ class PayloadBarrier(MotionBarrier):
     def join(self, junction: int, before: Array, after: Array) -> tuple[Array, Array]:
         """Return what holds at a via point."""
         return self.payload.join(junction, before, after)
-
-    def guess(self, solution: CollocationSolution, mu: float) -> Array:
-        """Return torques inside their limits, slacks and multipliers for a motion."""
-        z = solution.stage_values().reshape(-1, solution.nodes.shape[1])
-        return self._centre(z[:, :-2], mu).reshape(*solution.stages.shape[:2], -1)
 
     def extend(self, solution: CollocationSolution) -> CollocationSolution:
         """Return a motion with the payload of the task, whose price grows evenly."""

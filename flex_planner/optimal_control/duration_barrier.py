@@ -85,11 +85,6 @@ class DurationBarrier(MotionBarrier):
         """Return the final conditions."""
         return _with_end(self.motion.right(z[:-2]), z)
 
-    def guess(self, solution: CollocationSolution, mu: float) -> Array:
-        """Return torques inside their limits, slacks and multipliers for a motion."""
-        z = solution.stage_values().reshape(-1, solution.nodes.shape[1])
-        return self._centre(z[:, :-2], mu).reshape(*solution.stages.shape[:2], -1)
-
     def extend(self, solution: CollocationSolution) -> CollocationSolution:
         """Return a motion with the duration of the task as a guess."""
         extended = self.duration.extend(solution)

@@ -7,7 +7,7 @@ from dataclasses import replace
 from flex_planner.collocation import CollocationSolution
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.planning.bending import find_bending, LARGEST
-from flex_planner.planning.constraint_margins import find_margins
+from flex_planner.planning.constraint_margins import ConstraintMargin, find_margins
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.warnings import find_warnings
 from flex_planner.planning.way_limits import find_limit_violations
@@ -28,15 +28,16 @@ def judge(plan: Plan) -> Plan:
 
     """
     assert plan.solution is not None
-    refused = find_refusal(plan.problem, plan.solution) or _find_drift(plan)
+    margins = find_margins(plan.problem, plan.solution)
+    refused = find_refusal(plan.problem, plan.solution, margins) or _find_drift(plan)
     status, message = refused or (PlanStatus.SOLVED, plan.message)
-    return replace(plan, status=status, message=message,
-                   constraints=find_margins(plan.problem, plan.solution),
+    return replace(plan, status=status, message=message, constraints=margins,
                    warnings=find_warnings(plan.problem, plan.solution))
 
 
-def find_refusal(problem: MotionProblem,
-                 solution: CollocationSolution) -> tuple[PlanStatus, str] | None:
+def find_refusal(problem: MotionProblem, solution: CollocationSolution,
+                 margins: tuple[ConstraintMargin, ...] | None = None,
+                 ) -> tuple[PlanStatus, str] | None:
     """
     Return why the arm may not do a motion that solves its task; None if it may.
 
@@ -46,6 +47,8 @@ def find_refusal(problem: MotionProblem,
         The task says whether links may bend far.
     solution : CollocationSolution
         The motion.
+    margins : tuple of ConstraintMargin, optional
+        Its margins where they are known, see `find_margins`.
 
     Returns
     -------
@@ -61,7 +64,8 @@ def find_refusal(problem: MotionProblem,
         return PlanStatus.LIMIT_VIOLATED, (
             f'{violations[0]}{more}; another duration, another posture at start or goal, or '
             'weights on positions or speeds may lead past')
-    broken = [one for one in find_margins(problem, solution) if not one.kept]
+    found = find_margins(problem, solution) if margins is None else margins
+    broken = [one for one in found if not one.kept]
     if broken:
         return PlanStatus.LIMIT_VIOLATED, str(min(broken, key=lambda one: one.slack))
     return None if problem.task.allow_large_bending else _find_bent_link(problem, solution)

@@ -244,6 +244,43 @@ def test_payloads_are_tried_where_the_barrier_leads_to_none(
     assert all(one.kept for one in found.plan.constraints)
 
 
+@pytest.mark.parametrize('status', [PlanStatus.TIMEOUT, PlanStatus.CANCELED])
+def test_payloads_that_are_tried_one_after_another_are_stopped(
+        rigid_model: ArmModel, paper_task: TaskFactory, monkeypatch: pytest.MonkeyPatch,
+        status: PlanStatus) -> None:
+    monkeypatch.setattr(within_limits, 'reach_largest_payload', lambda *given: None)
+    tries, monitor = list[float](), Monitor()
+
+    def plan_three(task: Task, *given: Any) -> Plan | None:
+        """Plan with three payloads, then stop."""
+        tries.append(task.payload_mass)
+        if len(tries) > 3:
+            stop(monitor, status)
+            monitor.check()
+        return plan_near(task, *given)
+
+    plan_near = within_limits._plan_near
+    monkeypatch.setattr(within_limits, '_plan_near', plan_three)
+    task = replace(paper_task(rigid_model.arm), path_constraints=(POST,))
+    found = find_max_payload(task, model=rigid_model, search='fast', monitor=monitor)
+    assert (found.status, found.solved, len(tries)) == (status, False, 4)
+    if status is PlanStatus.CANCELED:
+        assert found.payload == 0
+        return
+    assert found.payload in tries[:3]  # the last that was certified
+    assert found.plan is not None
+    assert found.plan.solved
+    assert found.plan.task.payload_mass == found.payload
+
+
+def stop(monitor: Monitor, status: PlanStatus) -> None:
+    """Let a monitor stop work."""
+    if status is PlanStatus.CANCELED:
+        monitor.canceled = lambda: True
+    else:
+        monitor.time_limit = -1.0
+
+
 def test_shortest_duration_within_limits_is_not_that_without(
         rigid_model: ArmModel, paper_task: TaskFactory) -> None:
     task = replace(paper_task(rigid_model.arm), path_constraints=SPEEDS)

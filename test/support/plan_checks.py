@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
@@ -11,6 +13,7 @@ from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
 from flex_planner.optimal_control.planned_torque import PlannedTorque
 from flex_planner.optimal_control.task import Task
+from flex_planner.planning.certificate import Certificate
 from flex_planner.planning.plan import Plan, PlanStatus
 import numpy as np
 
@@ -26,6 +29,12 @@ def problem_of(model: ArmModel, task: Task) -> MotionProblem:
 def solution_of(plan: Plan) -> CollocationSolution:
     assert plan.solution is not None, plan.message
     return plan.solution
+
+
+def says_nothing(plan: Plan) -> bool:
+    """Return whether a plan has no number that could pass for that of a motion."""
+    return (plan.cost == plan.effort == plan.energy == math.inf
+            and plan.certificate == Certificate())
 
 
 def stopped_in(phase: str, status: PlanStatus, iterations: int = 0) -> Monitor:

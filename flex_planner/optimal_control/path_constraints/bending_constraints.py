@@ -24,7 +24,28 @@ _NO_CURVATURE = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BendingMoment(PathConstraint):
+class _AlongLink(PathConstraint):
+    """A limit at stations of a link, in both directions."""
+
+    link: int
+    limit: float
+    stations: tuple[float, ...]
+
+    @property
+    def bends(self) -> bool:
+        """Return True."""
+        return True
+
+    def check(self, name: str, arm: Arm) -> None:
+        """Refuse a link that the arm has not, or that does not bend."""
+        integer(f'{name}.link', self.link, at_least=1, at_most=arm.n_joints)
+        if not arm.links[self.link - 1].modes:
+            raise InvalidValueError(f'{name}.link', self.link, 'a link with modes: a rigid one '
+                                    'does not bend')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BendingMoment(_AlongLink):
     """
     The bending moment ``E I v''(x)`` at stations of a link stays below a limit.
 
@@ -54,15 +75,6 @@ class BendingMoment(PathConstraint):
         number('limit', self.limit, above=0, unit='N m')
         object.__setattr__(self, 'stations', _shares(self.stations))
 
-    @property
-    def bends(self) -> bool:
-        """Return True."""
-        return True
-
-    def check(self, name: str, arm: Arm) -> None:
-        """Refuse a link that the arm has not, or that does not bend."""
-        _check_link(name, arm, self.link)
-
     def labels(self, arm: Arm) -> list[SlackLabel]:
         """Return the names of both directions at each station."""
         return [SlackLabel(name=f'bending moment of link {self.link} at {share:.3g} of its length',
@@ -82,7 +94,7 @@ class BendingMoment(PathConstraint):
         rigidity, limit = numbers
         shares = [rigidity * at.bend(self.link - 1, row) / limit
                   for _, row in self._curvatures(at.arm)]
-        return [1 - sign * share for share in shares for sign in (1, -1)]
+        return _both_ways(shares)
 
     def _curvatures(self, arm: Arm) -> list[tuple[float, Array]]:
         """Return the stations with a moment, and what it is there for E I = 1 and each mode."""
@@ -95,7 +107,7 @@ class BendingMoment(PathConstraint):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Deflection(PathConstraint):
+class Deflection(_AlongLink):
     """
     The deflection at stations of a link stays below a share of its length.
 
@@ -125,15 +137,6 @@ class Deflection(PathConstraint):
         number('limit', self.limit, above=0)
         object.__setattr__(self, 'stations', _shares(self.stations))
 
-    @property
-    def bends(self) -> bool:
-        """Return True."""
-        return True
-
-    def check(self, name: str, arm: Arm) -> None:
-        """Refuse a link that the arm has not, or that does not bend."""
-        _check_link(name, arm, self.link)
-
     def labels(self, arm: Arm) -> list[SlackLabel]:
         """Return the names of both directions at each station."""
         scale = self.limit * arm.links[self.link - 1].length
@@ -154,7 +157,7 @@ class Deflection(PathConstraint):
         length = at.arm.links[self.link - 1].length
         shares = [at.deflection(self.link - 1, share) / (numbers[0] * length)
                   for share in self._moving(at.arm)]
-        return [1 - sign * share for share in shares for sign in (1, -1)]
+        return _both_ways(shares)
 
     def _moving(self, arm: Arm) -> list[float]:
         """Return the stations that modes move."""
@@ -171,12 +174,9 @@ def _shares(given: Sequence[float]) -> tuple[float, ...]:
     return tuple(vector('stations', given, len(given), at_least=0, at_most=1).tolist())
 
 
-def _check_link(name: str, arm: Arm, link: int) -> None:
-    """Refuse a link that an arm has not, or that does not bend."""
-    integer(f'{name}.link', link, at_least=1, at_most=arm.n_joints)
-    if not arm.links[link - 1].modes:
-        raise InvalidValueError(f'{name}.link', link, 'a link with modes: a rigid one does not '
-                                'bend')
+def _both_ways(shares: Sequence[Any]) -> list[Any]:
+    """Return the slacks of shares of a limit, forwards and backwards."""
+    return [1 - sign * share for share in shares for sign in (1, -1)]
 
 
 def _rigidity_at(link: Link, share: float) -> float:

@@ -2,7 +2,7 @@
 The largest payload within limits on the way, by the interior-point method.
 
 Limits of motors and limits on the way are one barrier; the payload that is worth its price comes
-to the limit while mu falls, see `payload_barrier`.
+to the limit while mu falls, see `limit_barrier`.
 
 """
 
@@ -12,16 +12,15 @@ from flex_planner.base.errors import FlexPlannerError
 from flex_planner.collocation import CollocationSolution, GaussRule, Solver
 from flex_planner.collocation.barrier_mesh import follow_barrier
 from flex_planner.collocation.interior_point import BarrierSchedule
-from flex_planner.collocation.junctions import double_nodes
 from flex_planner.optimal_control.barrier_problem import PayloadBarrier
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.path_barrier import PathBarrier
 from flex_planner.optimal_control.path_constraints import PathSlacks
 from flex_planner.planning.strategies.interior_point import applies
 from flex_planner.planning.strategies.limit_barrier import barrier_price, moved_mass
+from flex_planner.planning.strategies.within_limits import first_count, first_mesh, STAGES
 import numpy as np
 
-_STAGES, _FEWEST = 4, 40
 # mu at first and at last, of the price of what is moved per second
 _FIRST, _LAST = 0.15, 1e-5
 _TOLERANCE, _PATIENCE = 1e-3, 80
@@ -65,11 +64,9 @@ def reach_largest_payload(problem: MotionProblem, slacks: PathSlacks, solver: So
         return None
     barrier = PayloadBarrier(problem, price)
     both = PathBarrier(barrier, slacks)
-    count = min(max(_FEWEST, problem.fewest_intervals(_STAGES)), solver.settings.max_intervals)
-    rule, half = GaussRule.of(_STAGES), problem.size // 2
-    mesh = double_nodes(np.linspace(0, problem.task.duration, count + 1, dtype=np.float64),
-                        problem.junctions)
-    start = problem.straight_line(count, rule) if near is None else near.on_mesh(mesh, rule)
+    rule, half = GaussRule.of(STAGES), problem.size // 2
+    start = (problem.straight_line(first_count(problem, solver), rule) if near is None
+             else near.on_mesh(first_mesh(problem, solver), rule))
     guess = barrier.extend(start)
     scale = price * moved_mass(problem) / problem.task.duration
     schedule = BarrierSchedule(first=_FIRST * scale, last=_LAST * scale, tolerance=_TOLERANCE,

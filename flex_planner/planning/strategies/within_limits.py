@@ -35,7 +35,7 @@ from flex_planner.planning.strategies.via_times import free_via_times
 import numpy as np
 
 # of the method, and intervals of its first mesh
-_STAGES, _FEWEST = 4, 40
+STAGES, _FEWEST = 4, 40
 # mu in units of the cost per time of the motion that it starts from: at first, with the smallest
 # slacks then, where a motion is told from others, and at last; the second of each where the first
 # leads to nothing
@@ -76,7 +76,7 @@ def approach_limits(problem: MotionProblem, slacks: PathSlacks, near: Collocatio
 
     """
     barrier, rate = PathBarrier(MotionBarrier(problem), slacks), find_cost_rate(problem, near)
-    guess = near.on_mesh(_first_mesh(problem, solver), GaussRule.of(_STAGES))
+    guess = near.on_mesh(first_mesh(problem, solver), GaussRule.of(STAGES))
     for first, slack in _FIRST:
         schedule = _schedule(first * rate, _COARSE * rate, solver)
         y = barrier.guess(guess, schedule.first, slack)
@@ -139,24 +139,29 @@ def solve_again(problem: MotionProblem, slacks: PathSlacks, near: CollocationSol
     """
     rate = find_cost_rate(problem, near)
     limited = ConstrainedMotion(problem, slacks, _LAST[0] * rate).floored(near, _FLOOR)
-    quick = solver.with_settings(stages=_STAGES).patient(_FIRST_LOOK)
+    quick = solver.with_settings(stages=STAGES).patient(_FIRST_LOOK)
     result = quick.solve(limited, near)
     limited, result = _at_best_times(limited, result, quick)
     kept = result.converged and _keeps(limited, result.solution)
     if kept or result.status in INTERRUPTED:
         return limited, result
     barrier = PathBarrier(MotionBarrier(problem), slacks)
-    guess, mu = near.on_mesh(_first_mesh(problem, solver), GaussRule.of(_STAGES)), limited.mu
+    guess, mu = near.on_mesh(first_mesh(problem, solver), GaussRule.of(STAGES)), limited.mu
     met = solve_barrier(barrier, guess, barrier.guess(guess, _NEAR * mu),
                         _schedule(_NEAR * mu, _NEAR * mu, solver), solver.monitor)
     return solve_within_limits(problem, slacks, met, solver)
 
 
-def _first_mesh(problem: MotionProblem, solver: Solver) -> Array:
+def first_count(problem: MotionProblem, solver: Solver) -> int:
+    """Return how many intervals the interior-point method begins with."""
+    return min(max(_FEWEST, problem.fewest_intervals(STAGES)), solver.settings.max_intervals)
+
+
+def first_mesh(problem: MotionProblem, solver: Solver) -> Array:
     """Return the times of the first mesh, those of via points twice."""
-    count = min(max(_FEWEST, problem.fewest_intervals(_STAGES)), solver.settings.max_intervals)
-    return double_nodes(np.linspace(0, problem.task.duration, count + 1, dtype=np.float64),
-                        problem.junctions)
+    times = np.linspace(0, problem.task.duration, first_count(problem, solver) + 1,
+                        dtype=np.float64)
+    return double_nodes(times, problem.junctions)
 
 
 def _schedule(first: float, last: float, solver: Solver) -> BarrierSchedule:
@@ -179,7 +184,7 @@ def _finish(limited: ConstrainedMotion, near: CollocationSolution,
     """Solve the conditions with their barrier from a motion within the limits."""
     settings = solver.settings
     quick = solver.with_settings(
-        stages=_STAGES, max_intervals=min(_MOST_INTERVALS, settings.max_intervals),
+        stages=STAGES, max_intervals=min(_MOST_INTERVALS, settings.max_intervals),
         max_meshes=min(_MOST_MESHES, settings.max_meshes)).patient(_FINISH)
     result = quick.solve(limited, near)
     if result.converged or result.status in INTERRUPTED:
