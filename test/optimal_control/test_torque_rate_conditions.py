@@ -29,7 +29,7 @@ def problem(ei50_model: ArmModel, paper_task: TaskFactory) -> MotionProblem:
 
 @pytest.fixture(scope='module')
 def points(problem: MotionProblem) -> Array:
-    """Return points (k, m) at which rates are within their bounds, and beyond."""
+    """Return points at which rates are within their bounds, and beyond."""
     z = np.random.default_rng(4).normal(size=(6, problem.size)) * 0.3
     # unbounded rates of the second joint up to 100 N m/s either way
     z[:, -1] = np.linspace(-0.3, 0.3, 6)
