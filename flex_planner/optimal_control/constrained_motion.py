@@ -15,6 +15,10 @@ from flex_planner.collocation.problem import CompiledRate
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.path_constraints import limits_of_arm, PathSlacks
 from flex_planner.optimal_control.path_constraints.path_constraint import PathConstraint
+from flex_planner.optimal_control.smoothed_torque_state import (
+    smooth_rates,
+    SmoothedTorqueState,
+)
 from flex_planner.optimal_control.torque_slacks import TorqueSlacks
 import numpy as np
 
@@ -47,6 +51,7 @@ class ConstrainedMotion(MotionProblem):
         super().__init__(motion.model, motion.task, motion.parameters,
                          via_times=motion.junctions if motion.junctions.size else None)
         self.slacks, self.mu = slacks, mu
+        self.conditions = smooth_rates(self.conditions, mu)
         self.floor: Array = np.zeros(slacks.count) if floor is None else floor
 
     def rate(self, t: Array, z: Array) -> Array:
@@ -79,7 +84,16 @@ class ConstrainedMotion(MotionProblem):
             kept, share = np.maximum(slacks, self.floor), np.maximum(1 - slacks / self.floor, 0.0)
             beyond = np.where(slacks < self.floor, share + share**2 / 2, 0.0)
             rate: Array = self.mu * (beyond - np.log(kept)).sum(axis=1)
+        if isinstance(self.conditions, SmoothedTorqueState):
+            rate += self.conditions.barrier_rate(z)
         return rate
+
+    @property
+    def terms(self) -> int:
+        """Return how many logarithms the barrier has."""
+        smoothed = isinstance(self.conditions, SmoothedTorqueState)
+        return self.slacks.count + (
+            2 * int(np.isfinite(self.task.max_torque_rate).sum()) if smoothed else 0)
 
     def multipliers(self, z: Array) -> Array:
         """Return lam at points (k, m), shape (k, n_c)."""
