@@ -394,7 +394,7 @@ def test_maximum_payload_is_found_step_by_step(rigid: Planner) -> None:
 
 
 @pytest.mark.parametrize(('wrong', 'code', 'text'), [
-    ({'payload_mass': 7.0}, PlanReport.NOT_FOUND,
+    ({'payload_mass': 7.0, 'allowed_planning_time': 120.0}, PlanReport.NOT_FOUND,
      'no motion found: no motion with 7 kg in 1 s was found'),
     ({'method': 2}, PlanReport.OUT_OF_RANGE, 'method is 2, but must be'),
     ({'payload_accuracy': math.nan}, PlanReport.NOT_FINITE, 'payload_accuracy is nan, but must'),
