@@ -42,6 +42,7 @@ from flex_planner.planning.strategies.strategy import Strategy
 from flex_planner.planning.via_limits import check_via_points
 from flex_planner.planning.warnings import find_arm_warnings
 from flex_planner.planning.weight_search import adapt_weights, check_objectives
+from flex_planner.planning.within_model import keep_model
 import numpy as np
 
 
@@ -196,7 +197,7 @@ def _keep(plan: Plan, solver: Solver, objectives: Objectives | None,
     # weights that meet an objective may well bring a motion back within its limits
     if objectives is not None and plan.certified:
         plan = adapt_weights(plan, objectives, solver)
-    within = keep_limits(plan, solver, effort)
+    within = keep_model(keep_limits(plan, solver, effort), solver, effort)
     if within is plan or objectives is None:
         return within
     return check_objectives(within, plan.objectives, objectives)
