@@ -29,6 +29,7 @@ from flex_planner.planning.kinds.effort import SearchEffort
 from flex_planner.planning.plan import PlanStatus
 from flex_planner.planning.plan_problem import STOP_STATUS
 from flex_planner.planning.proofs import bound_duration, guess_duration, prove_not_held
+from flex_planner.planning.smooth_torques import refuse_torque_rates
 from flex_planner.planning.strategies.extremals import SearchStart
 from flex_planner.planning.strategies.free_parameters import DURATION
 from flex_planner.planning.within_model import bound_by_limits
@@ -69,7 +70,7 @@ def find_min_duration(task: Task, *, model: ArmModel | None = None,
     ------
     InvalidTaskError
         If a motor has no limit, if the arm need not come to rest at the goal, or if there are via
-        points.
+        points, or rates of torques with a price or a bound.
     InvalidValueError
         If the accuracy breaks its bound.
 
@@ -80,6 +81,7 @@ def find_min_duration(task: Task, *, model: ArmModel | None = None,
     if not np.isfinite([joint.motor.standstill_torque for joint in task.arm.joints]).all():
         raise InvalidTaskError('a motor of the arm has no stall torque, so no duration is the '
                                'shortest')
+    refuse_torque_rates(task, 'a search for the shortest duration')
     if task.via_points:
         raise InvalidTaskError('via_points must be empty: the shortest duration is that of a '
                                'motion without via points')
