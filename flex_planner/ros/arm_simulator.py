@@ -16,7 +16,12 @@ from flex_planner.ros.messages.plans import duration_seconds
 from flex_planner.ros.messages.points import point_message
 from flex_planner.ros.messages.trajectory_rules import range_violations, trajectory_violations
 from flex_planner.ros.runtime.elapsed import ElapsedTime
-from flex_planner.ros.runtime.parameters import declare, declare_arm, warn_of_unknown
+from flex_planner.ros.runtime.parameters import (
+    ARM_PARAMETERS,
+    declare,
+    declare_arm,
+    warn_of_unknown,
+)
 from flex_planner.ros.runtime.running import run_node
 from flex_planner.ros.settings.simulator import SimulatorSettings
 from flex_planner.simulation.plant import Plant, RunawayError
@@ -67,7 +72,7 @@ class ArmSimulator(Node):  # type: ignore[misc]
 
     def __init__(self) -> None:
         super().__init__('arm_simulator')
-        warn_of_unknown(self, SimulatorSettings, ['arm'])
+        warn_of_unknown(self, SimulatorSettings, ARM_PARAMETERS)
         arm = declare_arm(self)
         self._settings = declare(self, SimulatorSettings.for_arm(arm))
         self._arm = self._settings.mismatch.apply(arm)
