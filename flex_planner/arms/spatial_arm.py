@@ -18,7 +18,8 @@ from flex_planner.arms.spatial_body import as_point, IDENTITY, Matrix, Point, ro
 from flex_planner.arms.spatial_body import point as checked_point
 from flex_planner.arms.spatial_joint import SpatialJoint
 from flex_planner.arms.spatial_link import SpatialLink
-from flex_planner.base.errors import InvalidValueError
+from flex_planner.base.errors import InvalidSizeError, InvalidValueError
+from flex_planner.base.sentences import count_of
 from flex_planner.base.text import LONGEST_NAME, printable
 from flex_planner.base.validation import Array, integer, plain_names, vector
 import numpy as np
@@ -54,6 +55,10 @@ class SpatialArm(Arm):
         >= 0 [kg m^2].
     notes : tuple of str
         What was made of the file that the arm comes from, for people.
+    joint_names : tuple of str
+        Of the joints, where the file names them; empty, or one per joint.
+    frame_names : tuple of str
+        Of the base, the links and the tip, where the file names them; empty, or n + 2.
 
     Raises
     ------
@@ -69,6 +74,8 @@ class SpatialArm(Arm):
     base: Point = (0.0, 0.0, 0.0)
     tip_rotation: Matrix = IDENTITY
     notes: tuple[str, ...] = ()
+    joint_names: tuple[str, ...] = ()
+    frame_names: tuple[str, ...] = ()
 
     if TYPE_CHECKING:
         # arrays are made of anything like one; type checkers would insist on arrays
@@ -76,7 +83,8 @@ class SpatialArm(Arm):
                      joints: tuple[SpatialJoint, ...], gravity: ArrayLike = ...,
                      source: str = ..., payload_com: ArrayLike = ..., payload_inertia: float = ...,
                      base: ArrayLike = ..., tip_rotation: ArrayLike = ...,
-                     notes: tuple[str, ...] = ...) -> None:
+                     notes: tuple[str, ...] = ..., joint_names: tuple[str, ...] = ...,
+                     frame_names: tuple[str, ...] = ...) -> None:
             """Accept a list where an array is kept."""
 
     @classmethod
@@ -119,6 +127,11 @@ class SpatialArm(Arm):
         object.__setattr__(self, 'base', checked_point('base', self.base))
         object.__setattr__(self, 'tip_rotation', rotation('tip_rotation', self.tip_rotation))
         plain_names('notes', self.notes)
+        for name, count in (('joint_names', n), ('frame_names', n + 2)):
+            given = getattr(self, name)
+            plain_names(name, given)
+            if len(given) not in (0, count):
+                raise InvalidSizeError(name, count_of(len(given), 'name'), f'{count}, or none')
         if not self.reach:
             raise InvalidValueError('links', 'all of length 0', 'with an end apart from a joint')
 

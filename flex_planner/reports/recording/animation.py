@@ -7,6 +7,7 @@ from typing import Any
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import link_points, payload_position
+from flex_planner.arms.planar_only import require_planar
 from flex_planner.base.colours import ARM, FLEXIBLE, PLANNED, REFUSED
 from flex_planner.base.validation import Array
 from flex_planner.optimal_control.path_constraints import PathConstraint
@@ -42,6 +43,7 @@ def animation(arm: Arm, motion: RecordedMotion,
         which links are ``flexible``; colours; ``box``, left, low, width and height [mm].
 
     """
+    require_planar(arm, 'pages of recordings')
     times, coordinates = _even(motion)
     points = link_points(arm, coordinates, _STATIONS)
     payload = payload_position(arm, coordinates)
