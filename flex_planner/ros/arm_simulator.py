@@ -12,6 +12,7 @@ from flex_planner.base.validation import Array
 from flex_planner.control.joint_reference import JointReference
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.ros.messages.plans import duration_seconds
+from flex_planner.ros.messages.points import point_message
 from flex_planner.ros.messages.trajectory_rules import range_violations, trajectory_violations
 from flex_planner.ros.runtime.elapsed import ElapsedTime
 from flex_planner.ros.runtime.parameters import declare, declare_arm, warn_of_unknown
@@ -125,7 +126,7 @@ class ArmSimulator(Node):  # type: ignore[misc]
                 stamp, self._arm.passive_names, state[n:n_t], state[n_t + n:], np.zeros(0)))
         tip = PointStamped()
         tip.header.stamp, tip.header.frame_id = stamp, self._settings.base_frame
-        tip.point.x, tip.point.y = (float(v) for v in tip_position(self._arm, state[:n_t]))
+        tip.point = point_message(tip_position(self._arm, state[:n_t]))
         self._tip.publish(tip)
 
     def _on_silence(self) -> None:

@@ -10,7 +10,7 @@ from flex_planner.base.validation import Array
 from flex_planner.optimal_control.path_constraints import PathConstraint
 from flex_planner.planning.region_outlines import find_keep_outs, outline_region
 from flex_planner.planning.sampling import SampledPlan
-from geometry_msgs.msg import Point
+from flex_planner.ros.messages.points import point_message
 import numpy as np
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
@@ -82,7 +82,7 @@ def _marker(namespace: str, number: int, kind: int, color: tuple[float, ...]) ->
 def _line(namespace: str, number: int, points: Array, color: tuple[float, ...],
           width: float) -> Marker:
     marker = _marker(namespace, number, Marker.LINE_STRIP, color)
-    marker.points = [Point(x=float(x), y=float(y), z=0.0) for x, y in points]
+    marker.points = [point_message(point) for point in points]
     marker.scale.x = width
     return marker
 
@@ -90,6 +90,6 @@ def _line(namespace: str, number: int, points: Array, color: tuple[float, ...],
 def _ball(namespace: str, place: Array, color: tuple[float, ...], size: float,
           number: int = 0) -> Marker:
     marker = _marker(namespace, number, Marker.SPHERE, color)
-    marker.pose.position = Point(x=float(place[0]), y=float(place[1]), z=0.0)
+    marker.pose.position = point_message(place)
     marker.scale.x = marker.scale.y = marker.scale.z = size
     return marker

@@ -8,7 +8,6 @@ from typing import Any, TypeVar
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import load_arm
-from flex_planner.arms.planar_only import require_planar
 from flex_planner.base.errors import FlexPlannerError, InvalidValueError
 from flex_planner.base.suggestions import nearest_name
 from flex_planner.ros.settings.fields import Description
@@ -141,16 +140,12 @@ def declare_arm(node: Node) -> Arm:
     ------
     ArmFileError
         If there is no such arm, or its file is wrong.
-    PlanarOnlyError
-        If it is a spatial one.
 
     """
     description = Description(
         text='Name of a preset in config/arms, or path of an arm file.', read_only=True)
     name = str(node.declare_parameter('arm', _DEFAULT_ARM, _descriptor(description, '')).value)
-    arm = load_arm(name)
-    require_planar(arm, 'the nodes')
-    return arm
+    return load_arm(name)
 
 
 def apply_changes(settings: Settings, changes: list[Parameter]) -> Settings:

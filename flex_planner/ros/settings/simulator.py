@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from flex_planner.arms.arm import Arm, Joint
+from flex_planner.arms.frames import name_frames, name_joints
 from flex_planner.base.validation import plain_names, vector
 from flex_planner.control.default_gains import default_gains
 from flex_planner.control.joint_controller import EffortHold, Gains, MAX_RATE, MIN_RATE
@@ -110,7 +111,8 @@ class SimulatorSettings:
     def for_arm(cls, arm: Arm) -> SimulatorSettings:
         """Return the defaults for an arm."""
         n, gains = arm.n_joints, default_gains(ArmDynamics.of(arm))
-        return replace(cls(), joint_names=[f'joint{i}' for i in range(1, n + 1)],
+        return replace(cls(), joint_names=list(name_joints(arm)),
+                       base_frame=name_frames(arm)[0],
                        initial_positions=[_within_limits(joint) for joint in arm.joints],
                        stiffness=gains.stiffness.tolist(),
                        damping=gains.damping.tolist(), added_friction=[0.0] * n)
