@@ -7,23 +7,11 @@ from dataclasses import dataclass
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.validation import Array
+from flex_planner.control.extent import peak_to_peak
 import numpy as np
 
 MIN_SETTLING, MAX_SETTLING = 1e-3, 1000.0  # [s], that an arm may be watched after its arrival
 _STATIONS = 41
-_DIRECTIONS = 180
-
-
-def peak_to_peak(points: Array) -> float:
-    """
-    Return the largest extent of points (k, 2) in any direction [m].
-
-    Directions are a degree apart, which understates it by less than 1 in 25000.
-
-    """
-    angles = np.linspace(0, np.pi, _DIRECTIONS, endpoint=False, dtype=np.float64)
-    directions = np.stack([np.cos(angles), np.sin(angles)])
-    return float(np.ptp(points @ directions, axis=0).max())
 
 
 def bending_peak_to_peak(arm: Arm, coordinates: Array) -> float:
