@@ -59,7 +59,7 @@ class GainSettings:
     controller : JointController or None
         Its rate, how it holds efforts, and gains that are tried, too; None for 1 kHz and
         `default_gains`.
-    resolution : float
+    encoder_resolution : float
         Of the encoders, 1e-9 to 1 [rad].
     stiffness_error, payload_error : float
         By which shares E I of all links, and mass and inertia of the payload, may differ from the
@@ -73,12 +73,12 @@ class GainSettings:
     """
 
     controller: JointController | None = None
-    resolution: float = RESOLUTION
+    encoder_resolution: float = RESOLUTION
     stiffness_error: float = 0.1
     payload_error: float = 0.1
 
     def __post_init__(self) -> None:
-        number('resolution', self.resolution, at_least=1e-9, at_most=1, unit='rad')
+        number('encoder_resolution', self.encoder_resolution, at_least=1e-9, at_most=1, unit='rad')
         for name in ('stiffness_error', 'payload_error'):
             number(name, getattr(self, name), at_least=0, at_most=MAX_ERROR)
 
@@ -142,7 +142,7 @@ class _Search:
         self._monitor, self._rate = monitor, controller.rate
         self._differences = settings.differences(plan)
         # of roundings, and of a noise of half a step
-        self._noise = settings.resolution * float(np.sqrt(1 / 12 + 1 / 4))
+        self._noise = settings.encoder_resolution * float(np.sqrt(1 / 12 + 1 / 4))
         parameters = without_friction(plan.problem.parameters)
         self._model = LinearArm.of(plan.model, plan.problem.goal[:plan.arm.n_joints], parameters,
                                    self._rate)
@@ -150,7 +150,7 @@ class _Search:
     def run(self) -> FeedbackGains:
         """Return what was found."""
         found = FeedbackGains(rate=self._rate, cutoff=SPEED_CUTOFF, differences=self._differences,
-                              resolution=self._settings.resolution)
+                              resolution=self._settings.encoder_resolution)
         try:
             self._arms = self._make_arms()
         except NoEquilibriumError as error:
@@ -161,9 +161,10 @@ class _Search:
     def _make_arms(self) -> list[DifferingArm]:
         """Return the arms that are looked at."""
         nominal = Execution.of(self._plan, self._controller)
-        course = course_of(self._plan, self._controller)
-        return [DifferingArm.of(nominal, self._plan, course, difference,
-                                self._settings.resolution) for difference in self._differences]
+        course, resolution = (course_of(self._plan, self._controller),
+                              self._settings.encoder_resolution)
+        return [DifferingArm.of(nominal, self._plan, course, difference, resolution)
+                for difference in self._differences]
 
     def _add_state(self, found: FeedbackGains) -> FeedbackGains:
         """Look for a regulator with its observer, and one that estimates a torque, too."""
@@ -174,11 +175,11 @@ class _Search:
                          for error in _ERRORS[2:] for wander in _WANDERS]
         except NoFeedbackError:
             return found
-        plain = self._best([self._combine(gain, one) for gain in gains for one in observers])
+        plain = self._best([[self._combine(gain, one) for gain in gains] for one in observers])
         if plain is None:
             return found
         found = replace(found, state=plain[0], records={**found.records, 'state': plain[1]})
-        more = self._best([self._combine(plain[0].state_gain, one) for one in wandering])
+        more = self._best([[self._combine(plain[0].state_gain, one)] for one in wandering])
         if more is None or more[1].worst >= plain[1].worst:
             return found
         return replace(found, disturbance=more[0],
@@ -191,17 +192,20 @@ class _Search:
                              state_gain=gain, observer_gain=correction, rate=self._rate,
                              disturbance_gain=disturbance)
 
-    def _best(self, candidates: Sequence[StateFeedback]) -> tuple[StateFeedback, Record] | None:
-        """Return the candidate that leaves least on the worst arm, if it is stable on all."""
-        laws = [one.law() for one in candidates]
-        calm = [i for i, law in enumerate(laws) if self._is_calm(law)]
-        residuals = {i: self._yardstick.predict_residual(laws[i], self._monitor)
-                     for i in calm}
-        for i in sorted(calm, key=lambda i: residuals[i]):
-            record = self._try(laws[i])
+    def _best(self, groups: Sequence[Sequence[StateFeedback]],
+              ) -> tuple[StateFeedback, Record] | None:
+        """Return what leaves least of the firmest of each group that shake no arm."""
+        calm = [one for group in groups for one in self._calmest(group)]
+        residuals = [self._yardstick.predict_residual(one.law(), self._monitor) for one in calm]
+        for i in np.argsort(residuals):
+            record = self._try(calm[i].law())
             if record.stable:
-                return candidates[i], record
+                return calm[i], record
         return None
+
+    def _calmest(self, group: Sequence[StateFeedback]) -> list[StateFeedback]:
+        """Return the first of a group that shakes no arm, if there is one."""
+        return next(([one] for one in group if self._is_calm(one.law())), [])
 
     @property
     def _yardstick(self) -> DifferingArm:
@@ -233,7 +237,9 @@ class _Search:
                             records={**found.records, 'coupled_joints': best[1]})
         choices = [*map(_own_gains, coupled), self._controller.gains]
         laws = [pd_feedback(gains, self._rate) for gains in choices]
-        tried = [self._firmest(laws[:-1]), (len(laws) - 1, self._try(laws[-1]))]
+        given = self._try(laws[-1])
+        found = replace(found, given=given)
+        tried = [self._firmest(laws[:-1]), (len(laws) - 1, given)]
         which, record = min(filter(None, tried), key=lambda one: one[1].worst)
         if not record.stable:
             return found

@@ -71,6 +71,8 @@ class FeedbackGains:
         it leaves more than `state` does.
     records : dict of str to Record
         What each of these made of the plan, by name.
+    given : Record or None
+        What the gains of the controller itself made of it, stable or not.
     message : str
         What was found, or why nothing was and what to try.
 
@@ -85,6 +87,7 @@ class FeedbackGains:
     state: StateFeedback | None = None
     disturbance: StateFeedback | None = None
     records: dict[str, Record] = field(default_factory=dict)
+    given: Record | None = None
     message: str = ''
 
     @property

@@ -142,8 +142,8 @@ def test_rigid_arm_has_the_corners_of_its_payload(plan_of: PlanFactory) -> None:
 def test_wrong_plans_and_settings_are_refused(plan: Plan) -> None:
     with pytest.raises(InvalidTaskError, match='plans that are solved'):
         find_feedback_gains(replace(plan, solution=None, status=type(plan.status).NOT_FOUND))
-    with pytest.raises(InvalidValueError, match='resolution is 0'):
-        GainSettings(resolution=0.0)
+    with pytest.raises(InvalidValueError, match='encoder_resolution is 0'):
+        GainSettings(encoder_resolution=0.0)
     with pytest.raises(InvalidValueError, match='stiffness_error is 0.6'):
         GainSettings(stiffness_error=0.6)
 
