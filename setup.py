@@ -45,6 +45,7 @@ setup(
         (f'share/{package_name}/config/arms', glob('config/arms/*.yaml')),
         (f'share/{package_name}/config/studies', glob('config/studies/*.yaml')),
         (f'share/{package_name}/launch', glob('launch/*.py')),
+        (f'share/{package_name}/rviz', glob('rviz/*.rviz')),
     ],
     install_requires=[
         'casadi>=3.6.7',

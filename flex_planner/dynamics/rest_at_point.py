@@ -5,7 +5,7 @@ from __future__ import annotations
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.inverse_kinematics import check_singularity
 from flex_planner.arms.kinematics import jacobian, tip_jacobian, tip_position
-from flex_planner.base.errors import NoEquilibriumError, UnreachableError
+from flex_planner.base.errors import UnreachableError
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.physical_parameters import PhysicalParameters
@@ -131,7 +131,7 @@ class _BentArm:
             if not miss < last:
                 return None
             exact, last = miss <= _EXACT * self.arm.reach, miss
-            turned = turned + np.linalg.lstsq(follows @ self._turning(turned), left, rcond=None)[0]
+            turned = turned + _least_squares(follows @ self._turning(turned), left)
             angles = self._angles(turned)
             q[n:] += sag - sagging @ (angles - q[:n])
             q[:n] = angles
@@ -139,9 +139,7 @@ class _BentArm:
 
     def numbers_of(self, q: Array) -> Array:
         """Return the numbers (d,) that lead to the joint angles of q, or near them."""
-        turn = q[:self.arm.n_joints] - self._reference
-        numbers: Array = np.linalg.lstsq(self._directions, turn, rcond=None)[0]
-        return numbers
+        return _least_squares(self._directions, q[:self.arm.n_joints] - self._reference)
 
     def _balance(self, q: Array) -> tuple[Array, Array, Array]:
         """Return static forces, how links sag as joints turn, and what they sag more now."""
@@ -149,8 +147,8 @@ class _BentArm:
         forces, stiffness = self._dynamics.static_forces(q[None], self._parameters.physical)
         if q.size == n:
             return forces[0], np.zeros((0, n)), np.zeros(0)
-        solved = np.linalg.solve(stiffness[0, n:, n:],
-                                 np.column_stack([stiffness[0, n:, :n], -forces[0, n:]]))
+        pulled = np.column_stack([stiffness[0, n:, :n], -forces[0, n:]])
+        solved = np.linalg.solve(stiffness[0, n:, n:], pulled).astype(np.float64)
         return forces[0], solved[:, :n], solved[:, n]
 
     def _is_whole(self, q: Array, follows: Array) -> bool:
@@ -174,9 +172,15 @@ class _BentArm:
         return np.clip(angles, self._lower, self._upper) if self._keeps_limits else angles
 
 
+def _least_squares(matrix: Array, right: Array) -> Array:
+    solution: Array = np.linalg.lstsq(matrix, right, rcond=None)[0].astype(np.float64)
+    return solution
+
+
 def _approach(posture: _BentArm, point: Array) -> Array:
     """Bring the tip from where it rests in the reference posture to a point, in steps."""
-    way, step, turned = 0.0, 1.0, np.zeros(point.size)
+    way, step = 0.0, 1.0
+    turned: Array = np.zeros(point.size)
     q, first, _ = posture.at(turned)
     while way < 1:
         there = min(way + step, 1.0)
@@ -204,10 +208,10 @@ def _side(moves: Array) -> float:
 
 def _nearest(posture: _BentArm, point: Array) -> Array:
     """Turn the only joint until the tip passes a point, which lies on its curve or is refused."""
-    turned = np.zeros(point.size)
+    turned: Array = np.zeros(point.size)
     for _ in range(_MAX_ITERATIONS):
         _, tip, slope = posture.at(turned)
-        change = np.linalg.lstsq(slope, point - tip, rcond=None)[0]
+        change = _least_squares(slope, point - tip)
         turned = turned + change
         if np.abs(change).max() <= _EXACT:
             break

@@ -67,6 +67,28 @@ def motion_markers(arm: Arm, reference: SampledPlan, frame: str,
     return MarkerArray(markers=markers)
 
 
+def arm_markers(arm: Arm, coordinates: Array, frame: str) -> MarkerArray:
+    """
+    Return the bent links as they are: namespaces ``links`` and ``tip``.
+
+    Parameters
+    ----------
+    arm : Arm
+        n_t coordinates.
+    coordinates : numpy.ndarray, shape (n_t,)
+        q.
+    frame : str
+        Of the base.
+
+    """
+    links, width = link_points(arm, coordinates, _STATIONS), _reach(arm) / 100
+    markers = [_line('links', i, points, (*_LINK, 1.0), width) for i, points in enumerate(links)]
+    markers.append(_ball('tip', links[-1][-1], (*_PATH, 1.0), 2 * width))
+    for marker in markers:
+        marker.header.frame_id = frame
+    return MarkerArray(markers=markers)
+
+
 def _reach(arm: Arm) -> float:
     return float(sum(link.length for link in arm.links))
 

@@ -95,11 +95,18 @@ class SimulatorSettings:
     start_tolerance: float = parameter_field(
         0.05, 'A trajectory that starts further from the arm than this is refused [rad].',
         lowest=0.0, highest=10.0, read_only=True)
-    base_frame: str = parameter_field('base_link', 'Frame of the tip.', read_only=True)
+    base_frame: str = parameter_field('base_link', 'Frame of the base.', read_only=True)
+    frame_prefix: str = parameter_field(
+        'bent_', 'What the names of the frames of the links and of the tip begin with on /tf, '
+        'beside those of a robot_state_publisher, whose links do not bend.', read_only=True)
+    picture_rate: float = parameter_field(
+        25.0, 'Rate of the markers and frames [Hz]; 0: none.', lowest=0.0, highest=1000.0,
+        read_only=True)
 
     def __post_init__(self) -> None:
         count = len(self.joint_names)
         plain_names('joint_names', self.joint_names)
+        plain_names('frame_prefix', [self.frame_prefix])
         for name in ('stiffness', 'damping', 'added_friction'):
             vector(name, getattr(self, name), count, at_least=0, at_most=MAX_GAIN)
         vector('initial_positions', self.initial_positions, count, at_least=-MAX_JOINT_ANGLE,
