@@ -17,7 +17,8 @@ from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.validation import Array
 from flex_planner.identification.drive import Drive
 from flex_planner.identification.joint_log import JointLog
-from flex_planner.identification.loop_model import DriveLaw, LAGS, LoopModel, SimulatedLog
+from flex_planner.identification.loop_model import DriveLaw, LoopModel, SimulatedLog
+from flex_planner.identification.loop_sizes import LAGS
 import numpy as np
 from numpy.typing import NDArray
 

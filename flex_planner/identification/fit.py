@@ -14,7 +14,8 @@ from dataclasses import dataclass
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
 from flex_planner.identification.experiments import Experiment, Method
-from flex_planner.identification.loop_model import LAGS, LoopModel, steps_per_part
+from flex_planner.identification.loop_model import LoopModel, steps_per_part
+from flex_planner.identification.loop_sizes import LAGS
 from flex_planner.identification.plant_parameters import list_parameters, Quantity
 import numpy as np
 

@@ -18,7 +18,7 @@ from flex_planner.arms.arm import Arm
 from flex_planner.arms.mechanism import planar_beam
 from flex_planner.dynamics.build_chain import build_chain
 from flex_planner.dynamics.dynamics_functions import batch, BatchedFunction, solver_of
-from flex_planner.identification.loop_model import LAGS, LoopSizes
+from flex_planner.identification.loop_sizes import LAGS, LoopSizes
 import numpy as np
 
 

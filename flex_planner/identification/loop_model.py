@@ -12,63 +12,15 @@ from flex_planner.base.errors import NoEquilibriumError
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.cache_key import cache_key
 from flex_planner.dynamics.compiled_functions import load_functions
+from flex_planner.identification.loop_sizes import LAGS, LoopSizes
 from flex_planner.identification.plant_parameters import mode_weights
 import numpy as np
-
-LAGS = 4
-"""Most periods of the drive by which its torque may be late."""
 
 # rows that are computed before what nobody needs of them is thrown away
 _BLOCK = 4096
 # of a step and the fastest motion: the method is stable up to 2.8
 _STEP_ANGLE = 1.0
 _MOST_ITERATIONS = 50
-
-
-@dataclass(frozen=True, slots=True)
-class LoopSizes:
-    """
-    Where things are in the arrays of the compiled functions, for n joints and n_t coordinates.
-
-    The state is z = (q, q', filtered speeds, angles sampled last, torque of the guide, torques
-    commanded last, newest first). Columns of its derivatives are those of the physical
-    parameters, the offsets of the encoders, the delay, and the start angles.
-
-    """
-
-    joints: int
-    coordinates: int
-
-    @property
-    def physical(self) -> int:
-        """Return the number of physical parameters."""
-        return 1 + 5 * self.joints
-
-    @property
-    def columns(self) -> int:
-        """Return the number of columns of derivatives."""
-        return self.physical + 2 * self.joints + 1
-
-    @property
-    def state(self) -> int:
-        """Return the size of z."""
-        return 2 * self.coordinates + (4 + LAGS) * self.joints
-
-    @property
-    def row(self) -> int:
-        """Return the size of what differs from step to step."""
-        return 3 * self.joints + 5 + LAGS
-
-    @property
-    def angles(self) -> slice:
-        """Return where the sampled angles are in z."""
-        first = 2 * self.coordinates + self.joints
-        return slice(first, first + self.joints)
-
-    @property
-    def guide(self) -> slice:
-        """Return where the torque of the guide is in z."""
-        return slice(self.angles.stop, self.angles.stop + self.joints)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
