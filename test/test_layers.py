@@ -21,7 +21,7 @@ FLOORS = {
     'control': 4,
     'planning': 5,
     'capacity': 6, 'identification': 6, 'simulation': 6,
-    'plotting': 7, 'reports': 7,
+    'logs': 7, 'plotting': 7, 'reports': 7,
     'maps': 8, 'paper': 8,
     'ros': 9,
     'cli': 10,
