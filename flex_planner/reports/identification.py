@@ -67,4 +67,3 @@ def _entry(one: Estimate) -> dict[str, Any]:
 
 def _plain(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
-

@@ -142,4 +142,3 @@ def _identify(options: argparse.Namespace, arm: Arm, logs: list[JointLog], drive
     if canceled():
         raise CanceledError(f'{SIGNALS.word}; nothing was written')
     return found
-
