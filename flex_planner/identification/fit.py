@@ -19,7 +19,8 @@ from flex_planner.identification.loop_sizes import LAGS
 from flex_planner.identification.plant_parameters import list_parameters, Quantity
 import numpy as np
 
-_TOLERANCE = 1e-9
+TOLERANCE, COARSE = 1e-9, 1e-5
+"""Of a fit whose values count, and of one that they are compared with."""
 _MOST_EVALUATIONS = 40
 _RUN_AWAY = 1e6
 _NORMAL_95 = 1.96
@@ -137,7 +138,8 @@ class _Problem:
 
 
 def fit_parameters(model: LoopModel, experiments: Sequence[Experiment], values: Array,
-                   free: Sequence[int], monitor: Monitor | None = None) -> Fit:
+                   free: Sequence[int], monitor: Monitor | None = None, *,
+                   tolerance: float = TOLERANCE) -> Fit:
     """
     Return the parameters with which a model fits logs best.
 
@@ -153,6 +155,8 @@ def fit_parameters(model: LoopModel, experiments: Sequence[Experiment], values: 
         Indices of those to find.
     monitor : Monitor, optional
         May stop it.
+    tolerance : float
+        Relative change of the squared errors, or of the parameters, at which it ends.
 
     Raises
     ------
@@ -167,7 +171,7 @@ def fit_parameters(model: LoopModel, experiments: Sequence[Experiment], values: 
     inside = np.clip(problem.first, lower + 1e-9, upper - 1e-9)
     result = least_squares(
         lambda at: problem.evaluate(at)[0], inside, lambda at: problem.evaluate(at)[1],
-        bounds=(lower, upper), x_scale='jac', ftol=_TOLERANCE, xtol=_TOLERANCE, gtol=_TOLERANCE,
+        bounds=(lower, upper), x_scale='jac', ftol=tolerance, xtol=tolerance, gtol=TOLERANCE,
         max_nfev=_MOST_EVALUATIONS)
     return _summarize(problem, result.x, bool(result.status > 0))
 

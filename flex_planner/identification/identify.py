@@ -27,7 +27,7 @@ from flex_planner.identification.experiments import (
     LogError,
     Method,
 )
-from flex_planner.identification.fit import Fit, fit_parameters, judge_parameters
+from flex_planner.identification.fit import COARSE, Fit, fit_parameters, judge_parameters
 from flex_planner.identification.identification import (
     Estimate,
     Finding,
@@ -110,7 +110,8 @@ def identify(arm: Arm, logs: Sequence[JointLog], *, payload_mass: float = 0.0,
     start = parameters_of(arm, mass, drive.delay if drive else 0.0)
     used, experiments, fit = search.choose(start, method)
     richer = search.fit_richer(used, fit, more_modes)
-    single = tuple(fit_parameters(search.model, [one], fit.values, fit.free, monitor)
+    single = tuple(fit_parameters(search.model, [one], fit.values, fit.free, monitor,
+                                  tolerance=COARSE)
                    for one in experiments) if len(logs) > 1 else ()
     left_out = search.judge(experiments, single)
     return _conclude(search, start, used, method, fit, richer, single, left_out)
@@ -186,7 +187,8 @@ class _Search:
             return None
         model = LoopModel(self.richer, self.inertia)
         experiments = self.experiments(method, fit.values)
-        return fit_parameters(model, experiments, fit.values, fit.free, self.monitor)
+        return fit_parameters(model, experiments, fit.values, fit.free, self.monitor,
+                              tolerance=COARSE)
 
     def judge(self, experiments: Sequence[Experiment], single: Sequence[Fit]) -> Array:
         """Return how much of each log fits to the others explain, at least."""
