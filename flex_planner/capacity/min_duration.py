@@ -32,6 +32,7 @@ from flex_planner.planning.proofs import bound_duration, guess_duration, prove_n
 from flex_planner.planning.smooth_torques import refuse_torque_rates
 from flex_planner.planning.strategies.extremals import SearchStart
 from flex_planner.planning.strategies.free_parameters import DURATION
+from flex_planner.planning.within_model import bound_by_limits
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -130,8 +131,10 @@ def _search(task: Task, search: LimitSearch, neighbours: Neighbours,
     lower = max(0.0, last.value - last.gap)
     found = replace(_result(task, search, plan.status, plan.message), plan=plan,
                     duration=last.value if plan.solved else np.inf, local_lower=lower)
-    if plan.status is PlanStatus.LIMIT_VIOLATED:
-        within = hurry_within_limits(task, search.solver, accuracy, found)
+    limited = bound_by_limits(plan.problem, plan)
+    if limited is not None:
+        bounded = replace(task, path_constraints=limited.task.path_constraints)
+        within = hurry_within_limits(bounded, search.solver, accuracy, found)
         if within is not None:
             return within
         found = replace(found, local_lower=0.0)  # what ends is a motion beyond the limits

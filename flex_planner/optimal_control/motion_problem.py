@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationSolution, GaussRule
@@ -146,9 +147,9 @@ class MotionProblem:
         """Return the state (2 n_t,) that a motion ending in `end` is to reach."""
         return self.ends.target_state(end)
 
-    def with_changes(self, **changes: float) -> MotionProblem:
-        """Return the problem of the same task changed in payload or duration."""
-        task = replace(self.task, **changes)  # type: ignore[arg-type]
+    def with_changes(self, **changes: Any) -> MotionProblem:
+        """Return the problem of the same task changed in payload, duration or limits."""
+        task = replace(self.task, **changes)
         parameters = replace(self.parameters, payload_mass=task.payload_mass)
         times = self.via.times * (task.duration / self.task.duration)
         return MotionProblem(self.model, task, parameters, via_times=np.where(

@@ -12,6 +12,7 @@ from flex_planner.arms.planar_only import require_planar
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.validation import Array, listed, number, vector
 from flex_planner.optimal_control.ends_at_points import ends_at_points, MAX_COORDINATE
+from flex_planner.optimal_control.goal_in_pose import posture_in_pose
 from flex_planner.optimal_control.path_constraints.joint_constraints import (
     JointRange,
     JointSpeed,
@@ -59,7 +60,8 @@ class Task:
     payload_inertia : float
         Rotary inertia of the payload about its centre of mass, which is at the tip unless
         `Arm.payload_com` says otherwise, >= 0 and at most 1e6 [kg m^2]; by default
-        `Arm.payload_inertia`.
+        `Arm.payload_inertia`. `SpatialArm.payload_tensor` adds what is not the same about every
+        axis.
     effort_weights : array_like, shape (n,)
         Diagonal of R, 1e-18 to 1e18; empty for ones.
     position_weights, velocity_weights : array_like, shape (n,) or (n_t,)
@@ -194,6 +196,39 @@ class Task:
         start = vector('start_positions', start_positions, arm.n_joints, unit='rad')
         return cls(arm=arm, duration=duration, start_positions=start, **others,
                    **ends_at_points(arm, None, goal, elbow, start))
+
+    @classmethod
+    def to_pose(cls, arm: Arm, start_positions: ArrayLike, point: ArrayLike,
+                orientation: ArrayLike, *, duration: float, **others: Any) -> Task:
+        """
+        Return the motion from given joint coordinates to a pose in which the tip rests.
+
+        The goal of the task are joint coordinates: those of `posture_in_pose` with the payload of
+        the task. A search that changes the payload keeps them, not the pose.
+
+        Parameters
+        ----------
+        arm : Arm
+            A spatial one of n joints.
+        start_positions : array_like, shape (n,)
+            [rad, m].
+        point, orientation : array_like
+            As of `posture_in_pose`.
+        duration, others
+            Fields of `Task`.
+
+        Raises
+        ------
+        UnreachableError, SingularError, NoEquilibriumError, InvalidValueError
+            See `posture_in_pose`.
+
+        """
+        start = vector('start_positions', start_positions, arm.n_joints, unit='rad')
+        goal = posture_in_pose(arm, point, orientation, start,
+                               payload_mass=others.get('payload_mass', 0.0),
+                               payload_inertia=others.get('payload_inertia'))
+        return cls(arm=arm, duration=duration, start_positions=start, goal_positions=goal,
+                   **others)
 
     def __post_init__(self) -> None:
         n, n_t = self.arm.n_joints, self.arm.n_coordinates

@@ -47,6 +47,7 @@ from flex_planner.planning.strategies.strategy import Strategy
 from flex_planner.planning.via_limits import check_via_points
 from flex_planner.planning.warnings import find_arm_warnings
 from flex_planner.planning.weight_search import adapt_weights, check_objectives
+from flex_planner.planning.within_model import keep_model
 import numpy as np
 
 
@@ -204,7 +205,7 @@ def _keep(plan: Plan, solver: Solver, objectives: Objectives | None,
     # weights that meet an objective may well bring a motion back within its limits
     if objectives is not None and plan.certified:
         plan = adapt_weights(plan, objectives, solver)
-    within = keep_limits(plan, solver, effort)
+    within = keep_model(keep_limits(plan, solver, effort), solver, effort)
     if within is plan or objectives is None:
         return within
     return check_objectives(within, plan.objectives, objectives)
@@ -235,7 +236,7 @@ def _plan_smoothly(problem: MotionProblem, solver: Solver,
     if isinstance(start, Plan) and start.solution is not None and start.problem.layout.torques:
         plan = plan_problem(problem, solver, tuple(_given(start, problem, solver)))
         if plan.certified:
-            return keep_limits(plan, solver, effort)
+            return _keep(plan, solver, None, effort)
     task = without_torque_rates(problem.task)
     stiff = find_stiff_links(MotionProblem(problem.model, task, problem.parameters), solver)
     if stiff is not None:
@@ -246,7 +247,7 @@ def _plan_smoothly(problem: MotionProblem, solver: Solver,
                       strategies=strategies, search=effort)
     if plain.status is PlanStatus.INFEASIBLE:  # nor is a motion whose torques are less free
         return replace(plain, task=problem.task, problem=problem)
-    return keep_limits(plan_without_jumps(problem, plain, solver), solver, effort)
+    return _keep(plan_without_jumps(problem, plain, solver), solver, None, effort)
 
 
 def _not_possible(problem: MotionProblem, why: str) -> Plan:
