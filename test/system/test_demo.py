@@ -86,7 +86,7 @@ def test_arms_in_space_have_a_motion_to_a_point_too(name: str, space: int) -> No
 
 def test_arm_without_a_motion_is_refused_by_name() -> None:
     with pytest.raises(InvalidValueError, match='--arm is .* did you mean tudor_like'):
-        demo_motion('tudor')
+        demo_motion('tudorlike')
 
 
 def test_demonstration_waits_for_nodes_with_a_limit(ros: None) -> None:
