@@ -31,11 +31,10 @@ TASK = MotionTask(
     goal_point=Point(x=0.5, y=1.2, z=0.9), publish=True)
 GIVEN = ['-r', f'__ns:={SPACE}', '-p', f'arm:={FOLDER}/two_tubes.yaml',
          '-p', 'robot_description_topic:=robot_description']
-NODES = [  # as in a terminal, after tools/run
+NODES = [
     ['planner', '--ros-args', *GIVEN, '-p', 'search:=fast', '-p', 'allowed_planning_time:=90.0'],
     ['arm_simulator', '--ros-args', *GIVEN, '-p', f'payload_mass:={TASK.payload_mass}',
      '-p', f'initial_positions:={START}', '-r', 'joint_trajectory:=flex_planner/joint_trajectory']]
-FOLLOWED = f'{SPACE}/flex_planner/joint_trajectory'
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
@@ -54,16 +53,15 @@ def main() -> None:
         end = time.monotonic() + 120.0  # [s]; what was never compiled takes long
         while not done():
             rclpy.spin_once(node, timeout_sec=0.1)
-            if time.monotonic() > end:
-                raise SystemExit(f'no {what}')
+            assert time.monotonic() < end, f'no {what}'
 
     started = [subprocess.Popen(command) for command in NODES]
     try:
         wait('planner', planner.service_is_ready)
-        wait('arm', lambda: bool(states and node.count_subscribers(FOLLOWED)))
+        wait('arm', lambda: bool(states and node.count_subscribers(
+            f'{SPACE}/flex_planner/joint_trajectory')))
         print(f'joints: {", ".join(states[-1].name)}')
-        answer = planner.call_async(PlanPath.Request(task=TASK))
-        wait('answer', answer.done)
+        wait('answer', (answer := planner.call_async(PlanPath.Request(task=TASK))).done)
         report = answer.result().report
         assert report.error_code == PlanReport.NONE, report.error_msg
         print(f'J = {report.cost:.4g}, recorded in {report.recording}')
