@@ -36,7 +36,8 @@ setup(
                   'flex_planner.config': ['arm_template.yaml', 'arms/*.yaml', 'studies/*.yaml'],
                   'flex_planner.recording.flex_planner_interfaces': [
                       'msg/*.msg', 'srv/*.srv', 'action/*.action'],
-                  'flex_planner.reports.recording': ['arm.js', 'page.html', 'plots.js']},
+                  'flex_planner.reports.recording': [
+                      'arm.js', 'page.html', 'player.js', 'plots.js', 'space.js']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),

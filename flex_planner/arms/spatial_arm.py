@@ -14,7 +14,16 @@ from typing import TYPE_CHECKING
 from flex_planner.arms.arm import Arm, MAX_LINKS, Node
 from flex_planner.arms.quantities import check_quantity
 from flex_planner.arms.spatial_beam import CLAMPED, SpatialBeam
-from flex_planner.arms.spatial_body import as_point, IDENTITY, Matrix, Point, rotation, SpatialBody
+from flex_planner.arms.spatial_body import (
+    as_point,
+    IDENTITY,
+    inertia_matrix,
+    Matrix,
+    NO_INERTIA,
+    Point,
+    rotation,
+    SpatialBody,
+)
 from flex_planner.arms.spatial_body import point as checked_point
 from flex_planner.arms.spatial_joint import SpatialJoint
 from flex_planner.arms.spatial_link import SpatialLink
@@ -53,6 +62,9 @@ class SpatialArm(Arm):
     payload_inertia : float
         Its rotary inertia about that centre where a task gives none, the same about every axis,
         >= 0 [kg m^2].
+    payload_tensor : array_like, shape (3,) or (3, 3)
+        Rotary inertia of what the arm carries besides, whatever its mass: principal moments along
+        the axes of the tip, or a matrix in its frame [kg m^2].
     notes : tuple of str
         What was made of the file that the arm comes from, for people.
     joint_names : tuple of str
@@ -73,6 +85,7 @@ class SpatialArm(Arm):
     payload_com: Array = field(default_factory=lambda: np.zeros(3))
     base: Point = (0.0, 0.0, 0.0)
     tip_rotation: Matrix = IDENTITY
+    payload_tensor: Matrix = NO_INERTIA
     notes: tuple[str, ...] = ()
     joint_names: tuple[str, ...] = ()
     frame_names: tuple[str, ...] = ()
@@ -83,6 +96,7 @@ class SpatialArm(Arm):
                      joints: tuple[SpatialJoint, ...], gravity: ArrayLike = ...,
                      source: str = ..., payload_com: ArrayLike = ..., payload_inertia: float = ...,
                      base: ArrayLike = ..., tip_rotation: ArrayLike = ...,
+                     payload_tensor: ArrayLike = ...,
                      notes: tuple[str, ...] = ..., joint_names: tuple[str, ...] = ...,
                      frame_names: tuple[str, ...] = ...) -> None:
             """Accept a list where an array is kept."""
@@ -126,6 +140,8 @@ class SpatialArm(Arm):
         check_quantity('payload_inertia', self.payload_inertia, 'inertia', at_least=0)
         object.__setattr__(self, 'base', checked_point('base', self.base))
         object.__setattr__(self, 'tip_rotation', rotation('tip_rotation', self.tip_rotation))
+        object.__setattr__(self, 'payload_tensor',
+                           inertia_matrix('payload_tensor', self.payload_tensor))
         plain_names('notes', self.notes)
         for name, count in (('joint_names', n), ('frame_names', n + 2)):
             given = getattr(self, name)

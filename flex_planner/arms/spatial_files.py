@@ -90,8 +90,10 @@ def _common(top: YamlSection) -> dict[str, Any]:
                               'gravity': top.take('gravity', _GRAVITY)}
     if top.has('payload'):
         part = top.section('payload')
+        inertia = part.take('inertia', 0.0)
+        tensor = isinstance(inertia, list)
         values |= {'payload_com': part.take('center_of_mass', (0.0, 0.0, 0.0)),
-                   'payload_inertia': part.take('inertia', 0.0)}
+                   'payload_tensor' if tensor else 'payload_inertia': inertia}
         part.finish()
     return values
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import tip_position
+from flex_planner.control.extent import peak_to_peak
 from flex_planner.simulation.mismatch import Mismatch
 from flex_planner.simulation.settling import (
     ArrivalWatch,
     bending_peak_to_peak,
-    peak_to_peak,
     ResidualVibration,
 )
 import numpy as np
