@@ -7,7 +7,16 @@ from collections.abc import Sequence
 
 from flex_planner.base.version import VERSION
 from flex_planner.cli.command_parser import CommandParser
-from flex_planner.cli.commands import arm, cache, compare, identify, paper, plan, recordings
+from flex_planner.cli.commands import (
+    arm,
+    cache,
+    compare,
+    excite,
+    identify,
+    paper,
+    plan,
+    recordings,
+)
 from flex_planner.cli.commands import map as maps
 from flex_planner.cli.options import join_lists
 
@@ -27,6 +36,7 @@ def build_parser() -> argparse.ArgumentParser:
     plan.add_commands(commands)
     compare.add_command(commands)
     identify.add_command(commands)
+    excite.add_command(commands)
     maps.add_command(commands)
     paper.add_command(commands)
     cache.add_command(commands)
