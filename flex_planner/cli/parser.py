@@ -12,6 +12,7 @@ from flex_planner.cli.commands import (
     cache,
     compare,
     excite,
+    gains,
     identify,
     paper,
     plan,
@@ -35,6 +36,7 @@ def build_parser() -> argparse.ArgumentParser:
     arm.add_command(commands)
     plan.add_commands(commands)
     compare.add_command(commands)
+    gains.add_command(commands)
     identify.add_command(commands)
     excite.add_command(commands)
     maps.add_command(commands)

@@ -174,6 +174,44 @@ class ArmDynamics:
             first, reference, timing, controller, physical)
         return after[:, :state.size], after[:, state.size:], fifth, third
 
+    def feedback_steps(self, state: Array, reference: Array, timing: Array, law: Array,
+                       motors: Array, physical: Array) -> tuple[Array, Array, Array]:
+        """
+        Return what follows each of k steps under a linear law, and the errors of the steps.
+
+        The law is sampled at the beginning of steps, with the limits of motors at the speeds of
+        that instant, and its torques are held.
+
+        Parameters
+        ----------
+        state : numpy.ndarray, shape (4 n_t + 2 n,)
+            x (2 n_t,), the state of the law (2 n_t + n,) and torques (n,) before the first step.
+        reference : numpy.ndarray, shape (k, 2 n)
+            Angles that joints are compared with [rad], and efforts [N m].
+        timing : numpy.ndarray, shape (k, 2)
+            Length of each step [s], and 1 where the law is sampled at its beginning, else 0.
+        law : numpy.ndarray
+            A, B, C, D, E of `LinearFeedback`, each column by column.
+        motors : numpy.ndarray, shape (3 n + 1,)
+            Stall torque, torque lost per speed and largest torque of the joints; the resolution
+            of the encoders, 0 for exact ones [rad].
+        physical : numpy.ndarray
+            `PhysicalParameters.physical`.
+
+        Returns
+        -------
+        states : numpy.ndarray, shape (k, 4 n_t + 2 n)
+            As `state`, after each step.
+        fifth, third : numpy.ndarray, shape (k, 2 n_t)
+            As `runge_kutta_steps` has them.
+
+        """
+        first = np.zeros((len(reference), state.size))
+        first[0] = state
+        after, fifth, third = self._load('feedback_step').evaluate_chain(
+            first, reference, timing, law, motors, physical)
+        return after, fifth, third
+
     def held_step(self, physical: Array) -> HeldStep:
         """
         Return one such step under torques that are held, as a quick function.

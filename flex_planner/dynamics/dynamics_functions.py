@@ -36,6 +36,8 @@ def build_dynamics_functions(arm: Arm) -> dict[str, BatchedFunction]:
           estimates of the Dormand-Prince method of order 8
         - ``controlled_step`` ((x, feedback), reference, (step, sampled), controller) -> the same
           of a step under a joint controller, see `_controlled_step`
+        - ``feedback_step`` ((x, xi, u), reference, (step, sampled), law, motors) -> the same of a
+          step under a linear law that has a state of its own, see `_feedback_step`
         - ``inverse_dynamics`` (x, a) -> generalized forces, eq. (3)
         - ``mass_and_energy`` x -> M, kinetic energy, potential energy
         - ``static_forces`` q -> dV/dq, d2V/dq2 with V the potential energy
@@ -53,6 +55,7 @@ def build_dynamics_functions(arm: Arm) -> dict[str, BatchedFunction]:
         'forward_dynamics': rate,
         'runge_kutta_step': _runge_kutta_step(rate[0]),
         'controlled_step': _controlled_step(rate[0], arm.n_joints),
+        'feedback_step': _feedback_step(rate[0], arm.n_joints),
         'inverse_dynamics': batch('inverse_dynamics', [x, a], p, [chain.inverse_dynamics(a)]),
         'mass_and_energy': batch('mass_and_energy', [x], p,
                                  [M, chain.kinetic, chain.potential]),
@@ -121,6 +124,45 @@ def _controlled_step(rate: Any, n: int) -> BatchedFunction:
     after, fifth, third = _advance(limited, x, [*stages, last + held], timing[0], p)
     return ca.Function('controlled_step', [state, reference, timing, controller, p], [
         ca.vertcat(after, held), fifth, third]), 3
+
+
+def _feedback_step(rate: Any, n: int) -> BatchedFunction:
+    """
+    Return a step of DOP853 under efforts and a linear law, sampled and held within motor limits.
+
+    Inputs: x, the state xi of the law with 2 n_t + n entries, and the torques that are held;
+    angles that encoders should see, and efforts; the length of the step, and 1 where the law is
+    sampled at its beginning, else 0; its matrices A, B, C, D, E column by column, as
+    `LinearFeedback` has them; stall torques, what a motor loses of them by its speed, its largest
+    torque, and the resolution of the encoders. Outputs: the same state, two error estimates.
+
+    """
+    from scipy.integrate import DOP853
+
+    size = rate.size1_in(0)
+    order = size + n
+    state, p = ca.MX.sym('s', size + order + n), ca.MX.sym('p', rate.size1_in(2))
+    reference, timing = ca.MX.sym('r', 2 * n), ca.MX.sym('t', 2)
+    shapes = ((order, order), (order, n), (n, order), (n, n), (order, n))
+    law, motors = ca.MX.sym('l', sum(a * b for a, b in shapes)), ca.MX.sym('m', 3 * n + 1)
+    x, xi, held = ca.vertsplit(state, [0, size, size + order, size + order + n])
+    borders = [0]
+    for rows, columns in shapes:
+        borders.append(borders[-1] + rows * columns)
+    A, B, C, D, E = (ca.reshape(entries, *shape) for entries, shape in zip(
+        ca.vertsplit(law, borders), shapes, strict=True))
+    stall, loss, cap, resolution = ca.vertsplit(motors, [0, n, 2 * n, 3 * n, 3 * n + 1])
+    angles, efforts = ca.vertsplit(reference, n)
+    rounded = ca.floor(x[:n] / resolution + 0.5) * resolution
+    error = ca.if_else(resolution > 0, rounded, x[:n]) - angles
+    speeds = x[size // 2:size // 2 + n]
+    torques = clip(efforts + C @ xi + D @ error, *torque_bounds(stall, loss, cap, speeds))
+    following = A @ xi + B @ error + E @ (torques - efforts)
+    held += timing[1] * (torques - held)
+    xi += timing[1] * (following - xi)
+    after, fifth, third = _advance(rate, x, [held] * (DOP853.n_stages + 1), timing[0], p)
+    return ca.Function('feedback_step', [state, reference, timing, law, motors, p], [
+        ca.vertcat(after, xi, held), fifth, third]), 3
 
 
 def _advance(rate: Any, x: Any, torques: Sequence[Any], step: Any, p: Any) -> list[Any]:

@@ -236,7 +236,7 @@ def test_misspelt_preset_is_told_with_what_is_meant(capsys: pytest.CaptureFixtur
 
 
 def test_help_and_tables_name_no_equations(capsys: pytest.CaptureFixture[str]) -> None:
-    for command in ('arm', 'plan', 'payload', 'compare', 'map', 'report'):
+    for command in ('arm', 'plan', 'payload', 'compare', 'gains', 'map', 'report'):
         with pytest.raises(SystemExit):
             main([command, '--help'])
     assert re.search(r'\beqs?[. ]', capsys.readouterr().out) is None

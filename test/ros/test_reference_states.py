@@ -23,7 +23,7 @@ from flex_planner.ros.settings.planner import PlannerSettings
 import numpy as np
 import pytest
 from rclpy.clock import ROSClock
-from ros_support import PATIENCE, Planner
+from ros_support import LONG, PATIENCE, Planner
 from sensor_msgs.msg import JointState
 
 NAMES = ['joint1', 'joint2', 'link1_mode1', 'link1_mode2', 'link2_mode1', 'link2_mode2']
@@ -309,7 +309,7 @@ def test_all_states_come_while_the_solver_is_at_work(planner: Planner,
                                                      heard: list[Heard]) -> None:
     heard.clear()
     planner.report(publish=True, duration=2.0)
-    goal = planner.plan_goal(duration=100.0)
+    goal = planner.plan_goal(**LONG)
     planner.wait('all states', lambda: len(heard) == 201)
     assert not goal.answer.done()
     assert goal.cancel()

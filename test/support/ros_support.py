@@ -43,6 +43,11 @@ PATIENCE = 60.0  # [s], for anything else that comes by itself
 LEAVING = 20.0  # [s], less than the plan takes that a node is at work on meanwhile
 SUPPORT = Path(__file__).parent
 PARAMETER_FILE = Path(__file__).parents[2] / 'config' / 'planner.yaml'
+# keeps the solver of the flexible arm at work until a limit: its links ring at the start, and
+# nothing damps the hundreds of swings that the motion has to follow
+LONG: dict[str, Any] = {
+    'space': MotionTask.JOINT, 'start_positions': [1.0, -2.0], 'goal_positions': [1.5, -1.5],
+    'start_modal_displacements': [0.02, 0.0, 0.02, 0.0], 'duration': 100.0}
 SomeClient = TypeVar('SomeClient', bound='Client')
 _NUMBERS = itertools.count(1)
 

@@ -10,11 +10,11 @@ from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
 from flex_planner.control.joint_controller import JointController
 from flex_planner.control.joint_reference import JointReference
+from flex_planner.control.linearisation import hold_inputs, linearise_dynamics
 from flex_planner.dynamics.statics import equilibrium
 from flex_planner.planning.execution import Execution
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.published_motion import PublishedMotion
-from flex_planner.planning.robust.linearisation import hold_inputs, linearise_dynamics
 from flex_planner.planning.robust.objective import WATCHED
 import numpy as np
 

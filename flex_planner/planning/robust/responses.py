@@ -14,12 +14,12 @@ from dataclasses import dataclass
 
 from flex_planner.base.validation import Array
 from flex_planner.control.joint_controller import Gains
+from flex_planner.control.linearisation import hold_inputs, linearise_dynamics
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.statics import natural_modes
 from flex_planner.optimal_control.torque_limits import TorqueLimits
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.robust.arrivals import Arrival
-from flex_planner.planning.robust.linearisation import hold_inputs, linearise_dynamics
 import numpy as np
 
 # steps: the fewest and the most, and for each cycle of the fastest vibration

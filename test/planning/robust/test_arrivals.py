@@ -7,11 +7,11 @@ from dataclasses import replace
 from factories import PlanFactory
 from flex_planner.base.progress import Monitor
 from flex_planner.control.joint_controller import JointController
+from flex_planner.control.linearisation import hold_inputs, linearise_dynamics
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.robust.arrivals import tabulate_reference
 from flex_planner.planning.robust.differing_plans import CarriedOut, DifferingArms
-from flex_planner.planning.robust.linearisation import hold_inputs, linearise_dynamics
 from flex_planner.planning.robust.objective import Robustness
 from flex_planner.simulation.settling import bending_peak_to_peak
 import numpy as np

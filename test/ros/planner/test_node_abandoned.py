@@ -23,7 +23,8 @@ from rclpy.action import ActionClient
 rclpy.init()
 node = rclpy.create_node('impatient')
 task = MotionTask(start_positions=[1.0, -2.0], goal_positions=[1.5, -1.5], duration=100.0,
-                  effort_weights=[0.1, 0.1], allowed_planning_time=600.0)
+                  start_modal_displacements=[0.02, 0.0, 0.02, 0.0], effort_weights=[0.1, 0.1],
+                  allowed_planning_time=600.0)
 client = ActionClient(node, PlanPath, '/abandoned/plan_path')
 service = node.create_client(PlanService, '/abandoned/plan_path')
 assert client.wait_for_server(60) and service.wait_for_service(60)

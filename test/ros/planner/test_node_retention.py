@@ -8,11 +8,10 @@ from action_msgs.msg import GoalStatus
 from flex_planner.recording import read_metadata
 from flex_planner.reports.recording import RecordedRequest
 from flex_planner_interfaces.msg import PlanReport
-from ros_support import Planner
+from ros_support import LONG, Planner
 from trajectory_msgs.msg import JointTrajectory
 
 REMAPPED = {'~/joint_trajectory': '/controller/trajectory'}
-LONG = {'duration': 1.5, 'payload_mass': 5.0}
 
 
 def folders(planner: Planner) -> list[Path]:

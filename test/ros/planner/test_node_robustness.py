@@ -13,7 +13,7 @@ from flex_planner_interfaces.msg import FlexibleTrajectory, MotionTask, PlanRepo
 import pytest
 from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import SetParameters
-from ros_support import Planner, SUPPORT
+from ros_support import LONG, Planner, SUPPORT
 from trajectory_msgs.msg import JointTrajectory
 
 QUEUE = 8
@@ -125,12 +125,12 @@ def test_node_ends_in_good_order_while_requests_pour_in(
     planner = flooded[number]
     planner.plan(duration=-1.0)
     planner.plan_goal(duration=-1.0).end()
-    planner.send_plan(duration=100.0)
+    planner.send_plan(**LONG)
     planner.spin(0.3)  # it is at work from here on
     for _ in range(20):
-        planner.send_plan(duration=100.0)
-        planner.send_search(duration=100.0)
-    planner.plan_goal(duration=100.0)
+        planner.send_plan(**LONG)
+        planner.send_search(**LONG)
+    planner.plan_goal(**LONG)
     assert planner.stop(number) == 0
     assert 'Traceback' not in planner.log()
     assert not list(planner.recordings.glob('.*'))

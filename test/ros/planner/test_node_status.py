@@ -14,7 +14,7 @@ from flex_planner.ros.planner.diagnostics import Record, SUBSCRIBERS
 from flex_planner_interfaces.msg import PlanReport
 import numpy as np
 import pytest
-from ros_support import Planner
+from ros_support import LONG, Planner
 from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -93,7 +93,7 @@ def test_status_counts_the_requests_and_warns_of_the_last_that_failed(
 
 def test_status_tells_the_phase_and_the_queue(planner: Planner,
                                               heard: list[DiagnosticArray]) -> None:
-    goals = [planner.plan_goal(duration=100.0), planner.plan_goal()]
+    goals = [planner.plan_goal(**LONG), planner.plan_goal()]
     planner.spin(0.3)
     status = next_status(planner, heard)
     told = values(status)
