@@ -36,7 +36,8 @@ setup(
                   'flex_planner.config': ['arm_template.yaml', 'arms/*.yaml', 'studies/*.yaml'],
                   'flex_planner.recording.flex_planner_interfaces': [
                       'msg/*.msg', 'srv/*.srv', 'action/*.action'],
-                  'flex_planner.reports.recording': ['arm.js', 'page.html', 'plots.js']},
+                  'flex_planner.reports.recording': [
+                      'arm.js', 'page.html', 'player.js', 'plots.js', 'space.js']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),
@@ -44,6 +45,7 @@ setup(
         (f'share/{package_name}/config/arms', glob('config/arms/*.yaml')),
         (f'share/{package_name}/config/studies', glob('config/studies/*.yaml')),
         (f'share/{package_name}/launch', glob('launch/*.py')),
+        (f'share/{package_name}/rviz', glob('rviz/*.rviz')),
     ],
     install_requires=[
         'casadi>=3.6.7',

@@ -19,6 +19,7 @@ import time
 from typing import NamedTuple
 
 from flex_planner import Arm, load_arm, plan_path, Task
+from flex_planner.arms.joint import Elasticity
 from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectSettings
@@ -50,8 +51,19 @@ def with_modes(modes: int, twist: int) -> Arm:
     return replace(arm, links=tuple(links))
 
 
+def panda(elastic: int = 4) -> Arm:
+    """Return the Panda with its first joints elastic, those of the wrist with half the spring."""
+    arm = load_arm('panda_elastic')
+    spring = Elasticity(stiffness=8000.0, damping=1.6)
+    joints = [joint if i >= elastic or joint.elasticity else replace(joint, elasticity=spring)
+              for i, joint in enumerate(arm.joints)]
+    return replace(arm, joints=tuple(joints))
+
+
 _UR5 = [0, -1.2, 1.2, -1.5, -1.5, 0.0], [1.0, -0.8, 0.9, -1.0, -1.2, 0.5]
 _3R = [0, -0.3, 0.9], [1.2, -0.6, 0.4]
+_PANDA = [0, -0.785, 0, -2.356, 0, 1.571, 0.785]
+_NEAR, _FAR = [0.5, -0.5, 0.3, -2.0, 0.2, 1.8, 1.0], [1.2, 0.3, 0.5, -1.5, 0.4, 2.0, 1.2]
 CASES: dict[str, Case] = {
     '3R': Case(lambda: load_arm('spatial_3r'), *_3R, 1.0, 0.5),
     '3R, 1 kg in 1.5 s': Case(lambda: load_arm('spatial_3r'), *_3R, 1.5, 1.0),
@@ -60,6 +72,13 @@ CASES: dict[str, Case] = {
     'TUDOR-like': Case(lambda: load_arm('tudor_like'), [0, -0.5, 1.0], [1.0, -1.0, 0.6], 1.0, 0.1),
     'UR5, rigid': Case(lambda: load_arm('ur5_elastic').rigid(), *_UR5, 1.2, 2.0),
     'UR5, joints 1 to 3 elastic': Case(lambda: load_arm('ur5_elastic'), *_UR5, 1.2, 1.5),
+    'Panda, joints 1 to 4 elastic, near': Case(panda, _PANDA, _NEAR, 0.8, 1.0),
+    'Panda, joints 1 to 4 elastic, far': Case(panda, _PANDA, _FAR, 1.2, 1.0),
+    'Panda, all joints elastic, near': Case(lambda: panda(7), _PANDA, _NEAR, 0.8, 1.0),
+    'Panda, all joints elastic, far': Case(lambda: panda(7), _PANDA, _FAR, 1.2, 1.0),
+    'SCARA': Case(lambda: load_arm('scara_elastic'), [-0.7, 1.05, -0.05, 0],
+                  [0.9, 1.4, -0.15, 1.57], 0.6, 2.0),
+    'gantry': Case(lambda: load_arm('gantry_beam'), [0.5, 0.5], [2.0, 1.2], 1.5, 2.0),
 }
 
 

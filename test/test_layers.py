@@ -135,7 +135,7 @@ def test_casadi_is_imported_only_to_derive_and_to_compile() -> None:
         'optimal_control.path_constraints.symbolic_arm',
         'optimal_control.pontryagin',
         'optimal_control.rate_jacobian', 'optimal_control.running_cost',
-        'optimal_control.torque_limits'}
+        'optimal_control.torque_limits', 'optimal_control.torque_rate_conditions'}
 
 
 def test_kinematics_and_dynamics_can_check_each_other() -> None:

@@ -15,9 +15,15 @@ from pathlib import Path
 import sys
 from typing import Any, NoReturn
 
-from flex_planner.arms.arm import Arm, BeamSection, Elasticity, Joint, Link, Motor, Node
+from flex_planner.arms.arm import Arm, BeamSection, Joint, Link, Node
 from flex_planner.arms.arm_fields import read_joint, read_link, read_node, read_payload
-from flex_planner.arms.planar_only import require_planar
+from flex_planner.arms.plain_spatial_arm import (
+    is_plain_spatial,
+    joint_values,
+    plain_spatial_arm,
+    spatial_arm_from_plain,
+)
+from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.arms.spatial_files import is_spatial, read_spatial_arm
 from flex_planner.arms.urdf import UrdfError
 from flex_planner.base.errors import FlexPlannerError, InvalidValueError
@@ -117,7 +123,7 @@ def read_arm_template() -> str:
     raise ArmFileError('arm_template.yaml is not installed')
 
 
-def load_arm(name: str | os.PathLike[str]) -> Arm:
+def load_arm(name: str | os.PathLike[str], description: str = '') -> Arm:
     """
     Return the arm described by a preset or a file.
 
@@ -125,6 +131,9 @@ def load_arm(name: str | os.PathLike[str]) -> Arm:
     ----------
     name : str or path
         Name of a preset in ``config/arms``, or path of a YAML file; ``-`` is the standard input.
+    description : str
+        Text of a URDF file, a ``robot_description``: it stands for the one that the arm file
+        names, which need not name any then.
 
     Raises
     ------
@@ -134,7 +143,8 @@ def load_arm(name: str | os.PathLike[str]) -> Arm:
     """
     path = find_arm_file(os.fspath(name))
     try:
-        return arm_from_mapping(read_yaml(path)[1], folder=path.parent)
+        return arm_from_mapping(read_yaml(path)[1], folder=path.parent,
+                                description=description)
     except YamlFileError as error:
         raise ArmFileError(str(error)) from None
     except UrdfError as error:
@@ -143,7 +153,8 @@ def load_arm(name: str | os.PathLike[str]) -> Arm:
         raise ArmFileError(f'{say_file(path)}: {error}') from error
 
 
-def arm_from_mapping(content: object, path: str = '', folder: Path = Path()) -> Arm:
+def arm_from_mapping(content: object, path: str = '', folder: Path = Path(),
+                     description: str = '') -> Arm:
     """
     Return the arm described by the content of an arm file.
 
@@ -155,6 +166,8 @@ def arm_from_mapping(content: object, path: str = '', folder: Path = Path()) -> 
         Where it stands in another file, for messages.
     folder : pathlib.Path
         In which the path of a URDF file begins.
+    description : str
+        As of `load_arm`.
 
     Raises
     ------
@@ -165,8 +178,8 @@ def arm_from_mapping(content: object, path: str = '', folder: Path = Path()) -> 
 
     """
     top = YamlSection(path, content)
-    if is_spatial(top):
-        return read_spatial_arm(top, folder)
+    if is_spatial(top) or description:
+        return read_spatial_arm(top, folder, description)
     arm: Arm = top.build(
         Arm, name=top.text('name'), source=top.text('source', ''),
         links=tuple(read_link(section) for section in top.sections('links')),
@@ -181,16 +194,12 @@ def plain_arm(arm: Arm) -> dict[str, Any]:
     """
     Return all values of an arm as YAML can write them.
 
-    They are the fields of `Arm` and its parts in SI units, which keep an arm in the metadata of
-    recordings and maps; an arm file may say the same in other quantities.
-
-    Raises
-    ------
-    PlanarOnlyError
-        If the arm is a spatial one.
+    They are the fields of `Arm` or `SpatialArm` and its parts in SI units, which keep an arm in
+    the metadata of recordings and maps; an arm file may say the same in other quantities.
 
     """
-    require_planar(arm, 'recordings and maps')
+    if isinstance(arm, SpatialArm):
+        return plain_spatial_arm(arm)
     return {**asdict(arm), 'gravity': arm.gravity.tolist(),
             'payload_com': arm.payload_com.tolist()}
 
@@ -209,6 +218,8 @@ def arm_from_plain(fields: Mapping[str, Any]) -> Arm:
         If a field is unknown or missing.
 
     """
+    if is_plain_spatial(fields):
+        return spatial_arm_from_plain(fields)
     return Arm(**{**fields, 'links': tuple(_link(entry) for entry in fields['links']),
                   'joints': tuple(_joint(entry) for entry in fields['joints']),
                   'nodes': tuple(Node(**entry) for entry in fields['nodes'])})
@@ -222,9 +233,5 @@ def _link(fields: Mapping[str, Any]) -> Link:
 
 def _joint(fields: Mapping[str, Any]) -> Joint:
     """Return a joint of its plain values."""
-    parts: dict[str, Any] = {'motor': Motor(**{'max_torque': math.inf, **fields['motor']})}
-    if fields.get('elasticity') is not None:
-        parts['elasticity'] = Elasticity(**fields['elasticity'])
-    if 'housing' in fields:
-        parts['housing'] = Node(**fields['housing'])
-    return Joint(**{**fields, **parts})
+    motor = {'max_torque': math.inf, **fields['motor']}
+    return Joint(**joint_values({**fields, 'motor': motor}))

@@ -9,6 +9,7 @@ along x, so that as little as possible has to be rotated.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 from flex_planner.arms.arm import Arm
@@ -63,7 +64,7 @@ def _link(arm: SpatialArm, index: int, joint: SpatialJoint,
         turned, axes = clean(axes @ beam_axes), beam_axes.T
     beam = _beam(arm, index, axes)
     made = MechanismLink(
-        base=_base(arm, index, axes), beam=beam, end=link.tip_body.about(np.zeros(3), axes),
+        base=_base(arm, index, axes), beam=beam, end=_end(arm, index, axes),
         position=np.array(arm.base) if index == 0 else np.zeros(3), rotation=before, axis=axis,
         sign=sign, slides=joint.slides, turned=turned,
         tip_order=_tip_order(arm, index, axes), rotor=joint.motor.reflected_inertia,
@@ -106,6 +107,16 @@ def _base(arm: SpatialArm, index: int, axes: Array) -> RigidBody:
     return RigidBody(mass=body.mass + rod.mass,
                      first_moment=body.first_moment + turn @ rod.first_moment,
                      inertia=clean(body.inertia + turn @ rod.inertia @ turn.T))
+
+
+def _end(arm: SpatialArm, index: int, axes: Array) -> RigidBody:
+    """Return what is fixed to the end of a link, the payload's tensor included."""
+    body = arm.links[index].tip_body.about(np.zeros(3), axes)
+    if index < arm.n_joints - 1 or not np.any(arm.payload_tensor):
+        return body
+    tip = axes @ np.array(arm.tip_rotation)
+    carried = tip @ np.array(arm.payload_tensor) @ tip.T
+    return replace(body, inertia=clean(body.inertia + (carried + carried.T) / 2))
 
 
 def _tip_order(arm: SpatialArm, index: int, axes: Array) -> tuple[int, ...]:

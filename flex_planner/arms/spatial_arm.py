@@ -14,11 +14,21 @@ from typing import TYPE_CHECKING
 from flex_planner.arms.arm import Arm, MAX_LINKS, Node
 from flex_planner.arms.quantities import check_quantity
 from flex_planner.arms.spatial_beam import CLAMPED, SpatialBeam
-from flex_planner.arms.spatial_body import as_point, IDENTITY, Matrix, Point, rotation, SpatialBody
+from flex_planner.arms.spatial_body import (
+    as_point,
+    IDENTITY,
+    inertia_matrix,
+    Matrix,
+    NO_INERTIA,
+    Point,
+    rotation,
+    SpatialBody,
+)
 from flex_planner.arms.spatial_body import point as checked_point
 from flex_planner.arms.spatial_joint import SpatialJoint
 from flex_planner.arms.spatial_link import SpatialLink
-from flex_planner.base.errors import InvalidValueError
+from flex_planner.base.errors import InvalidSizeError, InvalidValueError
+from flex_planner.base.sentences import count_of
 from flex_planner.base.text import LONGEST_NAME, printable
 from flex_planner.base.validation import Array, integer, plain_names, vector
 import numpy as np
@@ -52,8 +62,15 @@ class SpatialArm(Arm):
     payload_inertia : float
         Its rotary inertia about that centre where a task gives none, the same about every axis,
         >= 0 [kg m^2].
+    payload_tensor : array_like, shape (3,) or (3, 3)
+        Rotary inertia of what the arm carries besides, whatever its mass: principal moments along
+        the axes of the tip, or a matrix in its frame [kg m^2].
     notes : tuple of str
         What was made of the file that the arm comes from, for people.
+    joint_names : tuple of str
+        Of the joints, where the file names them; empty, or one per joint.
+    frame_names : tuple of str
+        Of the base, the links and the tip, where the file names them; empty, or n + 2.
 
     Raises
     ------
@@ -68,7 +85,10 @@ class SpatialArm(Arm):
     payload_com: Array = field(default_factory=lambda: np.zeros(3))
     base: Point = (0.0, 0.0, 0.0)
     tip_rotation: Matrix = IDENTITY
+    payload_tensor: Matrix = NO_INERTIA
     notes: tuple[str, ...] = ()
+    joint_names: tuple[str, ...] = ()
+    frame_names: tuple[str, ...] = ()
 
     if TYPE_CHECKING:
         # arrays are made of anything like one; type checkers would insist on arrays
@@ -76,7 +96,9 @@ class SpatialArm(Arm):
                      joints: tuple[SpatialJoint, ...], gravity: ArrayLike = ...,
                      source: str = ..., payload_com: ArrayLike = ..., payload_inertia: float = ...,
                      base: ArrayLike = ..., tip_rotation: ArrayLike = ...,
-                     notes: tuple[str, ...] = ...) -> None:
+                     payload_tensor: ArrayLike = ...,
+                     notes: tuple[str, ...] = ..., joint_names: tuple[str, ...] = ...,
+                     frame_names: tuple[str, ...] = ...) -> None:
             """Accept a list where an array is kept."""
 
     @classmethod
@@ -118,7 +140,14 @@ class SpatialArm(Arm):
         check_quantity('payload_inertia', self.payload_inertia, 'inertia', at_least=0)
         object.__setattr__(self, 'base', checked_point('base', self.base))
         object.__setattr__(self, 'tip_rotation', rotation('tip_rotation', self.tip_rotation))
+        object.__setattr__(self, 'payload_tensor',
+                           inertia_matrix('payload_tensor', self.payload_tensor))
         plain_names('notes', self.notes)
+        for name, count in (('joint_names', n), ('frame_names', n + 2)):
+            given = getattr(self, name)
+            plain_names(name, given)
+            if len(given) not in (0, count):
+                raise InvalidSizeError(name, count_of(len(given), 'name'), f'{count}, or none')
         if not self.reach:
             raise InvalidValueError('links', 'all of length 0', 'with an end apart from a joint')
 

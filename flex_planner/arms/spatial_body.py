@@ -17,7 +17,7 @@ Point = tuple[float, float, float]
 Matrix = tuple[Point, Point, Point]
 
 IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-_NONE: Matrix = ((0.0, 0.0, 0.0),) * 3
+NO_INERTIA: Matrix = ((0.0, 0.0, 0.0),) * 3
 # of the largest principal moment
 _ROUNDING = 1e-9
 # of entries of a rotation
@@ -48,13 +48,13 @@ class SpatialBody:
 
     mass: float = 0.0
     center_of_mass: Point = (0.0, 0.0, 0.0)
-    inertia: Matrix = _NONE
+    inertia: Matrix = NO_INERTIA
 
     def __post_init__(self) -> None:
         check_quantity('mass', self.mass, 'mass', at_least=0)
         object.__setattr__(self, 'center_of_mass',
                            point('center_of_mass', self.center_of_mass))
-        object.__setattr__(self, 'inertia', _inertia(self.inertia))
+        object.__setattr__(self, 'inertia', inertia_matrix('inertia', self.inertia))
 
     @property
     def is_nothing(self) -> bool:
@@ -169,18 +169,18 @@ def clean(matrix: Array) -> Array:
     return np.where(np.abs(matrix - near) < 1e-14, near, cleaned) + 0.0
 
 
-def _inertia(values: ArrayLike) -> Matrix:
-    """Return a checked inertia."""
+def inertia_matrix(field: str, values: ArrayLike) -> Matrix:
+    """Return a checked inertia of three principal moments, or a symmetric matrix [kg m^2]."""
     if np.ndim(values) == 1:
-        moments = vector('inertia', values, 3, at_least=0, unit='kg m^2')
+        moments = vector(field, values, 3, at_least=0, unit='kg m^2')
         matrix = np.diag(moments)
     else:
-        matrix = square('inertia', values)
+        matrix = square(field, values)
     size = np.abs(matrix).max()
     if np.abs(matrix - matrix.T).max() > _ROUNDING * size:
-        raise InvalidValueError('inertia', matrix.tolist(), 'symmetric')
+        raise InvalidValueError(field, matrix.tolist(), 'symmetric')
     if np.linalg.eigvalsh(matrix)[0] < -_ROUNDING * size:
-        raise InvalidValueError('inertia', matrix.tolist(), 'without negative principal moments')
+        raise InvalidValueError(field, matrix.tolist(), 'without negative principal moments')
     for entry in matrix.ravel():
-        check_quantity('inertia', abs(float(entry)), 'inertia', at_least=0)
+        check_quantity(field, abs(float(entry)), 'inertia', at_least=0)
     return as_matrix(matrix)

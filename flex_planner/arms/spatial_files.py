@@ -28,7 +28,7 @@ from flex_planner.arms.spatial_body import (
 )
 from flex_planner.arms.spatial_joint import SpatialJoint
 from flex_planner.arms.spatial_link import SpatialLink
-from flex_planner.arms.urdf import read_urdf, Urdf, UrdfJoint
+from flex_planner.arms.urdf import read_urdf, read_urdf_text, Urdf, UrdfJoint
 from flex_planner.arms.urdf_chain import ChainLink, find_chain, UrdfChain, whole_body
 from flex_planner.base.errors import InvalidSizeError, InvalidValueError
 from flex_planner.base.sentences import count_of
@@ -38,6 +38,7 @@ from flex_planner.base.yaml_files import YamlSection
 import numpy as np
 
 SPATIAL = 'spatial'
+ROBOT_DESCRIPTION = 'robot_description'
 _GRAVITY = (0.0, 0.0, -9.81)
 # of masses that are compared
 _ALIKE = 1e-3
@@ -55,7 +56,7 @@ def is_spatial(top: YamlSection) -> bool:
     return bool(kind == SPATIAL)
 
 
-def read_spatial_arm(top: YamlSection, folder: Path) -> SpatialArm:
+def read_spatial_arm(top: YamlSection, folder: Path, description: str = '') -> SpatialArm:
     """
     Return the arm of a file.
 
@@ -65,6 +66,8 @@ def read_spatial_arm(top: YamlSection, folder: Path) -> SpatialArm:
         The file, `is_spatial`.
     folder : pathlib.Path
         In which the path of a URDF file begins.
+    description : str
+        Text of a URDF file in place of the one that the file names, which need not name any.
 
     Raises
     ------
@@ -74,7 +77,9 @@ def read_spatial_arm(top: YamlSection, folder: Path) -> SpatialArm:
         If the URDF file is missing or wrong.
 
     """
-    values = {**_common(top), **(_of_urdf(top, folder) if top.has('urdf') else _alone(top))}
+    named = top.has('urdf')
+    values = {**_common(top), **(_of_urdf(top, folder, description) if named or description
+                                 else _alone(top))}
     arm: SpatialArm = top.build(SpatialArm, **values)
     return arm
 
@@ -85,8 +90,10 @@ def _common(top: YamlSection) -> dict[str, Any]:
                               'gravity': top.take('gravity', _GRAVITY)}
     if top.has('payload'):
         part = top.section('payload')
+        inertia = part.take('inertia', 0.0)
+        tensor = isinstance(inertia, list)
         values |= {'payload_com': part.take('center_of_mass', (0.0, 0.0, 0.0)),
-                   'payload_inertia': part.take('inertia', 0.0)}
+                   'payload_tensor' if tensor else 'payload_inertia': inertia}
         part.finish()
     return values
 
@@ -144,9 +151,11 @@ def _read_link(section: YamlSection, end: Any) -> SpatialLink:
     return link
 
 
-def _of_urdf(top: YamlSection, folder: Path) -> dict[str, Any]:
+def _of_urdf(top: YamlSection, folder: Path, description: str) -> dict[str, Any]:
     """Return the fields of an arm from a URDF file and what the overlay says of it."""
-    urdf = read_urdf(top.text('urdf'), folder)
+    path = top.text('urdf', '')
+    urdf = (read_urdf_text(description, ROBOT_DESCRIPTION) if description
+            else read_urdf(path, folder))
     if top.has('kind'):
         is_spatial(top)
     locked = top.section('locked_joints', {})
@@ -179,7 +188,8 @@ class _Overlay:
             'joints': tuple(self._joint(link, joints.get(link.joint.name))
                             for link in self._chain.links),
             'links': tuple(self._link(link, links.get(link.name)) for link in self._chain.links),
-            'notes': tuple(self._notes)}
+            'notes': tuple(self._notes), 'joint_names': tuple(joint_names),
+            'frame_names': (self._chain.base_name, *names, self._chain.tip_name)}
 
     def _sections(self, field: str, names: list[str]) -> dict[str, YamlSection]:
         """Return what the file says of links or joints, by name."""

@@ -79,13 +79,13 @@ def spatial_inverse_kinematics(arm: SpatialArm, point: ArrayLike, near: ArrayLik
     return posture
 
 
-def spatial_posture_near_point(arm: SpatialArm, point: ArrayLike,
-                               near: ArrayLike | None = None) -> Array:
+def spatial_posture_near_point(arm: SpatialArm, point: ArrayLike, near: ArrayLike | None = None,
+                               *, orientation: ArrayLike | None = None) -> Array:
     """
     Return joint coordinates from which those of the arm at rest with its tip at a point are found.
 
     They are those of `spatial_inverse_kinematics`; where gravity bends the arm, those nearest to
-    the point if they are within a twentieth of the reach from it.
+    the point, or the pose, if they are within a twentieth of the reach and of a radian from it.
 
     Raises
     ------
@@ -95,10 +95,12 @@ def spatial_posture_near_point(arm: SpatialArm, point: ArrayLike,
     """
     if arm.bends_at_rest:
         _check_reach(arm, vector('point', point, 3, unit='m'), _SAGS)
-        posture, miss = _search(_Target(arm, vector('point', point, 3, unit='m'), None), near)
+        posture, miss = _search(_Target(
+            arm, vector('point', point, 3, unit='m'), None if orientation is None else np.array(
+                rotation('orientation', orientation))), near)
         if _EXACT < miss <= _SAGS:
             return posture
-    return spatial_inverse_kinematics(arm, point, near)
+    return spatial_inverse_kinematics(arm, point, near, orientation=orientation)
 
 
 def check_spatial_singularity(arm: SpatialArm, positions: Array,
@@ -180,7 +182,7 @@ class _Target:
         away = (place - self.point) / self.arm.reach
         if self._orientation is None:
             return away
-        return np.concatenate([away, _turn_between(self._orientation, axes)])
+        return np.concatenate([away, turn_between(self._orientation, axes)])
 
     def slope(self, positions: Array) -> Array:
         """Return its derivative by the joint coordinates, that of the turn for small ones."""
@@ -192,7 +194,7 @@ class _Target:
         return np.concatenate([positions, np.zeros(self.arm.n_passive)])
 
 
-def _turn_between(wanted: Array, axes: Array) -> Array:
+def turn_between(wanted: Array, axes: Array) -> Array:
     """Return the rotation vector from wanted axes to others, in the axes of the base [rad]."""
     turn = axes @ wanted.T
     vector_part: Array = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0],

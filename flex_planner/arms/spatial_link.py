@@ -160,6 +160,13 @@ class SpatialLink:
         return (self if self.beam is None
                 else replace(self, beam=self.beam.with_rigidity(factor)))
 
+    def with_modes(self, count: int) -> SpatialLink:
+        """Return the same link with so many modes in each plane that has any; 0: rigid."""
+        if self.beam is None or not count:
+            return self.rigid()
+        first, second = (count if given else 0 for given in self.beam.modes)
+        return replace(self, beam=replace(self.beam, modes=(first, second)))
+
     def with_more_modes(self, more: int) -> SpatialLink:
         """Return the same link with so many modes more in each plane that has any."""
         if self.beam is None:

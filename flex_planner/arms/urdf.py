@@ -140,19 +140,37 @@ def read_urdf(given: str, folder: Path) -> Urdf:
     Raises
     ------
     UrdfError
-        If it cannot be found, read or expanded, or is no XML.
-    InvalidValueError
-        If something in it is wrong; the message names the element.
+        If it cannot be found, read or expanded, or as `read_urdf_text`.
 
     """
     path = _find(given, folder)
-    text = _expand(path) if path.suffix == '.xacro' else _text(path)
+    return read_urdf_text(_expand(path) if path.suffix == '.xacro' else _text(path),
+                          say_file(path))
+
+
+def read_urdf_text(text: str, source: str) -> Urdf:
+    """
+    Return what the text of a URDF file says.
+
+    Parameters
+    ----------
+    text : str
+        Not of a ``.xacro`` file.
+    source : str
+        Where it comes from, for messages.
+
+    Raises
+    ------
+    UrdfError
+        If it is no XML, or something in it is wrong; the message names the element.
+
+    """
     try:
         return parse_urdf(text)
     except ElementTree.ParseError as error:
-        raise UrdfError(f'{say_file(path)}: is no XML: {error}') from None
+        raise UrdfError(f'{source}: is no XML: {error}') from None
     except InvalidValueError as error:
-        raise UrdfError(f'{say_file(path)}: {error}') from None
+        raise UrdfError(f'{source}: {error}') from None
 
 
 def parse_urdf(text: str) -> Urdf:

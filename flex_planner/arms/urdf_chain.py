@@ -64,6 +64,8 @@ class UrdfChain:
         Of the tip in the frame of the last link.
     notes : tuple of str
         What was merged and locked.
+    base_name, tip_name : str
+        Links of the file.
 
     """
 
@@ -71,6 +73,8 @@ class UrdfChain:
     base: Point
     tip_rotation: Array
     notes: tuple[str, ...]
+    base_name: str
+    tip_name: str
 
 
 def find_chain(urdf: Urdf, base: str | None, tip: str | None,
@@ -148,7 +152,7 @@ class _Finder:
             place, turn = np.zeros(3), np.eye(3)
         links[-1] = _ended(links[-1], place)
         return UrdfChain(links=tuple(links), base=start, tip_rotation=turn,
-                         notes=tuple(self.notes))
+                         notes=tuple(self.notes), base_name=base, tip_name=tip)
 
     def _link(self, joint: UrdfJoint, turn: Array, on_path: set[str]) -> ChainLink:
         """Return a link with what is fixed to it."""

@@ -37,6 +37,7 @@ from flex_planner.planning.proofs import (
     Proof,
     prove_not_held,
 )
+from flex_planner.planning.smooth_torques import refuse_torque_rates
 from flex_planner.planning.strategies.extremals import SearchStart
 import numpy as np
 
@@ -142,6 +143,7 @@ def stays(task: Task) -> bool:
 
 def _check(task: Task) -> None:
     """Refuse a task that has no largest payload."""
+    refuse_torque_rates(task, 'a search for the largest payload')
     if not np.isfinite([joint.motor.standstill_torque for joint in task.arm.joints]).any():
         raise InvalidTaskError('no motor of the arm has a stall torque, so no payload is the '
                                'largest')

@@ -29,8 +29,10 @@ from flex_planner.planning.kinds.effort import SearchEffort
 from flex_planner.planning.plan import PlanStatus
 from flex_planner.planning.plan_problem import STOP_STATUS
 from flex_planner.planning.proofs import bound_duration, guess_duration, prove_not_held
+from flex_planner.planning.smooth_torques import refuse_torque_rates
 from flex_planner.planning.strategies.extremals import SearchStart
 from flex_planner.planning.strategies.free_parameters import DURATION
+from flex_planner.planning.within_model import bound_by_limits
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -68,7 +70,7 @@ def find_min_duration(task: Task, *, model: ArmModel | None = None,
     ------
     InvalidTaskError
         If a motor has no limit, if the arm need not come to rest at the goal, or if there are via
-        points.
+        points, or rates of torques with a price or a bound.
     InvalidValueError
         If the accuracy breaks its bound.
 
@@ -79,6 +81,7 @@ def find_min_duration(task: Task, *, model: ArmModel | None = None,
     if not np.isfinite([joint.motor.standstill_torque for joint in task.arm.joints]).all():
         raise InvalidTaskError('a motor of the arm has no stall torque, so no duration is the '
                                'shortest')
+    refuse_torque_rates(task, 'a search for the shortest duration')
     if task.via_points:
         raise InvalidTaskError('via_points must be empty: the shortest duration is that of a '
                                'motion without via points')
@@ -128,8 +131,10 @@ def _search(task: Task, search: LimitSearch, neighbours: Neighbours,
     lower = max(0.0, last.value - last.gap)
     found = replace(_result(task, search, plan.status, plan.message), plan=plan,
                     duration=last.value if plan.solved else np.inf, local_lower=lower)
-    if plan.status is PlanStatus.LIMIT_VIOLATED:
-        within = hurry_within_limits(task, search.solver, accuracy, found)
+    limited = bound_by_limits(plan.problem, plan)
+    if limited is not None:
+        bounded = replace(task, path_constraints=limited.task.path_constraints)
+        within = hurry_within_limits(bounded, search.solver, accuracy, found)
         if within is not None:
             return within
         found = replace(found, local_lower=0.0)  # what ends is a motion beyond the limits

@@ -32,6 +32,7 @@ from flex_planner.planning.proofs import is_payload_bounded
 from flex_planner.planning.strategies.catalogue import BARRIER, QUICK
 from flex_planner.planning.strategies.extremals import Extremal, SearchStart
 from flex_planner.planning.strategies.free_parameters import PAYLOAD
+from flex_planner.planning.within_model import bound_by_limits
 import numpy as np
 
 # of the payload that the motors can just hold, kept clear of rounding
@@ -76,8 +77,9 @@ def _follow(search: LimitSearch, problem: MotionProblem, solver: Solver,
     found = replace(_result(search, problem, plan.status, plan.message), plan=plan,
                     payload=last.value if plan.solved else 0.0,
                     local_upper=last.value + last.gap)
-    if plan.status is PlanStatus.LIMIT_VIOLATED:
-        within = carry_within_limits(problem, solver, accuracy, found)
+    limited = bound_by_limits(problem, plan)
+    if limited is not None:
+        within = carry_within_limits(limited, solver, accuracy, found)
         if within is not None:
             return within
         found = replace(found, local_upper=np.inf)  # what ends is a motion beyond the limits

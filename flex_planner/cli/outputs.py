@@ -11,7 +11,6 @@ import sys
 import tempfile
 from typing import TYPE_CHECKING
 
-from flex_planner.arms.planar_only import PlanarOnlyError, require_planar
 from flex_planner.base.errors import FlexPlannerError, InvalidValueError, RecordingError
 from flex_planner.base.paths import file_stem
 from flex_planner.capacity.results import MaxPayload
@@ -142,12 +141,11 @@ def check_folder(folder: Path) -> None:
 
 
 def _recorder(request: Request, folder: Path) -> RequestRecorder | None:
-    """Return the recorder; None, with a message, for spatial arms and without definitions."""
+    """Return the recorder; None, with a message, without definitions of messages."""
     try:
         from flex_planner.cli.recorder import RequestRecorder
 
-        require_planar(request.task.arm, 'recordings')
         return RequestRecorder(request, folder / 'recordings')
-    except (PlanarOnlyError, RecordingError) as error:
+    except RecordingError as error:
         print(f'flex-planner: no recording is written: {error}', file=sys.stderr)
         return None

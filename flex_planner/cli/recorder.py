@@ -6,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 import time
 
-from flex_planner.base.validation import Array
 from flex_planner.capacity.results import MaxPayload
 from flex_planner.cli.request import Request
 from flex_planner.optimal_control.path_constraints import write_constraint
@@ -18,7 +17,6 @@ from flex_planner.ros.messages.classes import (
     MotionTask,
     PayloadSearch,
     PlanReport,
-    Point,
 )
 from flex_planner.ros.messages.payload_searches import (
     report_from_search,
@@ -31,6 +29,7 @@ from flex_planner.ros.messages.plans import (
     report_from_plan,
     report_trajectory,
 )
+from flex_planner.ros.messages.points import point_message
 from flex_planner.ros.messages.robustness import enter_robustness
 from flex_planner.ros.messages.via_points import fill_via_points
 from flex_planner.ros.planner.outcome import Outcome
@@ -118,7 +117,7 @@ def task_message(request: Request) -> MotionTask:
     _fill_start(message, task)
     fill_via_points(message, task)
     if task.goal_point.size:
-        message.goal_point = _point(task.goal_point)
+        message.goal_point = point_message(task.goal_point)
         message.space = (MotionTask.CARTESIAN if task.start_point.size
                          else MotionTask.CARTESIAN_GOAL)
     else:
@@ -131,10 +130,6 @@ def _fill_start(message: MotionTask, task: Task) -> None:
     message.start_velocities = task.start_velocities.tolist()
     message.start_modal_displacements = task.start_modal_displacements.tolist()
     if task.start_point.size:
-        message.start_point = _point(task.start_point)
+        message.start_point = point_message(task.start_point)
     else:
         message.start_positions = task.start_positions.tolist()
-
-
-def _point(values: Array) -> Point:
-    return Point(x=float(values[0]), y=float(values[1]))

@@ -11,7 +11,7 @@ from typing import Any
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import load_arm
-from flex_planner.arms.spatial_joint import slides
+from flex_planner.arms.joint_units import units_of
 from flex_planner.base.errors import (
     InvalidTaskError,
     InvalidValueError,
@@ -29,9 +29,11 @@ from flex_planner.cli.options import (
     numbers,
     positions,
 )
+from flex_planner.cli.payload_options import add_payload_shape, take_payload_shape
 from flex_planner.cli.via_options import add_via_points, via_points
 from flex_planner.control.joint_controller import JointController
 from flex_planner.optimal_control.ends_at_points import ends_at_points
+from flex_planner.optimal_control.goal_in_pose import posture_in_pose
 from flex_planner.optimal_control.path_constraints import FORMS, read_constraint
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.objectives import Objectives
@@ -46,7 +48,8 @@ MAX_TIME_LIMIT, _TIME_LIMIT = 3600.0, 60.0  # [s]
 # names of the core that are not those of options, which have - for _
 _POINTS = {'start_point': '--from', 'goal_point': '--to'}
 _ANGLES = {'start_positions': '--from-angles', 'goal_positions': '--to-angles'}
-_RENAMED = {**_POINTS, 'payload_mass': '--payload'}
+_RENAMED = {**_POINTS, 'payload_mass': '--payload', 'goal_orientation': '--to-orientation',
+            'payload_tensor': '--payload-inertia'}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -88,11 +91,13 @@ class Request:
         """
         arm = load_arm(options.arm)
         with translate_errors():
+            arm, inertia = take_payload_shape(options, arm)
             limit = number('time_limit', options.time_limit, above=0, at_most=MAX_TIME_LIMIT,
                            unit='s')
             task = Task(
-                arm=arm, **_ends(options, arm), **_start(options, arm), duration=options.duration,
-                payload_mass=options.payload_mass, payload_inertia=options.payload_inertia,
+                arm=arm, **_ends(options, arm, inertia), **_start(options, arm),
+                duration=options.duration,
+                payload_mass=options.payload_mass, payload_inertia=inertia,
                 tolerance=options.tolerance, allow_large_bending=options.allow_large_bending,
                 via_points=via_points(options.via_points, arm),
                 path_constraints=[read_constraint('--limit', text) for text in options.limits],
@@ -150,8 +155,7 @@ def add_task(parser: argparse.ArgumentParser, payload: str) -> None:
         help='duration of the motion [s]')
     add('--payload', dest='payload_mass', type=number_argument, default=0.0, metavar='KG',
         help=payload)
-    add('--payload-inertia', type=number_argument, default=None, metavar='KG_M2',
-        help='moment of inertia of the payload (default: that of the arm file, or 0)')
+    add_payload_shape(parser)
     for name, what in (('effort', 'torques, R in the cost (default: ones)'),
                        ('velocity', 'velocities, W_2 in the cost (default: zeros)'),
                        ('position', 'positions, W_1 in the cost (default: zeros)')):
@@ -224,7 +228,7 @@ def _via_option(field: str) -> str:
     return f'via point {number} of --via and --via-angles{part}'
 
 
-def _ends(options: argparse.Namespace, arm: Arm) -> dict[str, Any]:
+def _ends(options: argparse.Namespace, arm: Arm, inertia: float | None) -> dict[str, Any]:
     """Return start and goal as they are given, with the postures that belong to points."""
     ends = {**_POINTS, **_ANGLES}
     given = [name for name in ends if getattr(options, name) is not None]
@@ -238,8 +242,25 @@ def _ends(options: argparse.Namespace, arm: Arm) -> dict[str, Any]:
                               for name in given if name in _ANGLES}
     points = {name: numbers(_POINTS[name], getattr(options, name), arm.dimension, 'm')
               for name in given if name in _POINTS}
-    return fields | ends_at_points(arm, points.get('start_point'), points.get('goal_point'),
-                                   options.elbow, fields.get('start_positions'))
+    in_pose = getattr(options, 'goal_orientation', None) is not None
+    goal = points.get('goal_point')
+    fields |= ends_at_points(arm, points.get('start_point'), None if in_pose else goal,
+                             options.elbow, fields.get('start_positions'))
+    return fields | (_goal_in_pose(options, arm, goal, fields, inertia) if in_pose else {})
+
+
+def _goal_in_pose(options: argparse.Namespace, arm: Arm, point: Array | None,
+                  fields: dict[str, Any], inertia: float | None) -> dict[str, Any]:
+    """Return the field of a goal that is a point with an orientation."""
+    if point is None:
+        raise InvalidTaskError('--to-orientation belongs to the point of --to, which is missing')
+    turned = np.radians(numbers('--to-orientation', options.goal_orientation, 3, 'deg'))
+    try:
+        return {'goal_positions': posture_in_pose(
+            arm, point, turned, fields['start_positions'], payload_mass=options.payload_mass,
+            payload_inertia=inertia)}
+    except (UnreachableError, SingularError) as error:
+        raise type(error)(f'goal_point: {error}') from None
 
 
 def _start(options: argparse.Namespace, arm: Arm) -> dict[str, Any]:
@@ -253,10 +274,10 @@ def _start(options: argparse.Namespace, arm: Arm) -> dict[str, Any]:
 def _say_end(task: Task, name: str) -> str:
     """Return start or goal in words."""
     point: Array = getattr(task, f'{name}_point')
-    units = np.array([1.0 if slides(joint) else np.degrees(1.0) for joint in task.arm.joints])
+    units = np.array([units_of(joint).scale for joint in task.arm.joints])
     values, unit = (point, 'm') if point.size else (
         units * getattr(task, f'{name}_positions'),
-        'deg, m' if any(map(slides, task.arm.joints)) else 'deg')
+        ', '.join(dict.fromkeys(units_of(joint).position for joint in task.arm.joints)))
     return f'({", ".join(f"{value:.6g}" for value in values)}) {unit}'
 
 

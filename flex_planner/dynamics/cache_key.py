@@ -24,6 +24,7 @@ FREE_FIELDS = frozenset({'Arm.name', 'Arm.source', 'Arm.payload_inertia',
                          'Motor.no_load_speed', 'Motor.max_torque', 'Motor.max_speed',
                          'Joint.lower_limit', 'Joint.upper_limit', 'SpatialArm.name',
                          'SpatialArm.source', 'SpatialArm.notes', 'SpatialArm.payload_inertia',
+                         'SpatialArm.joint_names', 'SpatialArm.frame_names',
                          'SpatialJoint.lower_limit', 'SpatialJoint.upper_limit'})
 _PACKAGES = Path(__file__).parents[1]
 

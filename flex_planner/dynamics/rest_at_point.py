@@ -5,7 +5,7 @@ from __future__ import annotations
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.inverse_kinematics import check_singularity
 from flex_planner.arms.kinematics import jacobian, tip_jacobian, tip_position
-from flex_planner.base.errors import NoEquilibriumError, UnreachableError
+from flex_planner.base.errors import UnreachableError
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.physical_parameters import PhysicalParameters
@@ -22,7 +22,8 @@ _FLAT = 1e-12
 
 
 def rest_at_point(dynamics: ArmDynamics, arm: Arm, point: Array, reference: Array,
-                  parameters: PhysicalParameters) -> tuple[Array, Array]:
+                  parameters: PhysicalParameters,
+                  near: Array | None = None) -> tuple[Array, Array]:
     """
     Return the arm at rest with its tip at a point, its links bent by gravity.
 
@@ -42,6 +43,8 @@ def rest_at_point(dynamics: ArmDynamics, arm: Arm, point: Array, reference: Arra
         Joint angles of the unbent arm, see `posture_near_point` [rad].
     parameters : PhysicalParameters
         Payload and stiffness.
+    near : numpy.ndarray, shape (n_t,), optional
+        q at rest there with a little more or less payload, from which it is found sooner.
 
     Returns
     -------
@@ -61,8 +64,12 @@ def rest_at_point(dynamics: ArmDynamics, arm: Arm, point: Array, reference: Arra
 
     """
     posture = _BentArm(dynamics, arm, reference, parameters)
-    turned = (_approach if arm.n_joints >= arm.dimension else _nearest)(posture, point)
-    coordinates, torque, moves = posture.at(turned)
+    if arm.n_joints < arm.dimension:
+        coordinates = posture.at(_nearest(posture, point))[0]
+    else:
+        found = None if near is None else posture.turn_to(point, near, posture.numbers_of(near))
+        coordinates = _approach(posture, point) if found is None else found[0]
+    torque, moves = posture.hold(coordinates)
     angles = coordinates[:arm.n_joints]
     _check_limits(arm, angles)
     check_singularity(arm, angles, moves)
@@ -86,29 +93,78 @@ class _BentArm:
         self.arm, self._dynamics, self._parameters = arm, dynamics, parameters
         self._reference, (self._lower, self._upper) = reference, arm.angle_limits()
         unbent = jacobian(arm, reference)
-        self.side, self._directions = _side(unbent), unbent.T / arm.reach  # (n, d)
+        self._side, self._directions = _side(unbent), unbent.T / arm.reach  # (n, d)
         self._keeps_limits = arm.n_joints > arm.dimension  # others have no joint to spare
 
     def at(self, turned: Array) -> tuple[Array, Array, Array]:
-        """Return coordinates, holding torque, and how the tip at rest follows the joints."""
-        n, dynamics = self.arm.n_joints, self._dynamics
-        q, torque = equilibrium(dynamics, self._angles(turned), self._parameters)
-        moves = tip_jacobian(dynamics.arm, q)
-        if not dynamics.arm.n_passive:
-            return q, torque, moves
-        stiffness = dynamics.static_forces(q[None], self._parameters.physical)[1][0]
-        sagging = np.linalg.solve(stiffness[n:, n:], stiffness[n:, :n])
-        return q, torque, moves[:, :n] - moves[:, n:] @ sagging
+        """Return q at rest, the tip (d,), and its derivative (d, d)."""
+        q, _ = equilibrium(self._dynamics, self._angles(turned), self._parameters)
+        moves = self.hold(q)[1]
+        return q, tip_position(self._dynamics.arm, q), moves @ self._turning(turned)
 
-    def tip(self, turned: Array) -> tuple[Array, Array, Array]:
-        """Return the tip at rest (d,), its derivative (d, d), and that by the joints (d, n)."""
-        q, _, moves = self.at(turned)
-        directions = self._directions
-        if self._keeps_limits:
-            free = self._reference + directions @ turned
-            inside = (free > self._lower) & (free < self._upper)
-            directions = np.where(inside[:, None], directions, 0.0)
-        return tip_position(self._dynamics.arm, q), moves @ directions, moves
+    def hold(self, q: Array) -> tuple[Array, Array]:
+        """Return the torque that holds q (n,), and how the tip at rest follows the joints."""
+        n = self.arm.n_joints
+        force, sagging, _ = self._balance(q)
+        moves = tip_jacobian(self._dynamics.arm, q)
+        return force[:n], moves[:, :n] - moves[:, n:] @ sagging
+
+    def turn_to(self, point: Array, start: Array, turned: Array) -> tuple[Array, Array] | None:
+        """
+        Return q at rest with the tip at a near point, and the numbers; None if it is not found.
+
+        Newton's method on the place of the tip and the balance of the links at once.
+
+        """
+        n, q, last, exact = self.arm.n_joints, start.copy(), np.inf, False
+        for _ in range(_MAX_ITERATIONS):
+            try:
+                _, sagging, sag = self._balance(q)
+            except np.linalg.LinAlgError:  # about to buckle
+                return None
+            moves = tip_jacobian(self._dynamics.arm, q)
+            follows = moves[:, :n] - moves[:, n:] @ sagging
+            left = point - tip_position(self._dynamics.arm, q) - moves[:, n:] @ sag
+            miss = float(np.linalg.norm(left)) + float(np.abs(sag).max(initial=0.0))
+            if exact or (miss > _SLOW * last and miss <= _ENOUGH * self.arm.reach):
+                return (q, turned) if self._is_whole(q, follows) else None
+            if not miss < last:
+                return None
+            exact, last = miss <= _EXACT * self.arm.reach, miss
+            turned = turned + _least_squares(follows @ self._turning(turned), left)
+            angles = self._angles(turned)
+            q[n:] += sag - sagging @ (angles - q[:n])
+            q[:n] = angles
+        return None
+
+    def numbers_of(self, q: Array) -> Array:
+        """Return the numbers (d,) that lead to the joint angles of q, or near them."""
+        return _least_squares(self._directions, q[:self.arm.n_joints] - self._reference)
+
+    def _balance(self, q: Array) -> tuple[Array, Array, Array]:
+        """Return static forces, how links sag as joints turn, and what they sag more now."""
+        n = self.arm.n_joints
+        forces, stiffness = self._dynamics.static_forces(q[None], self._parameters.physical)
+        if q.size == n:
+            return forces[0], np.zeros((0, n)), np.zeros(0)
+        pulled = np.column_stack([stiffness[0, n:, :n], -forces[0, n:]])
+        solved = np.linalg.solve(stiffness[0, n:, n:], pulled).astype(np.float64)
+        return forces[0], solved[:, :n], solved[:, n]
+
+    def _is_whole(self, q: Array, follows: Array) -> bool:
+        """Return whether q is on the branch of the reference posture, and would not buckle."""
+        n = self.arm.n_joints
+        stiffness = self._dynamics.static_forces(q[None], self._parameters.physical)[1]
+        return _side(follows) == self._side and bool(
+            q.size == n or np.linalg.eigvalsh(stiffness[0, n:, n:])[0] > 0)
+
+    def _turning(self, turned: Array) -> Array:
+        """Return the derivative of the joint angles, shape (n, d)."""
+        if not self._keeps_limits:
+            return self._directions
+        free = self._reference + self._directions @ turned
+        inside = (free > self._lower) & (free < self._upper)
+        return np.where(inside[:, None], self._directions, 0.0)
 
     def _angles(self, turned: Array) -> Array:
         """Return the joint angles, shape (n,)."""
@@ -116,14 +172,19 @@ class _BentArm:
         return np.clip(angles, self._lower, self._upper) if self._keeps_limits else angles
 
 
+def _least_squares(matrix: Array, right: Array) -> Array:
+    solution: Array = np.linalg.lstsq(matrix, right, rcond=None)[0].astype(np.float64)
+    return solution
+
+
 def _approach(posture: _BentArm, point: Array) -> Array:
     """Bring the tip from where it rests in the reference posture to a point, in steps."""
-    turned: Array = np.zeros(point.size)
     way, step = 0.0, 1.0
-    first = posture.tip(turned)[0]
+    turned: Array = np.zeros(point.size)
+    q, first, _ = posture.at(turned)
     while way < 1:
         there = min(way + step, 1.0)
-        found = _newton(posture, turned, first + there * (point - first))
+        found = posture.turn_to(first + there * (point - first), q, turned)
         if found is None:
             step /= 2
             if step < _SHORTEST_STEP:
@@ -131,27 +192,8 @@ def _approach(posture: _BentArm, point: Array) -> Array:
                     'no posture was found in which the arm, bent by gravity, rests with its tip '
                     f'at {_say_point(point, 6)} m')
         else:
-            turned, way = found, there
-    return turned
-
-
-def _newton(posture: _BentArm, start: Array, point: Array) -> Array | None:
-    """Solve for a near point; None if that fails, or ends on the other branch."""
-    turned, last = start, np.inf
-    for _ in range(_MAX_ITERATIONS):
-        try:
-            tip, slope, moves = posture.tip(turned)
-        except NoEquilibriumError:
-            return None
-        miss = float(np.linalg.norm(tip - point))
-        exact = _ENOUGH if miss > _SLOW * last else _EXACT
-        if miss <= exact * posture.arm.reach:
-            return turned if _side(moves) == posture.side else None
-        if exact == _ENOUGH:
-            return None
-        change, last = np.linalg.lstsq(slope, point - tip, rcond=None)[0], miss
-        turned = turned + change
-    return None
+            (q, turned), way = found, there
+    return q
 
 
 def _side(moves: Array) -> float:
@@ -166,14 +208,14 @@ def _side(moves: Array) -> float:
 
 def _nearest(posture: _BentArm, point: Array) -> Array:
     """Turn the only joint until the tip passes a point, which lies on its curve or is refused."""
-    turned = np.zeros(point.size)
+    turned: Array = np.zeros(point.size)
     for _ in range(_MAX_ITERATIONS):
-        tip, slope, _ = posture.tip(turned)
-        change = np.linalg.lstsq(slope, point - tip, rcond=None)[0]
+        _, tip, slope = posture.at(turned)
+        change = _least_squares(slope, point - tip)
         turned = turned + change
         if np.abs(change).max() <= _EXACT:
             break
-    tip, n = posture.tip(turned)[0], posture.arm.n_joints
+    tip, n = posture.at(turned)[1], posture.arm.n_joints
     joints = 'one joint' if n == 1 else f'{n} joints'
     if np.linalg.norm(tip - point) > _ENOUGH * posture.arm.reach:
         raise UnreachableError(

@@ -8,7 +8,7 @@ conditions z = (q, q', psi_1, psi_2).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -121,12 +121,14 @@ class ArmModel(ArmDynamics):
         Parameters
         ----------
         name : str
-            ``optimality``, ``free_payload``, ``free_duration`` or ``free_times``.
+            ``optimality``, ``free_payload``, ``free_duration``, ``free_times`` or
+            ``torque_rate``.
         p : numpy.ndarray
-            `Parameters.stack`.
+            `Parameters.stack`, and what else the functions take.
 
         """
-        functions = [self._load_optimality(part) for part in (name, f'{name}_jacobian')]
+        load = self.torque_rate_function if name == 'torque_rate' else self._load_optimality
+        functions = [load(part) for part in (name, f'{name}_jacobian')]
         rate, jacobian = (function.address for function in functions)
         if rate is None or jacobian is None:
             return None
@@ -145,11 +147,19 @@ class ArmModel(ArmDynamics):
 
     def offset_function(self, name: str) -> BatchFunction:
         """Return a function of `build_offset_functions`; they are derived when first wanted."""
+        return self._load_apart(name, 'offset', self._build_offset)
+
+    def torque_rate_function(self, name: str) -> BatchFunction:
+        """Return one of `build_torque_rate_functions`; they are derived when first wanted."""
+        return self._load_apart(name, 'torque rate', self._build_torque_rate)
+
+    def _load_apart(self, name: str, library: str,
+                    build: Callable[[], Mapping[str, tuple[Any, int]]]) -> BatchFunction:
+        """Return a function of a library that few motions need."""
         if name not in self._loaded:
             key = cache_key(self.arm, 'dynamics', 'optimal_control')
             self._loaded |= load_functions(
-                content_key(key, 'offset', 'caps' if has_caps(self.arm) else ''),
-                self._build_offset)
+                content_key(key, library, 'caps' if has_caps(self.arm) else ''), build)
         return self._loaded[name]
 
     def prepare_barrier(self, monitor: Monitor | None = None) -> None:
@@ -203,6 +213,14 @@ class ArmModel(ArmDynamics):
         from flex_planner.optimal_control.offset_conditions import build_offset_functions
 
         return build_offset_functions(self.arm)
+
+    def _build_torque_rate(self) -> Mapping[str, tuple[Any, int]]:
+        """Derive the functions of torques with a priced rate; CasADi is imported only here."""
+        from flex_planner.optimal_control.torque_rate_conditions import (
+            build_torque_rate_functions,
+        )
+
+        return build_torque_rate_functions(self.arm)
 
     def _build_optimality(self) -> Mapping[str, tuple[Any, int]]:
         """Derive the functions; CasADi is imported only here."""

@@ -100,14 +100,19 @@ def _start_state(model: ArmModel, task: Task, parameters: Parameters) -> Array:
     return np.concatenate([coordinates, task.start_velocities])
 
 
-def rest_at_end(model: ArmModel, task: Task, end: str,
-                parameters: Parameters) -> tuple[Array, Array]:
-    """Return the coordinates (n_t,) of the arm at rest at 'start' or 'goal', and what holds it."""
+def rest_at_end(model: ArmModel, task: Task, end: str, parameters: Parameters,
+                near: Array | None = None) -> tuple[Array, Array]:
+    """
+    Return the coordinates (n_t,) of the arm at rest at 'start' or 'goal', and what holds it.
+
+    Those at rest with about that payload may help to find them.
+
+    """
     positions, point = getattr(task, f'{end}_positions'), getattr(task, f'{end}_point')
     if not point.size:
         return equilibrium(model, positions, parameters)
     try:
-        return rest_at_point(model, task.arm, point, positions, parameters)
+        return rest_at_point(model, task.arm, point, positions, parameters, near)
     except (UnreachableError, SingularError) as error:
         raise type(error)(f'{end}_point: {error}') from None
 
@@ -146,6 +151,8 @@ class PayloadEnds:
         self._given = conditions.start, conditions.goal
         bends = task.arm.bends_at_rest
         self._bent = bends and not task.start_modal_displacements.size, bends
+        # that were found last, from which others are found soon
+        self._near: list[Array | None] = [None, None]
 
     def at(self, end: int, payload: float) -> tuple[Array, Array, Array]:
         """
@@ -172,7 +179,9 @@ class PayloadEnds:
         name, velocities = (('start', self._task.start_velocities),
                             ('goal', self._task.goal_velocities))[end]
         try:
-            coordinates, _ = rest_at_end(self._model, self._task, name, parameters)
+            coordinates, _ = rest_at_end(self._model, self._task, name, parameters,
+                                         self._near[end])
         except (SingularError, UnreachableError) as error:
             raise NoEquilibriumError(str(error)) from None
+        self._near[end] = coordinates
         return np.concatenate([coordinates, velocities])

@@ -14,6 +14,8 @@ from flex_planner.collocation import CollocationSolution
 from flex_planner.collocation.problem import CompiledRate
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.path_constraints import limits_of_arm, PathSlacks
+from flex_planner.optimal_control.path_constraints.path_constraint import PathConstraint
+from flex_planner.optimal_control.torque_slacks import TorqueSlacks
 import numpy as np
 
 # slacks at both ends are taken as at least so much, see `PathSlacks.relieved`
@@ -49,22 +51,21 @@ class ConstrainedMotion(MotionProblem):
 
     def rate(self, t: Array, z: Array) -> Array:
         """Return z'."""
-        rate = super().rate(t, z)
-        half = self.size // 2
-        states = z[:, :half]
-        rate[:, half:] += add_multipliers(self.slacks, states, self.multipliers(z))
+        rate, layout = super().rate(t, z), self.layout
+        rate[:, layout.costates] += add_multipliers(self.slacks, z[:, layout.states],
+                                                    self.multipliers(z))
         return rate
 
     def rate_jacobian(self, t: Array, z: Array) -> tuple[Array, Array]:
         """Return z' and its Jacobian."""
         rate, jacobian = super().rate_jacobian(t, z)
-        half = self.size // 2
+        states, costates = self.layout.states, self.layout.costates
         lam = self.multipliers(z)
-        slacks, slopes, curvature = self.slacks.linearise(z[:, :half], lam)
-        rate[:, half:] += _pull(slopes, lam)
+        slacks, slopes, curvature = self.slacks.linearise(z[:, states], lam)
+        rate[:, costates] += _pull(slopes, lam)
         kept = np.maximum(slacks, self.floor)
         ratio = np.where(kept > 0, self.mu / np.where(kept > 0, kept, 1.0)**2, np.nan)
-        jacobian[:, half:, :half] += curvature - _stiffen(slopes, ratio)
+        jacobian[:, costates[:, None], states] += curvature - _stiffen(slopes, ratio)
         return rate, jacobian
 
     def compiled_rate(self) -> CompiledRate | None:
@@ -73,7 +74,7 @@ class ConstrainedMotion(MotionProblem):
 
     def barrier_rate(self, z: Array) -> Array:
         """Return what the barrier adds to L and H, shape (k,)."""
-        slacks = self.slacks(z[:, :self.size // 2])
+        slacks = self.slacks(z[:, self.layout.states])
         with np.errstate(invalid='ignore', divide='ignore'):
             kept, share = np.maximum(slacks, self.floor), np.maximum(1 - slacks / self.floor, 0.0)
             beyond = np.where(slacks < self.floor, share + share**2 / 2, 0.0)
@@ -82,7 +83,7 @@ class ConstrainedMotion(MotionProblem):
 
     def multipliers(self, z: Array) -> Array:
         """Return lam at points (k, m), shape (k, n_c)."""
-        slacks = self.slacks(z[:, :self.size // 2])
+        slacks = self.slacks(z[:, self.layout.states])
         kept = np.maximum(slacks, self.floor)
         inside = np.where(kept > 0, kept, 1.0)
         lam: Array = np.where(kept > 0, self.mu / inside * (1 + (inside - slacks) / inside),
@@ -104,24 +105,56 @@ class ConstrainedMotion(MotionProblem):
 
     def floored(self, near: CollocationSolution, share: float) -> ConstrainedMotion:
         """Return the same problem with a floor at a share of the smallest slacks of a motion."""
-        states = near.stage_values()[..., :self.size // 2].reshape(-1, self.size // 2)
-        least = np.maximum(self.slacks(states).min(axis=0), _LEAST_FLOOR)
+        z = near.stage_values().reshape(-1, self.size)
+        least = np.maximum(self.slacks(z[:, self.layout.states]).min(axis=0), _LEAST_FLOOR)
         return ConstrainedMotion(self, self.slacks, self.mu, share * least)
 
 
 def slacks_of(motion: MotionProblem) -> PathSlacks | None:
+    """
+    Return the slacks of all limits of the states, None without any.
+
+    They are those of `way_slacks_of`, and of the motors where torques are states.
+
+    """
+    if not motion.layout.torques:
+        return way_slacks_of(motion)
+    slacks = TorqueSlacks(motion.model.arm, _limits_on_the_way(motion),
+                          motion.parameters.torque_limits)
+    return slacks if slacks.count else None
+
+
+def way_slacks_of(motion: MotionProblem) -> PathSlacks | None:
     """Return the slacks of all limits on the way, the arm's and the task's; None without any."""
+    slacks = PathSlacks(motion.model.arm, _limits_on_the_way(motion))
+    return slacks if slacks.count else None
+
+
+def _limits_on_the_way(motion: MotionProblem) -> tuple[PathConstraint, ...]:
+    """Return the limits that functions of q and q' are to keep."""
     arm, task = motion.model.arm, motion.task
     every = (*limits_of_arm(task.arm), *task.path_constraints)
-    constraints = tuple(one for one in every if arm.n_modes or not one.bends)
-    slacks = PathSlacks(arm, constraints) if constraints else None
-    return slacks if slacks is not None and slacks.count else None
+    return tuple(one for one in every if arm.n_modes or not one.bends)
 
 
 def end_states(motion: MotionProblem) -> Array:
-    """Return the states at both ends that a motion must have, shape (1 or 2, 2 n_t)."""
+    """
+    Return the states at both ends that a motion must have, shape (1 or 2, 2 n_t or 2 n_t + n).
+
+    A torque that is free there is one within its limits.
+
+    """
     hard = bool(np.isinf(motion.goal_weights).all())
-    return np.stack([motion.start, motion.goal]) if hard else motion.start[None]
+    states = np.stack([motion.start, motion.goal]) if hard else motion.start[None]
+    if motion.torque_ends is None:
+        return states
+    n_t, n = motion.layout.coordinates, motion.layout.torques
+    lower, upper = motion.parameters.torque_limits.bounds(states[:, n_t:n_t + n])
+    torques = np.clip(0.0, lower, upper)
+    for torque, held in zip(torques, (motion.torque_ends.start, motion.torque_ends.goal),
+                            strict=False):
+        torque[:held.size] = held
+    return np.hstack([states, torques])
 
 
 def relieve_ends(motion: MotionProblem, slacks: PathSlacks) -> PathSlacks:
@@ -130,7 +163,7 @@ def relieve_ends(motion: MotionProblem, slacks: PathSlacks) -> PathSlacks:
 
 
 def add_multipliers(slacks: PathSlacks, states: Array, multipliers: Array) -> Array:
-    """Return what multipliers (k, n_c) add to the rates of the costates, shape (k, 2 n_t)."""
+    """Return what multipliers (k, n_c) add to the rates of the costates, shape (k, n_x)."""
     return _pull(slacks.linearise(states, multipliers)[1], multipliers)
 
 
@@ -143,8 +176,8 @@ def eliminate_slacks(slacks: PathSlacks, states: Array, sigma: Array, multiplier
     ----------
     slacks : PathSlacks
         s(x).
-    states : numpy.ndarray, shape (k, 2 n_t)
-        x = (q, q').
+    states : numpy.ndarray, shape (k, n_x)
+        x = (q, q'), and tau where torques are states.
     sigma, multipliers : numpy.ndarray, shape (k, n_c)
         Of the iterate, > 0.
     mu : float
@@ -153,7 +186,7 @@ def eliminate_slacks(slacks: PathSlacks, states: Array, sigma: Array, multiplier
     Returns
     -------
     rate, jacobian : numpy.ndarray
-        (k, 2 n_t) and (k, 2 n_t, 2 n_t).
+        (k, n_x) and (k, n_x, n_x).
 
     """
     values, slopes, curvature = slacks.linearise(states, multipliers)
@@ -166,7 +199,7 @@ def eliminate_slacks(slacks: PathSlacks, states: Array, sigma: Array, multiplier
 
 def step_slacks(slacks: PathSlacks, states: Array, sigma: Array, multipliers: Array,
                 dx: Array, mu: float) -> tuple[Array, Array]:
-    """Return the steps of sigma and lam (k, n_c) that go with one of x (k, 2 n_t)."""
+    """Return the steps of sigma and lam (k, n_c) that go with one of x (k, n_x)."""
     values, slopes, _ = slacks.linearise(states, multipliers)
     step = values - sigma + (slopes @ dx[..., None])[..., 0]
     return step, mu / sigma - multipliers - multipliers / sigma * step

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationSolution, GaussRule
@@ -13,6 +14,8 @@ from flex_planner.optimal_control.arm_model import ArmModel, Controls
 from flex_planner.optimal_control.boundary_conditions import BoundaryConditions
 from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.optimal_control.task import Task
+from flex_planner.optimal_control.torque_conditions import torque_conditions, TorqueState
+from flex_planner.optimal_control.torque_ends import TorqueEnds
 from flex_planner.optimal_control.via_conditions import ViaConditions
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +30,9 @@ class MotionProblem:
     """
     The optimality conditions of a task.
 
-    The unknowns are z = (q, q', psi_1, psi_2), 4 n_t of them; `BoundaryConditions` says what holds
-    at both ends.
+    The unknowns are z = (q, q', psi_1, psi_2), 4 n_t of them, followed by the torques and their
+    costates where the task asks for their rates; `BoundaryConditions` says what holds at both
+    ends.
 
     Parameters
     ----------
@@ -47,9 +51,14 @@ class MotionProblem:
         Of `ends`.
     p : numpy.ndarray
         Stacked parameters.
+    conditions : TorqueConditions
+        The rates of the unknowns, and how the torque comes about.
+    layout : StateLayout
+        Where states and costates stand among the unknowns.
+    torque_ends : TorqueEnds or None
+        Conditions of the torques at both ends, where they are states.
     explicit : numpy.ndarray of int
-        q and psi_1, whose rates the collocation need not factorise.
-
+        Unknowns whose rates the collocation need not factorise.
     via : ViaConditions
         Via points, and when they are passed.
     holds : bool
@@ -73,14 +82,16 @@ class MotionProblem:
                  holds: bool = True, via_times: Array | None = None) -> None:
         self.model, self.task, self.parameters = model, task, parameters
         self.p = parameters.stack()
-        n_t = model.arm.n_coordinates
-        self.size = 4 * n_t
+        self.conditions = torque_conditions(model, task, parameters)
+        self.layout = self.conditions.layout
+        self.size = self.layout.size
         self.ends = BoundaryConditions(model, task, parameters, holds=holds)
         self.start, self.goal = self.ends.start, self.ends.goal
         self.goal_weights = self.ends.goal_weights
         self.holding_torque = self.ends.holding_torque
+        self.torque_ends = self._hold_ends() if self.layout.torques else None
         self.scale = self._scale()
-        self.explicit: Indices = np.r_[0:n_t, 2 * n_t:3 * n_t]
+        self.explicit: Indices = self.layout.explicit
         n = model.arm.n_joints
         self.via = ViaConditions.of(model.arm, task.via_points, (self.start[:n], self.goal[:n]),
                                     task.duration, self.scale, via_times)
@@ -96,37 +107,37 @@ class MotionProblem:
 
     def rate(self, t: Array, z: Array) -> Array:
         """Return z'; the problem does not depend on time."""
-        return self.model.optimality(z, self.p)
+        return self.conditions.rate(z)
 
     def rate_jacobian(self, t: Array, z: Array) -> tuple[Array, Array]:
         """Return z' and its Jacobian."""
-        return self.model.optimality_jacobian(z, self.p)
+        return self.conditions.rate_jacobian(z)
 
     def compiled_rate(self) -> CompiledRate | None:
         """Return both as machine code, None without a compiler."""
-        return self.model.compiled_rate('optimality', self.p)
+        return self.conditions.compiled_rate()
 
     def controls(self, t: Array, z: Array) -> Controls:
-        """Return torque, cost and Hamiltonian at times (k,) and points (k, 4 n_t)."""
-        return self.model.controls(z, self.p)
+        """Return torque, cost and Hamiltonian at times (k,) and points (k, m)."""
+        return self.conditions.controls(z)
 
     def hamiltonian_rate(self, t: Array, z: Array) -> Array:
-        """Return dH/dt of an extremal at times (k,) and points (k, 4 n_t), shape (k,): zero."""
+        """Return dH/dt of an extremal at times (k,) and points (k, m), shape (k,): zero."""
         return np.zeros(len(t))
 
     def switches(self, t: Array, z: Array, p: Array | None = None) -> Array:
-        """Return the distances of the unbounded torque from its bounds, 2 n columns or more."""
-        free = (self.controls(t, z) if p is None else self.model.controls(z, p)).free_torque
-        n_t, n = self.model.arm.n_coordinates, self.model.arm.n_joints
-        return np.hstack(self.parameters.torque_limits.distances(free, z[:, n_t:n_t + n]))
+        """Return functions (k, e) that change their signs where the conditions bend."""
+        return self.conditions.switches(z, p)
 
     def left(self, z: Array) -> tuple[Array, Array]:
         """Return the initial conditions of eq. (16)."""
-        return self.ends.left(z)
+        inner = self.ends.left(z[:4 * self.layout.coordinates])
+        return inner if self.torque_ends is None else self.torque_ends.add_left(z, *inner)
 
     def right(self, z: Array) -> tuple[Array, Array]:
         """Return the final conditions of eq. (16), or transversality of eq. (6)."""
-        return self.ends.right(z)
+        inner = self.ends.right(z[:4 * self.layout.coordinates])
+        return inner if self.torque_ends is None else self.torque_ends.add_right(z, *inner)
 
     def barrier_rate(self, z: Array) -> Array:
         """Return what a barrier adds to L and H, shape (k,): nothing here."""
@@ -136,9 +147,9 @@ class MotionProblem:
         """Return the state (2 n_t,) that a motion ending in `end` is to reach."""
         return self.ends.target_state(end)
 
-    def with_changes(self, **changes: float) -> MotionProblem:
-        """Return the problem of the same task changed in payload or duration."""
-        task = replace(self.task, **changes)  # type: ignore[arg-type]
+    def with_changes(self, **changes: Any) -> MotionProblem:
+        """Return the problem of the same task changed in payload, duration or limits."""
+        task = replace(self.task, **changes)
         parameters = replace(self.parameters, payload_mass=task.payload_mass)
         times = self.via.times * (task.duration / self.task.duration)
         return MotionProblem(self.model, task, parameters, via_times=np.where(
@@ -150,7 +161,7 @@ class MotionProblem:
 
     def fewest_intervals(self, stages: int) -> int:
         """Return the intervals of a mesh that resolves nothing finely but overlooks nothing."""
-        rates, _ = natural_modes(self.model, self.start[:self.size // 4], self.parameters,
+        rates, _ = natural_modes(self.model, self.start[:self.layout.coordinates], self.parameters,
                                  locked=False)
         cycles = float(np.nan_to_num(rates).max()) * self.task.duration / (2 * np.pi)
         return int(np.ceil(_POINTS_PER_CYCLE * cycles / stages))
@@ -168,6 +179,8 @@ class MotionProblem:
         change = self.goal[:n_t] - self.start[:n_t]
         nodes[:, :n_t] = self.start[:n_t] + np.outer(mesh / self.task.duration, change)
         nodes[:, n_t:2 * n_t] = change / self.task.duration
+        if self.torque_ends is not None:
+            nodes[:, self.layout.torque_slice] = self.torque_ends.between(mesh / mesh[-1])
         if not self.junctions.size:
             return CollocationSolution.from_values(mesh, nodes, rule)
         return self._pass_via_points(CollocationSolution.from_values(mesh, nodes, rule))
@@ -189,7 +202,7 @@ class MotionProblem:
 
     def _scale(self) -> Array:
         """
-        Return the magnitude of each unknown that matters, shape (4 n_t,).
+        Return the magnitude of each unknown that matters, shape (m,).
 
         A tenth of what a motion with constant acceleration, then deceleration would need: its
         torque gives the costates through u = -R^-1 B^T M^-1 psi_2, its inertia forces the
@@ -211,8 +224,24 @@ class MotionProblem:
         positions = np.concatenate([travel, bend])
         velocity_costates = np.abs(mass[:, :n]) @ (self.parameters.effort_weights * inertia[:n])
         scale: Array = np.concatenate([positions, positions / duration,
-                                       velocity_costates / duration, velocity_costates]) / 10
+                                       velocity_costates / duration, velocity_costates,
+                                       *self._torque_scales(inertia[:n])]) / 10
         return scale
+
+    def _torque_scales(self, torque: Array) -> tuple[Array, ...]:
+        """Return what torques and their costates come to, where they are states."""
+        if not isinstance(self.conditions, TorqueState):
+            return ()
+        return torque, self.conditions.weights * torque / self.task.duration
+
+    def _hold_ends(self) -> TorqueEnds:
+        """Return the torques that hold the arm at ends where it rests."""
+        at_rest = self.task.starts_at_rest, self.task.ends_at_rest
+        n_t, n = self.layout.coordinates, self.layout.torques
+        held = [self.model.static_forces(state[None, :n_t], self.parameters.physical)[0][0, :n]
+                if rests else np.zeros(0)
+                for state, rests in zip((self.start, self.goal), at_rest, strict=True)]
+        return TorqueEnds(layout=self.layout, start=held[0], goal=held[1])
 
 
 def task_parameters(task: Task) -> Parameters:

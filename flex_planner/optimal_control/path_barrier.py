@@ -14,7 +14,9 @@ from flex_planner.collocation import CollocationSolution
 from flex_planner.collocation.problem import Indices
 from flex_planner.optimal_control.barrier_problem import MotionBarrier
 from flex_planner.optimal_control.constrained_motion import eliminate_slacks, step_slacks
+from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.path_constraints import PathSlacks
+from flex_planner.optimal_control.state_barrier import StateBarrier
 import numpy as np
 
 # slacks begin with at least so much
@@ -27,20 +29,22 @@ class PathBarrier:
 
     Parameters
     ----------
-    inner : MotionBarrier
-        Of the motors' limits; its unknowns begin with (q, q', psi).
+    inner : MotionBarrier or StateBarrier
+        Of the motors' limits, or of none where torques are states; its unknowns begin with those
+        of a motion.
     slacks : PathSlacks
         Of the limits on the way.
 
     """
 
-    def __init__(self, inner: MotionBarrier, slacks: PathSlacks) -> None:
+    def __init__(self, inner: MotionBarrier | StateBarrier, slacks: PathSlacks) -> None:
         self.inner, self.slacks = inner, slacks
         self.size: int = inner.size
         self.free: int = inner.free
         self.explicit: Indices = inner.explicit
         self.junctions = inner.junctions
-        self._half: int = inner.motion.size // 2
+        self._states: Indices = inner.motion.layout.states
+        self._costates: Indices = inner.motion.layout.costates
 
     def scale(self, mu: float) -> Array:
         """Return the smallest magnitudes of z that matter."""
@@ -49,19 +53,19 @@ class PathBarrier:
     def condense(self, z: Array, y: Array, mu: float) -> tuple[Array, Array]:
         """Return F and J of the step z' = F + J dz."""
         own, sigma, lam = self.split(y)
-        half, costates = self._half, slice(self._half, 2 * self._half)
+        states, costates = self._states, self._costates
         rate, jacobian = self.inner.condense(z, own, mu)
-        pull, stiffness = eliminate_slacks(self.slacks, z[:, :half], sigma, lam, mu)
+        pull, stiffness = eliminate_slacks(self.slacks, z[:, states], sigma, lam, mu)
         rate[:, costates] += pull
-        jacobian[:, costates, :half] += stiffness
+        jacobian[:, costates[:, None], states] += stiffness
         return rate, jacobian
 
     def find_step(self, z: Array, y: Array, dz: Array, mu: float) -> Array:
         """Return the step of y that goes with one of z."""
         own, sigma, lam = self.split(y)
-        half = self._half
+        states = self._states
         step = self.inner.find_step(z, own, dz, mu)
-        steps = step_slacks(self.slacks, z[:, :half], sigma, lam, dz[:, :half], mu)
+        steps = step_slacks(self.slacks, z[:, states], sigma, lam, dz[:, states], mu)
         return self._join(step, *steps)
 
     def longest(self, node: Array, step: Array) -> float:
@@ -84,8 +88,8 @@ class PathBarrier:
               least: float = _FIRST_SLACK) -> Array:
         """Return torques inside their limits, slacks of at least so much, and multipliers."""
         own = self.inner.guess(solution, mu)
-        states = solution.stage_values()[..., :self._half].reshape(-1, self._half)
-        sigma = np.maximum(self.slacks(states), least).reshape(*own.shape[:2], -1)
+        z = solution.stage_values().reshape(-1, solution.nodes.shape[1])
+        sigma = np.maximum(self.slacks(z[:, self._states]), least).reshape(*own.shape[:2], -1)
         return self._join(own, sigma, mu / sigma)
 
     def split(self, y: Array) -> tuple[Array, Array, Array]:
@@ -98,3 +102,9 @@ class PathBarrier:
     def _join(self, own: Array, sigma: Array, lam: Array) -> Array:
         middle = self.free + (own.shape[-1] - self.free) // 2
         return np.concatenate([own[..., :middle], sigma, own[..., middle:], lam], axis=-1)
+
+
+def limit_states(problem: MotionProblem, slacks: PathSlacks) -> PathBarrier:
+    """Return the barrier of a motion with limits of its states."""
+    inner = StateBarrier(problem) if problem.layout.torques else MotionBarrier(problem)
+    return PathBarrier(inner, slacks)

@@ -48,7 +48,7 @@ class PlannedTorque:
         values = np.hstack([points.controls.free_torque, points.z[:, n_t:n_t + n]])
         values = values.reshape(solution.intervals, points.theta.size, -1)
         return cls(PiecewisePolynomial.through(solution.mesh, points.theta, values),
-                   problem.parameters.torque_limits)
+                   problem.conditions.limits)
 
     @property
     def breaks(self) -> Array:

@@ -79,11 +79,20 @@ class RateJacobian:
                    force_v=force_v, momentum_q=momentum_q,
                    inverse=_symmetric(solve(ca.SX.eye(n_t))), torque=torque)
 
+    @property
+    def motors(self) -> Any:
+        """Return M^-1 B, how torques accelerate the arm, shape (n_t, n)."""
+        return self.inverse[:, :self.torque.inside.numel()]
+
+    @property
+    def virtual_by_position(self) -> Any:
+        """Return the derivative of y by q at fixed psi_2, shape (n_t, n_t)."""
+        return -self.inverse @ self.momentum_q
+
     def assemble(self) -> Any:
         """Return dz'/dz, shape (4 n_t, 4 n_t)."""
-        n_t, torque = self.inverse.size1(), self.torque
-        motors = self.inverse[:, :torque.inside.numel()]
-        a_q, y_q = -self.inverse @ self.force_q, -self.inverse @ self.momentum_q
+        n_t, torque, motors = self.inverse.size1(), self.torque, self.motors
+        a_q, y_q = -self.inverse @ self.force_q, self.virtual_by_position
         turned = self.momentum_q.T @ a_q
         pushed = y_q[:torque.inside.numel(), :]  # of the joints
         free = ca.diag(torque.by_costate)

@@ -12,12 +12,13 @@ from flex_planner.arms.planar_only import require_planar
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.validation import Array, listed, number, vector
 from flex_planner.optimal_control.ends_at_points import ends_at_points, MAX_COORDINATE
+from flex_planner.optimal_control.goal_in_pose import posture_in_pose
 from flex_planner.optimal_control.path_constraints.joint_constraints import (
     JointRange,
     JointSpeed,
 )
 from flex_planner.optimal_control.path_constraints.path_constraint import PathConstraint
-from flex_planner.optimal_control.via_points import check_via_points, ViaPoint
+from flex_planner.optimal_control.via_points import check_via_points, free_times, ViaPoint
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -30,6 +31,9 @@ MAX_TIME_WEIGHT = 1e9
 MIN_TOLERANCE = 1e-15
 # of effort, where 0 is none; far beyond what searches for weights come to
 MIN_WEIGHT, MAX_WEIGHT = 1e-18, 1e18
+MIN_TORQUE_RATE = 1e-9
+# of the duration, over which torques turn where their rates have bounds alone
+_SMOOTHING = 1 / 200
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -56,11 +60,21 @@ class Task:
     payload_inertia : float
         Rotary inertia of the payload about its centre of mass, which is at the tip unless
         `Arm.payload_com` says otherwise, >= 0 and at most 1e6 [kg m^2]; by default
-        `Arm.payload_inertia`.
+        `Arm.payload_inertia`. `SpatialArm.payload_tensor` adds what is not the same about every
+        axis.
     effort_weights : array_like, shape (n,)
         Diagonal of R, 1e-18 to 1e18; empty for ones.
     position_weights, velocity_weights : array_like, shape (n,) or (n_t,)
         Diagonals of W_1 and W_2, 0 to 1e18; empty for zeros, n entries for the joints alone.
+    torque_rate_weight : array_like, a number or shape (n,)
+        Diagonal of S, 1e-18 to 1e18, one number for all joints; empty for none. With it
+        ``r^T S r / 2`` is added to L of eq. (7), where r are the rates of the torques [N m/s], and
+        torques start and end at those that hold the arm where it rests: they have no jumps.
+    max_torque_rate : array_like, a number or shape (n,)
+        Largest rates of the torques in either direction, > 0 [N m/s], ``inf`` for none, one
+        number for all joints; empty for none. Without `torque_rate_weight` a small price on the
+        rates is added, see `torque_rate_prices`. Neither goes with `time_weight`, nor with via
+        points without a time.
     start_velocities, goal_velocities : array_like, shape (n,) or (n_t,)
         Rates at both ends [rad/s, m/s]; empty for zeros, n entries for the joints alone.
     start_modal_displacements : array_like, shape (n_f,)
@@ -101,6 +115,8 @@ class Task:
     effort_weights: Array = field(default_factory=lambda: np.zeros(0))
     position_weights: Array = field(default_factory=lambda: np.zeros(0))
     velocity_weights: Array = field(default_factory=lambda: np.zeros(0))
+    torque_rate_weight: Array = field(default_factory=lambda: np.zeros(0))
+    max_torque_rate: Array = field(default_factory=lambda: np.zeros(0))
     start_velocities: Array = field(default_factory=lambda: np.zeros(0))
     goal_velocities: Array = field(default_factory=lambda: np.zeros(0))
     start_modal_displacements: Array = field(default_factory=lambda: np.zeros(0))
@@ -120,7 +136,8 @@ class Task:
                 self, *, arm: Arm, start_positions: ArrayLike, goal_positions: ArrayLike,
                 duration: float, payload_mass: float = ..., payload_inertia: float | None = ...,
                 effort_weights: ArrayLike = ..., position_weights: ArrayLike = ...,
-                velocity_weights: ArrayLike = ..., start_velocities: ArrayLike = ...,
+                velocity_weights: ArrayLike = ..., torque_rate_weight: ArrayLike = ...,
+                max_torque_rate: ArrayLike = ..., start_velocities: ArrayLike = ...,
                 goal_velocities: ArrayLike = ..., start_modal_displacements: ArrayLike = ...,
                 start_point: ArrayLike = ..., goal_point: ArrayLike = ...,
                 goal_position_weights: ArrayLike = ..., goal_velocity_weights: ArrayLike = ...,
@@ -180,6 +197,39 @@ class Task:
         return cls(arm=arm, duration=duration, start_positions=start, **others,
                    **ends_at_points(arm, None, goal, elbow, start))
 
+    @classmethod
+    def to_pose(cls, arm: Arm, start_positions: ArrayLike, point: ArrayLike,
+                orientation: ArrayLike, *, duration: float, **others: Any) -> Task:
+        """
+        Return the motion from given joint coordinates to a pose in which the tip rests.
+
+        The goal of the task are joint coordinates: those of `posture_in_pose` with the payload of
+        the task. A search that changes the payload keeps them, not the pose.
+
+        Parameters
+        ----------
+        arm : Arm
+            A spatial one of n joints.
+        start_positions : array_like, shape (n,)
+            [rad, m].
+        point, orientation : array_like
+            As of `posture_in_pose`.
+        duration, others
+            Fields of `Task`.
+
+        Raises
+        ------
+        UnreachableError, SingularError, NoEquilibriumError, InvalidValueError
+            See `posture_in_pose`.
+
+        """
+        start = vector('start_positions', start_positions, arm.n_joints, unit='rad')
+        goal = posture_in_pose(arm, point, orientation, start,
+                               payload_mass=others.get('payload_mass', 0.0),
+                               payload_inertia=others.get('payload_inertia'))
+        return cls(arm=arm, duration=duration, start_positions=start, goal_positions=goal,
+                   **others)
+
     def __post_init__(self) -> None:
         n, n_t = self.arm.n_joints, self.arm.n_coordinates
         for name in ('start_positions', 'goal_positions'):
@@ -213,9 +263,39 @@ class Task:
                                  at_least=-MAX_VELOCITY, at_most=MAX_VELOCITY))
         for name in ('goal_position_weights', 'goal_velocity_weights'):
             self._set(name, _goal_weights(name, getattr(self, name), n, n_t))
+        self._set('torque_rate_weight', _per_joint(
+            'torque_rate_weight', self.torque_rate_weight, n, MIN_WEIGHT, MAX_WEIGHT))
+        self._set('max_torque_rate', _per_joint(
+            'max_torque_rate', self.max_torque_rate, n, MIN_TORQUE_RATE, np.inf, 'N m/s'))
         self._set_bending()
         self._set_constraints()
         self._set_via_points()
+
+    @property
+    def has_torque_rates(self) -> bool:
+        """Return whether rates of torques have a price or a bound, and torques no jumps."""
+        return bool(self.torque_rate_weight.size or self.max_torque_rate.size)
+
+    @property
+    def torque_rate_prices(self) -> Array:
+        """
+        Return the diagonal of S, shape (n,).
+
+        Where rates have a bound but no weight it is ``R (T / 200)^2``, T the duration: rates would
+        jump between their bounds else, and where they are within them have no condition.
+
+        """
+        if self.torque_rate_weight.size:
+            return self.torque_rate_weight
+        prices: Array = self.effort_weights * (_SMOOTHING * self.duration)**2
+        return prices
+
+    @property
+    def torque_rate_bounds(self) -> Array:
+        """Return the largest rates of the torques, infinite for none, shape (n,) [N m/s]."""
+        if self.max_torque_rate.size:
+            return self.max_torque_rate
+        return np.full(self.arm.n_joints, np.inf)
 
     @property
     def ends_at_rest(self) -> bool:
@@ -264,6 +344,19 @@ class Task:
         if points and self.time_weight:
             raise InvalidValueError('time_weight', self.time_weight, '0 where there are via '
                                     'points: their times are those of a given duration')
+        self._check_torque_rates()
+
+    def _check_torque_rates(self) -> None:
+        """Refuse what motions whose torques are states cannot have yet."""
+        if not self.has_torque_rates:
+            return
+        given = 'torque_rate_weight' if self.torque_rate_weight.size else 'max_torque_rate'
+        if self.time_weight:
+            raise InvalidValueError('time_weight', self.time_weight, f'0 where {given} is given: '
+                                    'the duration must be given then')
+        if free_times(self.via_points):
+            raise InvalidValueError('via_points', 'one without a time', 'points with their times '
+                                    f'where {given} is given')
 
     def _set(self, name: str, value: Array) -> None:
         object.__setattr__(self, name, value)
@@ -276,6 +369,22 @@ def _pad(name: str, values: ArrayLike, n: int, n_t: int, rest: float,
     padded: Array = np.concatenate([given, np.full(n_t - given.size, rest)])
     padded.setflags(write=False)
     return padded
+
+
+def _per_joint(name: str, values: ArrayLike, n: int, least: float, most: float,
+               unit: str = '') -> Array:
+    """Return n checked entries > 0, of which one may stand for all, or none."""
+    try:
+        given = np.atleast_1d(np.array(values, dtype=float))
+    except (TypeError, ValueError, OverflowError):
+        raise InvalidValueError(name, values, 'a number or a list of numbers') from None
+    endless = np.isposinf(given) if np.isposinf(most) else np.zeros(given.shape, dtype=bool)
+    checked = vector(name, np.where(endless, 1.0, given), (0, 1, n), above=0, unit=unit)
+    vector(name, checked, checked.size, at_least=least, at_most=most, unit=unit)
+    entries: Array = np.where(endless, np.inf, checked)
+    entries = np.repeat(entries, n) if entries.size == 1 else entries
+    entries.setflags(write=False)
+    return entries
 
 
 def _goal_weights(name: str, values: ArrayLike, n: int, n_t: int) -> Array:

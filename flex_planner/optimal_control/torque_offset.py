@@ -11,6 +11,7 @@ from flex_planner.optimal_control.arm_model import ArmModel, Controls
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.optimal_control.task import Task
+from flex_planner.optimal_control.torque_conditions import ChosenTorque
 import numpy as np
 
 DEGREE = 5
@@ -95,6 +96,7 @@ class OffsetProblem(MotionProblem):
                  offset: TorqueOffset) -> None:
         super().__init__(model, task, parameters)
         self.offset = offset
+        self._chosen = ChosenTorque(model, parameters)
 
     def rate(self, t: Array, z: Array) -> Array:
         """Return z'."""
@@ -109,6 +111,10 @@ class OffsetProblem(MotionProblem):
     def controls(self, t: Array, z: Array) -> Controls:
         """Return torque, cost without the offset, and H with it."""
         return self.model.offset_controls(z, self.offset(t), self.p)
+
+    def switches(self, t: Array, z: Array, p: Array | None = None) -> Array:
+        """Return the distances of the unbounded torque from its bounds, 2 n columns or more."""
+        return self._chosen.distances(self.controls(t, z).free_torque, z)
 
     def hamiltonian_rate(self, t: Array, z: Array) -> Array:
         """Return dH/dt, which the offset makes: -w'^T R u, shape (k,)."""

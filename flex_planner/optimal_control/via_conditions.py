@@ -88,18 +88,18 @@ class ViaConditions:
         ----------
         index : int
             Of the via point.
-        before, after : numpy.ndarray, shape (4 n_t,)
-            (q, q', psi_1, psi_2) just before and after it.
+        before, after : numpy.ndarray, shape (m,)
+            The unknowns, (q, q', psi_1, psi_2) first, just before and after it.
 
         Returns
         -------
-        residual : numpy.ndarray, shape (4 n_t,)
+        residual : numpy.ndarray, shape (m,)
             What does not hold.
-        rows : numpy.ndarray, shape (4 n_t, 8 n_t)
+        rows : numpy.ndarray, shape (m, 2 m)
             Derivatives by both.
 
         """
-        size, n_t = before.size, before.size // 4
+        size, n_t = before.size, self.arm.n_coordinates
         residual, rows = after - before, np.hstack([-np.eye(size), np.eye(size)])
         q, jump = before[:n_t], residual[2 * n_t:3 * n_t].copy()
         miss, C = self.miss(index, q)
@@ -129,7 +129,7 @@ class ViaConditions:
         at = 2 * n_t + others
         residual[at] -= share @ jump[pivots]
         rows[at[:, None], 2 * n_t + pivots] += share
-        rows[at[:, None], 6 * n_t + pivots] -= share
+        rows[at[:, None], residual.size + 2 * n_t + pivots] -= share
         rows[at, :n_t] += share @ bend[pivots] - bend[others]
 
     def _pivots(self, index: int) -> NDArray[np.intp]:

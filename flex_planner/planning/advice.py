@@ -44,6 +44,8 @@ def _changes(problem: MotionProblem) -> list[str]:
     if most > 1:
         found.append(f'fewer modes per link than {most}')
     found.append(f'a longer duration than {task.duration:g} s{_periods(problem)}')
+    if task.max_torque_rate.size:
+        found.append('a larger max_torque_rate')
     if arm.n_modes and not any(_is_damped(arm)):
         found.append('damping of the links')
     if task.payload_mass:
@@ -62,7 +64,7 @@ def _periods(problem: MotionProblem) -> str:
     if not problem.task.arm.n_passive:
         return ''
     try:
-        rates, _ = natural_modes(problem.model, problem.start[:problem.size // 4],
+        rates, _ = natural_modes(problem.model, problem.start[:problem.layout.coordinates],
                                  problem.parameters, locked=True)
     except FlexPlannerError:
         return ''

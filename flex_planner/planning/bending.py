@@ -7,16 +7,22 @@ from functools import lru_cache
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import bent_distances
+from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationSolution
 from flex_planner.optimal_control.motion_problem import MotionProblem
+from flex_planner.optimal_control.path_constraints import Deflection
 from flex_planner.optimal_control.sampled_motion import sample_motion
+from flex_planner.optimal_control.task import Task
 
 # shares of a link's length. The model keeps the links' lengths and their small slopes: at a tenth
 # the slope of a cantilever's tip is 0.15 rad and the tip 0.6 % nearer than it is taken to be, at
 # 0.3 it is 0.45 rad and 5 %, so that not even masses and torques are right
 NOTABLE, LARGEST = 0.1, 0.3
 _STATIONS = 21
+# of the share that the model holds: between stations a link may bend a little more
+_LIMIT = 0.995 * LARGEST
+_LIMITED = (0.25, 0.4, 0.5, 0.6, 0.75, 1.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,3 +77,17 @@ def find_largest_bending(arm: Arm, coordinates: Array) -> Bending:
         if share > found.share:
             found = Bending(link=i, moment=moment, share=share)
     return found
+
+
+def limits_of_model(arm: Arm) -> tuple[Deflection, ...]:
+    """Return how far the links of an arm may bend, as limits on the way."""
+    if isinstance(arm, SpatialArm):  # they bend in two planes, for which there is no such limit
+        return ()
+    return tuple(Deflection(link=i, limit=_LIMIT, stations=_LIMITED)
+                 for i, link in enumerate(arm.links, 1) if link.modes)
+
+
+def keeps_model(task: Task) -> bool:
+    """Return whether a task is one that `bound_bending` has bounded."""
+    limits = limits_of_model(task.arm)
+    return bool(limits) and set(limits) <= set(task.path_constraints)

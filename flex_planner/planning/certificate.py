@@ -119,10 +119,10 @@ def certify(problem: MotionProblem, result: CollocationResult, monitor: Monitor,
         tip_error=float(np.linalg.norm(tip - asked)),
         residual_vibration=residual_vibration(problem.model, _at_rest(problem) + miss,
                                               problem.goal[:n_t], problem.parameters),
-        state_error=float(result.errors[:2 * n_t].max()),
-        costate_error=float(result.errors[2 * n_t:].max()),
+        state_error=float(result.errors[problem.layout.states].max()),
+        costate_error=float(result.errors[problem.layout.costates].max()),
         via_error=_via_error(problem, torque.breaks, states),
-        limit_slack=smallest_slack(problem, states))
+        limit_slack=smallest_slack(problem, states, _torques(torque)))
 
 
 def simulate_to_goal(problem: MotionProblem, solution: CollocationSolution, monitor: Monitor,
@@ -146,6 +146,11 @@ def _simulate(problem: MotionProblem, solution: CollocationSolution, monitor: Mo
     torque = PlannedTorque.of(problem, solution)
     return integrate(problem.model, problem.parameters.physical, problem.start, torque, monitor,
                      rtol=rtol, atol=rtol / 100), torque
+
+
+def _torques(torque: PlannedTorque) -> Array:
+    """Return the planned torques at their breaks, shape (N + 1, n)."""
+    return np.array([torque(time) for time in torque.breaks])
 
 
 def _target(problem: MotionProblem, solution: CollocationSolution) -> Array:
@@ -176,8 +181,8 @@ def hamiltonian_drift(problem: MotionProblem, solution: CollocationSolution) -> 
     times = np.linspace(0, problem.task.duration, 4 * solution.intervals + 1, dtype=np.float64)
     z = solution(times)
     controls = problem.controls(times, z)
-    half = z.shape[1] // 2
-    powers = np.abs(z[:, half:] * problem.rate(times, z)[:, :half]).max(axis=1)
+    layout = problem.layout
+    powers = np.abs(z[:, layout.costates] * problem.rate(times, z)[:, layout.states]).max(axis=1)
     size = max(float(np.max(controls.cost_rate)), float(np.max(powers)), np.finfo(float).tiny)
     constant = controls.hamiltonian + problem.barrier_rate(z) - _due_change(problem, times, z)
     phases = np.searchsorted(problem.junctions[problem.via.given], times, side='right')

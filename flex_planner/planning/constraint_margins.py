@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationSolution
+from flex_planner.collocation.problem import Indices
 from flex_planner.optimal_control.constrained_motion import ConstrainedMotion, slacks_of
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.path_constraints import PathSlacks
@@ -39,7 +40,7 @@ class ConstraintMargin:
         Of the limit, e.g. ``'tip from post'``.
     constraint : int
         Index of the constraint it belongs to among the arm's own, then the task's
-        `path_constraints`.
+        `path_constraints`; then the motors of the joints, where torques are states.
     unit : str
         Of `margin`.
     margin : float
@@ -97,29 +98,41 @@ def find_margins(problem: MotionProblem,
     if slacks is None:
         return ()
     times = solution.times_at(_POSITIONS)
-    half = problem.size // 2
-    states = solution.values_at(_POSITIONS)[..., :half]
-    values = slacks(states.reshape(-1, half))  # (N * 25, n_c)
+    which = problem.layout.states
+    states = solution.values_at(_POSITIONS)[..., which]
+    values = slacks(states.reshape(-1, which.size))  # (N * 25, n_c)
     prices = _find_prices(problem, solution, slacks)
-    return tuple(_margin(k, slacks, solution, times.ravel(), values[:, k], prices[k], half)
+    return tuple(_margin(k, slacks, solution, times.ravel(), values[:, k], prices[k], which)
                  for k in range(slacks.count))
 
 
-def smallest_slack(problem: MotionProblem, states: Array) -> float:
-    """Return the smallest slack of all limits in given states (k, 2 n_t); inf without limits."""
+def smallest_slack(problem: MotionProblem, states: Array, torques: Array) -> float:
+    """
+    Return the smallest slack of all limits; inf without limits.
+
+    Parameters
+    ----------
+    problem : MotionProblem
+        Of n joints.
+    states, torques : numpy.ndarray, shape (k, 2 n_t) and (k, n)
+        Of the motion, at the same moments.
+
+    """
     slacks = slacks_of(problem)
-    return np.inf if slacks is None else float(slacks(states).min())
+    if slacks is None:
+        return np.inf
+    return float(slacks(np.hstack([states, torques]) if problem.layout.torques else states).min())
 
 
 def _margin(k: int, slacks: PathSlacks, solution: CollocationSolution, times: Array,
-            values: Array, price: float, half: int) -> ConstraintMargin:
+            values: Array, price: float, which: Indices) -> ConstraintMargin:
     """Return the margin of one slack, whose values at times are known."""
     label, nearest = slacks.labels[k], int(values.argmin())
     time, least = float(times[nearest]), float(values[nearest])
     step = float(np.diff(solution.mesh).max()) / (_POSITIONS.size - 1)
     for _ in range(_ZOOMS if least < ACTIVE else 0):
         near = np.clip(time + step * _AROUND, solution.mesh[0], solution.mesh[-1])
-        found = slacks(solution(near)[:, :half])[:, k]
+        found = slacks(solution(near)[:, which])[:, k]
         if found.min() <= least:
             time, least = float(near[found.argmin()]), float(found.min())
         step *= 2 / (_AROUND.size - 1)

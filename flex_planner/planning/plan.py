@@ -37,9 +37,13 @@ from flex_planner.optimal_control.path_constraints import (
     PathSlacks,
     SelfClearance,
 )
+from flex_planner.optimal_control.state_layout import StateLayout
 from flex_planner.optimal_control.task import Task
+from flex_planner.optimal_control.torque_conditions import ChosenTorque, TorqueState
+from flex_planner.optimal_control.torque_ends import TorqueEnds
 from flex_planner.optimal_control.torque_limits import TorqueLimits
 from flex_planner.optimal_control.torque_offset import OffsetProblem, TorqueOffset
+from flex_planner.optimal_control.torque_slacks import TorqueSlacks
 from flex_planner.optimal_control.via_conditions import ViaConditions
 from flex_planner.optimal_control.via_points import ViaPoint
 from flex_planner.planning.certificate import Certificate
@@ -295,7 +299,7 @@ class Plan:
             times=times, coordinates=z[:, :n_t], rates=z[:, n_t:2 * n_t],
             accelerations=control.acceleration, torques=control.torque, lower_bounds=lower,
             upper_bounds=upper, position_costates=z[:, 2 * n_t:3 * n_t],
-            velocity_costates=z[:, 3 * n_t:], hamiltonian=control.hamiltonian,
+            velocity_costates=z[:, 3 * n_t:4 * n_t], hamiltonian=control.hamiltonian,
             tip=tip_position(arm, z[:, :n_t]))
 
     def _within(self, times: ArrayLike) -> Array:
@@ -326,6 +330,7 @@ _SAVED = (Plan, PlanStatus, Certificate, Task, Arm, Link, BeamSection, Joint, El
           ExploredMotion, PlanWarning, WarningKind, TriedStrategy, ConstraintMargin,
           ConstrainedMotion, PathSlacks, JointRange, JointSpeed, KeepOut, Circle, Capsule,
           HalfPlane, SelfClearance, BendingMoment, Deflection, ViaPoint, ViaConditions,
+          StateLayout, ChosenTorque, TorqueState, TorqueEnds, TorqueSlacks, TorqueLimits,
           OffsetProblem, TorqueOffset, Robustness, RobustSearch, RobustTrial, JointController,
           Gains, EffortHold)
 

@@ -35,6 +35,11 @@ from flex_planner.planning.proofs import (
     prove_not_held,
 )
 from flex_planner.planning.robust.make_robust import make_robust
+from flex_planner.planning.smooth_torques import (
+    plan_without_jumps,
+    refuse_torque_rates,
+    without_torque_rates,
+)
 from flex_planner.planning.stiff_links import find_stiff_links
 from flex_planner.planning.strategies.catalogue import CATALOGUE
 from flex_planner.planning.strategies.initial_guesses import restart, warm_start
@@ -42,6 +47,7 @@ from flex_planner.planning.strategies.strategy import Strategy
 from flex_planner.planning.via_limits import check_via_points
 from flex_planner.planning.warnings import find_arm_warnings
 from flex_planner.planning.weight_search import adapt_weights, check_objectives
+from flex_planner.planning.within_model import keep_model
 import numpy as np
 
 
@@ -110,6 +116,7 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
         return _impossible(refused, prove_not_held(error, task.payload_mass))
     if objectives is not None:
         objectives.check(task)
+        refuse_torque_rates(task, 'motions that must meet objectives')
     proof = find_proof(problem)
     if proof is not None:
         return _impossible(problem, proof)
@@ -120,6 +127,8 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
     broken = check_ends(problem) or check_via_points(problem)
     if broken:
         return _not_possible(problem, broken)
+    if task.has_torque_rates:
+        return _plan_smoothly(problem, solver, start_from, strategies, effort)
     plan = (_plan_as_rigid(problem, solver, start_from, objectives, strategies, effort)
             or _plan_again(problem, solver, start_from, objectives))
     if plan is not None:
@@ -196,7 +205,7 @@ def _keep(plan: Plan, solver: Solver, objectives: Objectives | None,
     # weights that meet an objective may well bring a motion back within its limits
     if objectives is not None and plan.certified:
         plan = adapt_weights(plan, objectives, solver)
-    within = keep_limits(plan, solver, effort)
+    within = keep_model(keep_limits(plan, solver, effort), solver, effort)
     if within is plan or objectives is None:
         return within
     return check_objectives(within, plan.objectives, objectives)
@@ -215,6 +224,30 @@ def _plan_again(problem: MotionProblem, solver: Solver,
     if objectives is not None or not isinstance(start_problem, ConstrainedMotion):
         return None
     return plan_again_within(problem, solution, solver)
+
+
+def _plan_smoothly(problem: MotionProblem, solver: Solver,
+                   start: Plan | KindOfMotion | CollocationSolution | None,
+                   strategies: Sequence[Strategy], effort: SearchEffort) -> Plan:
+    """Return the plan whose torques have no jumps, from one like it or from the one with jumps."""
+    again = _plan_again(problem, solver, start, None)
+    if again is not None:
+        return again
+    if isinstance(start, Plan) and start.solution is not None and start.problem.layout.torques:
+        plan = plan_problem(problem, solver, tuple(_given(start, problem, solver)))
+        if plan.certified:
+            return keep_limits(plan, solver, effort)
+    task = without_torque_rates(problem.task)
+    stiff = find_stiff_links(MotionProblem(problem.model, task, problem.parameters), solver)
+    if stiff is not None:
+        return _not_found(problem, 'links or joints are so stiff that they are planned as rigid, '
+                          'which torques without jumps cannot be: make them rigid in the arm '
+                          'file, or leave torque_rate_weight and max_torque_rate out')
+    plain = plan_path(task, model=problem.model, solver=solver, start_from=start,
+                      strategies=strategies, search=effort)
+    if plain.status is PlanStatus.INFEASIBLE:  # nor is a motion whose torques are less free
+        return replace(plain, task=problem.task, problem=problem)
+    return keep_limits(plan_without_jumps(problem, plain, solver), solver, effort)
 
 
 def _not_possible(problem: MotionProblem, why: str) -> Plan:
@@ -266,8 +299,9 @@ def _given(start: Plan | KindOfMotion | CollocationSolution | None, problem: Mot
 
 def _what_is_known(plan: Plan, solution: CollocationSolution) -> KnownSolution:
     """Return a solved plan as what a similar one starts from."""
-    certificate, half = plan.certificate, solution.nodes.shape[1] // 2
+    certificate = plan.certificate
+    errors = np.full(solution.nodes.shape[1], certificate.costate_error)
+    errors[plan.problem.layout.states] = certificate.state_error
     return KnownSolution(
-        solution=solution, residual=certificate.collocation_residual,
-        errors=np.repeat([certificate.state_error, certificate.costate_error], half),
+        solution=solution, residual=certificate.collocation_residual, errors=errors,
         switches=plan.switching_times)

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from flex_planner.base.progress import StoppedError
+from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationSolution, Solver
 from flex_planner.collocation.interior_point import BarrierOutcome
 from flex_planner.optimal_control.constrained_motion import (
@@ -230,10 +231,13 @@ class _Search:
 
     def _obstacles(self) -> list[KeepOut]:
         """Return the obstacles that the free motion passes through."""
-        solution, half = self._free.solution, self._free.problem.size // 2
-        assert solution is not None
-        states = solution.values_at(_SHARES)[..., :half].reshape(-1, half)
-        return find_obstacles(self._slacks, self._slacks(states))
+        assert self._free.solution is not None
+        return find_obstacles(self._slacks, self._values(self._free.solution))
+
+    def _values(self, solution: CollocationSolution) -> Array:
+        """Return the slacks along a motion, shape (k, n_c)."""
+        z = solution.values_at(_SHARES).reshape(-1, self._free.problem.size)
+        return self._slacks(z[:, self._free.problem.layout.states])
 
     def _best_cost(self) -> float:
         """Return about the cost of the cheapest motion within the limits so far."""
@@ -255,8 +259,7 @@ class _Search:
         free, failed = self._free, self._failed
         if failed is None:
             return replace(free, message=f'{free.message}; within its limits: {failure}')
-        half = free.problem.size // 2
-        values = self._slacks(failed.values_at(_SHARES)[..., :half].reshape(-1, half))
+        values = self._values(failed)
         worst = int(values.min(axis=0).argmin())
         label, slack = self._slacks.labels[worst], float(values[:, worst].min())
         nearest = (f': of {self._starts} tries the first breaks "{label.name}" by '
@@ -268,7 +271,7 @@ class _Search:
     def _say_payload(self) -> str:
         """Say how much can be carried within the limits, if that is less than the task's."""
         payload = self._free.task.payload_mass
-        if not payload:
+        if not payload or self._free.problem.layout.torques:
             return ''
         most = find_largest_payload(self._free.problem, self._slacks, self._solver)
         if most is None or most >= payload:

@@ -18,7 +18,7 @@ from flex_planner.base.validation import Array, number
 from flex_planner.control.default_gains import default_gains
 from flex_planner.control.joint_controller import JointController
 from flex_planner.control.joint_reference import JointReference
-from flex_planner.optimal_control.constrained_motion import slacks_of
+from flex_planner.optimal_control.constrained_motion import way_slacks_of
 from flex_planner.planning.certificate import CertificateLimits
 from flex_planner.planning.execution import (
     certify_execution,
@@ -195,7 +195,7 @@ def sample_plan(plan: Plan, settings: SamplingSettings,
     sampled = _close_enough(plan, settings, execution, watch)
     postures = plan.uniform_samples(_POSTURES).coordinates[:, :plan.arm.n_joints]
     certificate = certify_execution(execution, sampled.reference, postures, watch,
-                                    slacks=slacks_of(plan.problem))
+                                    slacks=way_slacks_of(plan.problem))
     return replace(sampled, execution=certificate)
 
 

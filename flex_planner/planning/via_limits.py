@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.validation import Array
-from flex_planner.optimal_control.constrained_motion import slacks_of
+from flex_planner.optimal_control.constrained_motion import way_slacks_of
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.path_constraints import JointRange, KeepOut, PathSlacks
 import numpy as np
@@ -23,7 +23,7 @@ def check_via_points(problem: MotionProblem) -> str:
     is given. What else a via point may break depends on the motion.
 
     """
-    slacks = slacks_of(problem) if problem.junctions.size else None
+    slacks = way_slacks_of(problem) if problem.junctions.size else None
     if slacks is None:
         return ''
     for k in range(problem.junctions.size):
@@ -38,7 +38,7 @@ def check_via_points(problem: MotionProblem) -> str:
 
 def _state_at(problem: MotionProblem, index: int) -> Array:
     """Return the unbent arm at rest in the posture of a via point, shape (2 n_t,)."""
-    state = np.zeros(problem.size // 2)
+    state = np.zeros(2 * problem.layout.coordinates)
     state[:problem.model.arm.n_joints] = problem.via.postures[index]
     return state
 

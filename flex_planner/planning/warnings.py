@@ -20,7 +20,7 @@ from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationSolution
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.sampled_motion import sample_motion
-from flex_planner.planning.bending import find_bending, NOTABLE
+from flex_planner.planning.bending import find_bending, keeps_model, LARGEST, NOTABLE
 from flex_planner.planning.certificate import CertificateLimits
 from flex_planner.planning.link_overlaps import find_overlap
 from flex_planner.planning.mode_count import estimate_left_out
@@ -182,7 +182,10 @@ def _bending(motion: _Motion) -> PlanWarning | None:
     return PlanWarning(
         kind=WarningKind.BENDING, value=found.share, time=time, sentence=(
             f'link {found.link + 1} bends by {found.share:.0%} of its length at {time:.4g} s: '
-            f'beams of the model are linear, which is true up to about {NOTABLE:.0%}'))
+            f'beams of the model are linear, which is true up to about {NOTABLE:.0%}'
+            + (f'; the motion of least cost would bend them by more than the {LARGEST:.0%} that '
+               'the model holds at most, and this one is planned within that'
+               if keeps_model(motion.problem.task) else '')))
 
 
 def _torque_jumps(motion: _Motion) -> PlanWarning | None:

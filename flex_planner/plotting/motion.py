@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from flex_planner.arms.arm import Arm
+from flex_planner.arms.joint_units import label_joints, position_scales
 from flex_planner.arms.kinematics import link_points
 from flex_planner.arms.planar_only import require_planar
 from flex_planner.arms.spatial_arm import SpatialArm
@@ -26,7 +27,7 @@ from flex_planner.plotting.limits import (
     mark_via_times,
     shade_active,
 )
-from flex_planner.plotting.spatial_motion import draw_path_in_space, label, position_scale
+from flex_planner.plotting.spatial_motion import draw_path_in_space
 from matplotlib.axes import Axes
 import numpy as np
 
@@ -162,13 +163,13 @@ def draw_motion(motion: Motion | Plan, execution: Execution | None = None) -> Pi
 def draw_angles(axes: Axes, motion: Motion, execution: Execution | None = None) -> None:
     """Draw the joint angles in a diagram."""
     n = motion.arm.n_joints
-    scale = position_scale(motion.arm)
+    scale = position_scales(motion.arm)
     _draw_joints(axes, motion, scale * motion.coordinates[:, :n], execution,
                  scale * execution.positions if execution else None)
     settle_limits(axes, _LEAST_ANGLE)
-    draw_angle_limits(axes, motion.constraints, position_scale(motion.arm))
+    draw_angle_limits(axes, motion.constraints, position_scales(motion.arm))
     _mark_way(axes, motion)
-    finish(axes, 'joint angles', label(motion.arm, 'angle [deg]', 'way [mm]'))
+    finish(axes, 'joint angles', label_joints(motion.arm, 'angle [deg]', 'way [mm]'))
 
 
 def draw_speeds(axes: Axes, motion: Motion, execution: Execution | None = None) -> None:
@@ -178,7 +179,7 @@ def draw_speeds(axes: Axes, motion: Motion, execution: Execution | None = None) 
     settle_limits(axes, _LEAST_SPEED)
     draw_speed_limits(axes, motion.constraints)
     _mark_way(axes, motion)
-    finish(axes, 'joint speeds', label(motion.arm, 'speed [rad/s]', '[m/s]'))
+    finish(axes, 'joint speeds', label_joints(motion.arm, 'speed [rad/s]', '[m/s]'))
 
 
 def draw_torques(axes: Axes, motion: Motion, execution: Execution | None = None) -> None:
@@ -194,7 +195,7 @@ def draw_torques(axes: Axes, motion: Motion, execution: Execution | None = None)
     _mark_way(axes, motion)
     axes.ticklabel_format(axis='y', useOffset=False)
     finish(axes, 'motor torques and their bounds',
-           label(motion.arm, 'torque [N m]', 'force [N]'))
+           label_joints(motion.arm, 'torque [N m]', 'force [N]'))
 
 
 def _mark_way(axes: Axes, motion: Motion) -> None:

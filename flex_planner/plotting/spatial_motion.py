@@ -1,4 +1,4 @@
-"""A motion in space: the path of the tip in three dimensions, and units of joints that slide."""
+"""A motion in space: the path of the tip in three dimensions."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from typing import Any
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import link_points
-from flex_planner.arms.spatial_joint import slides
 from flex_planner.base.colours import ARM, PLANNED
 from flex_planner.base.validation import Array
 import numpy as np
@@ -53,13 +52,3 @@ def _same_scale(axes: Any, points: Array) -> None:
     for name, centre in zip('xyz', middle, strict=True):
         getattr(axes, f'set_{name}lim')(centre - half, centre + half)
     axes.set_box_aspect((1, 1, 1))
-
-
-def position_scale(arm: Arm) -> Array:
-    """Return the factors to degrees of joints that turn, to millimetres of those that slide."""
-    return np.array([1e3 if slides(joint) else np.degrees(1.0) for joint in arm.joints])
-
-
-def label(arm: Arm, turning: str, sliding: str) -> str:
-    """Return a label of the joints of an arm, with the unit of those that slide if any do."""
-    return f'{turning}, {sliding}' if any(map(slides, arm.joints)) else turning

@@ -11,10 +11,17 @@ from flex_planner.base.text import printable
 from flex_planner.base.validation import Array
 from flex_planner.control.joint_reference import JointReference
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
+from flex_planner.ros.arm_picture import ArmPicture
 from flex_planner.ros.messages.plans import duration_seconds
+from flex_planner.ros.messages.points import point_message
 from flex_planner.ros.messages.trajectory_rules import range_violations, trajectory_violations
 from flex_planner.ros.runtime.elapsed import ElapsedTime
-from flex_planner.ros.runtime.parameters import declare, declare_arm, warn_of_unknown
+from flex_planner.ros.runtime.parameters import (
+    ARM_PARAMETERS,
+    declare,
+    declare_arm,
+    warn_of_unknown,
+)
 from flex_planner.ros.runtime.running import run_node
 from flex_planner.ros.settings.simulator import SimulatorSettings
 from flex_planner.simulation.plant import Plant, RunawayError
@@ -49,6 +56,9 @@ class ArmSimulator(Node):  # type: ignore[misc]
         As measured by the encoders; the torques are those of the motors.
     ~/modal_states : sensor_msgs/msg/JointState
     ~/tip : geometry_msgs/msg/PointStamped
+    ~/markers : visualization_msgs/msg/MarkerArray
+    /tf : tf2_msgs/msg/TFMessage
+        Frames of the links and of the tip, as they are bent, where tf2_msgs is installed.
     ~/residual_vibration, ~/residual_bending : std_msgs/msg/Float64
         Once after each arrival, kept for late subscribers: peak-to-peak motion of the tip, and
         of the deflection of the links where it is largest, over `vibration_window` [m].
@@ -62,7 +72,7 @@ class ArmSimulator(Node):  # type: ignore[misc]
 
     def __init__(self) -> None:
         super().__init__('arm_simulator')
-        warn_of_unknown(self, SimulatorSettings, ['arm'])
+        warn_of_unknown(self, SimulatorSettings, ARM_PARAMETERS)
         arm = declare_arm(self)
         self._settings = declare(self, SimulatorSettings.for_arm(arm))
         self._arm = self._settings.mismatch.apply(arm)
@@ -73,8 +83,11 @@ class ArmSimulator(Node):  # type: ignore[misc]
         self._tip = self.create_publisher(PointStamped, '~/tip', 10)
         self._vibration = self.create_publisher(Float64, '~/residual_vibration', _LATCHED)
         self._bending = self.create_publisher(Float64, '~/residual_bending', _LATCHED)
+        self._picture = ArmPicture(self, self._arm, self._settings)
         self.create_subscription(JointTrajectory, 'joint_trajectory', self._on_trajectory, 1)
         self.create_timer(1 / self._settings.publish_rate, self._on_timer)
+        if self._settings.picture_rate:
+            self.create_timer(1 / self._settings.picture_rate, self._on_picture)
         self.create_timer(_WARNING_PERIOD, self._on_silence, clock=Clock(
             clock_type=ClockType.STEADY_TIME))
         self.get_logger().info(f'simulating {self._arm.name}')
@@ -125,8 +138,13 @@ class ArmSimulator(Node):  # type: ignore[misc]
                 stamp, self._arm.passive_names, state[n:n_t], state[n_t + n:], np.zeros(0)))
         tip = PointStamped()
         tip.header.stamp, tip.header.frame_id = stamp, self._settings.base_frame
-        tip.point.x, tip.point.y = (float(v) for v in tip_position(self._arm, state[:n_t]))
+        tip.point = point_message(tip_position(self._arm, state[:n_t]))
         self._tip.publish(tip)
+
+    def _on_picture(self) -> None:
+        """Show the arm as it is."""
+        self._picture.show(self._plant.state[:self._arm.n_coordinates],
+                           self.get_clock().now().to_msg())
 
     def _on_silence(self) -> None:
         """Say what the arm waits for, should it be a clock that has not come."""

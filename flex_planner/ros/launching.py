@@ -24,6 +24,10 @@ def declare_arguments() -> list[DeclareLaunchArgument]:
             'params_file', default_value='', description='Parameters of the nodes; default: '
             'config/paper.yaml, or none if there is an arm'),
         DeclareLaunchArgument(
+            'urdf', default_value='', description='URDF file for the nodes, in place of the one '
+            'that the arm file names, and for a robot_state_publisher; without an arm file every '
+            'link is rigid'),
+        DeclareLaunchArgument(
             'use_sim_time', default_value='false', choices=['true', 'false'],
             description='Whether the nodes follow /clock')]
 
@@ -46,9 +50,11 @@ def create_node(context: LaunchContext, executable: str, name: str,
         More of them, which count more than those of the file.
 
     """
-    arm, file, clock = (LaunchConfiguration(argument).perform(context)
-                        for argument in ('arm', 'params_file', 'use_sim_time'))
-    if not arm and not file:
+    arm, file, clock, urdf = (LaunchConfiguration(argument).perform(context) for argument in (
+        'arm', 'params_file', 'use_sim_time', 'urdf'))
+    if urdf:
+        parameters['robot_description'] = _description(urdf)
+    if not arm and not file and not urdf:
         file = str(Path(get_package_share_directory('flex_planner'), 'config', 'paper.yaml'))
     if arm:
         parameters['arm'] = ParameterValue(arm, value_type=str)
@@ -58,3 +64,28 @@ def create_node(context: LaunchContext, executable: str, name: str,
         package='flex_planner', executable=executable, name=name, output='screen',
         namespace=LaunchConfiguration('namespace'), remappings=remappings,
         parameters=[*([file] if file else []), *([parameters] if parameters else [])])
+
+
+def create_views(context: LaunchContext) -> list[Node]:
+    """
+    Return what shows the arm: a robot_state_publisher if there is a URDF file, RViz if wanted.
+
+    The robot_state_publisher has the links that do not bend, beside the frames of the simulated
+    arm; it hears of the joints from ``joint_states``, where they have the names of the URDF file.
+
+    """
+    urdf, rviz = (LaunchConfiguration(argument).perform(context) for argument in ('urdf', 'rviz'))
+    space, views = LaunchConfiguration('namespace'), []
+    if urdf:
+        views.append(Node(package='robot_state_publisher', executable='robot_state_publisher',
+                          namespace=space,
+                          parameters=[{'robot_description': _description(urdf)}]))
+    if rviz == 'true':
+        file = Path(get_package_share_directory('flex_planner'), 'rviz', 'flex_planner.rviz')
+        views.append(Node(package='rviz2', executable='rviz2', namespace=space,
+                          arguments=['--display-config', str(file)]))
+    return views
+
+
+def _description(urdf: str) -> ParameterValue:
+    return ParameterValue(Path(urdf).expanduser().read_text(encoding='utf-8'), value_type=str)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from flex_planner.arms.arm import Arm, Joint, Link, MAX_MODES
+from flex_planner.arms.spatial_link import SpatialLink
 from flex_planner.base.validation import Array, integer, number, vector
 import numpy as np
 
@@ -19,9 +21,10 @@ class Mismatch:
     Parameters
     ----------
     modes : int
-        Of every link that has any, 0 (rigid) to 8; -1 leaves them.
+        Of every link that has any, in space in each plane that has any, 0 (rigid) to 8; -1 leaves
+        them.
     rigidity_scale : float
-        On E I of every link, 0.001 to 1000.
+        On E I of every link, and what else of a beam is stiff, 0.001 to 1000.
     added_friction : array_like, shape (n,)
         Viscous, of every joint, 0 to 1000 [N m s/rad]; empty for none.
 
@@ -55,16 +58,19 @@ class Mismatch:
         """
         friction = vector('added_friction', self.added_friction, (0, arm.n_joints))
         added = friction if friction.size else np.zeros(arm.n_joints)
+        links: Any = tuple(self._link(link) for link in arm.links)
         return replace(
-            arm, links=tuple(self._link(link) for link in arm.links),
+            arm, links=links,
             joints=tuple(_with_friction(joint, float(more))
                          for joint, more in zip(arm.joints, added, strict=True)))
 
-    def _link(self, link: Link) -> Link:
+    def _link(self, link: Link | SpatialLink) -> Link | SpatialLink:
         """Return a link with its own stiffness and number of modes; a rigid one stays."""
         if not link.modes:
             return link
         changed = link if self.modes == AS_GIVEN else link.with_modes(self.modes)
+        if isinstance(changed, SpatialLink):
+            return changed.with_rigidity(self.rigidity_scale)
         return replace(changed, flexural_rigidity=link.flexural_rigidity * self.rigidity_scale)
 
 

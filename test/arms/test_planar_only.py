@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from flex_planner.arms.arm_files import plain_arm
 from flex_planner.arms.inverse_kinematics import workspace
 from flex_planner.arms.kinematics import frame_angles
 from flex_planner.arms.planar_only import PlanarOnlyError
@@ -41,7 +40,7 @@ def task() -> Task:
 
 
 @pytest.mark.parametrize('make', [
-    lambda: plain_arm(ARM), lambda: workspace(ARM),
+    lambda: workspace(ARM),
     lambda: frame_angles(ARM, np.zeros(4)),
     lambda: mass_matrix(ARM, np.zeros(2), 1.0, 0.0),
     lambda: RigidInertia.of(ARM, 1.0, 0.0),

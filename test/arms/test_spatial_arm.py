@@ -6,7 +6,7 @@ from dataclasses import replace
 import math
 from typing import Any
 
-from flex_planner.arms.arm_files import arm_from_mapping, load_arm
+from flex_planner.arms.arm_files import arm_from_mapping, arm_from_plain, load_arm, plain_arm
 from flex_planner.arms.joint import Node
 from flex_planner.arms.kinematics import (
     bent_distances,
@@ -23,6 +23,8 @@ from flex_planner.arms.spatial_body import join_bodies, place_body, SpatialBody,
 from flex_planner.arms.spatial_joint import SpatialJoint
 from flex_planner.arms.spatial_link import SpatialLink
 from flex_planner.base.errors import InvalidValueError
+from flex_planner.base.yaml_text import format_yaml, parse_yaml
+from flex_planner.dynamics.cache_key import describe_fields
 import numpy as np
 from presets import SPATIAL_PRESETS
 import pytest
@@ -195,3 +197,11 @@ def test_third_form_is_read() -> None:
 def test_bad_files_are_refused_by_path(content: dict[str, Any], message: str) -> None:
     with pytest.raises(InvalidValueError, match=message):
         arm_from_mapping(content)
+
+
+@pytest.mark.parametrize('name', ['spatial_3r', 'tudor_like', 'ur5_elastic'])
+def test_recordings_keep_every_field(name: str) -> None:
+    arm = load_arm(name)
+    again = arm_from_plain(parse_yaml(format_yaml(plain_arm(arm))))
+    assert isinstance(again, SpatialArm)
+    assert describe_fields(again) == describe_fields(arm)

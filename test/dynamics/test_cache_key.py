@@ -90,7 +90,7 @@ def test_names_notes_and_limits_of_spatial_arms_are_not_compiled_in() -> None:
     arm = yaw_pitch()
     first, second = arm.joints
     arms = [arm, dataclasses.replace(arm, name='other', source='elsewhere', notes=('note',),
-                                     payload_inertia=0.1),
+                                     payload_inertia=0.1, joint_names=('yaw', 'pitch')),
             dataclasses.replace(arm, joints=(dataclasses.replace(first, upper_limit=1.0), second)),
             dataclasses.replace(arm, joints=(dataclasses.replace(first, slides=True), second)),
             dataclasses.replace(arm, tip_rotation=(0.1, 0.0, 0.0))]

@@ -15,6 +15,7 @@ from flex_planner.arms.spatial_beam import SpatialBeam
 from flex_planner.arms.spatial_body import (
     as_matrix,
     as_point,
+    join_bodies,
     place_body,
     SpatialBody,
     turn_rpy,
@@ -122,6 +123,24 @@ def test_forces_are_those_of_lagrange(name: str) -> None:
         state = point(arm, seed, 0.02)
         expected = others(*state, PAYLOAD, INERTIA)
         np.testing.assert_allclose(ours(*state, PAYLOAD, INERTIA), expected, rtol=0,
+                                   atol=1e-12 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize('name', ['3R', 'oblique', 'tilted'])
+def test_payload_with_a_tensor_is_a_body_at_the_tip(name: str) -> None:
+    arm = ARMS[name]()
+    place, tensor = np.array([0.05, -0.02, 0.1]), turn_rpy(0.3, -0.8, 1.1) @ np.diag(
+        [0.01, 0.02, 0.025]) @ turn_rpy(0.3, -0.8, 1.1).T
+    carried = SpatialBody(mass=PAYLOAD, center_of_mass=place, inertia=(tensor + tensor.T) / 2)
+    last = arm.links[-1]
+    whole = join_bodies(last.tip_body, place_body(carried, np.zeros(3),
+                                                  np.array(arm.tip_rotation)))
+    by_body = forces(replace(arm, links=(*arm.links[:-1], replace(last, tip_body=whole))))
+    by_payload = forces(replace(arm, payload_com=place, payload_tensor=tensor))
+    for seed in range(3):
+        state = point(arm, seed, 0.02)
+        expected = by_body(*state, 0.0, 0.0)
+        np.testing.assert_allclose(by_payload(*state, PAYLOAD, 0.0), expected, rtol=0,
                                    atol=1e-12 * np.abs(expected).max())
 
 

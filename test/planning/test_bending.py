@@ -6,8 +6,11 @@ from dataclasses import replace
 
 from flex_planner.arms.arm import Arm, Joint, Link, Motor, Node
 from flex_planner.arms.kinematics import link_points
+from flex_planner.capacity.max_payload import find_max_payload
+from flex_planner.capacity.min_duration import find_min_duration
+from flex_planner.optimal_control.path_constraints import read_constraint, write_constraint
 from flex_planner.optimal_control.task import Task
-from flex_planner.planning.bending import find_largest_bending
+from flex_planner.planning.bending import find_largest_bending, keeps_model
 from flex_planner.planning.certificate import CertificateLimits
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_path import plan_path
@@ -40,7 +43,7 @@ def test_rigid_links_do_not_bend(rigid_arm: Arm) -> None:
     assert find_largest_bending(rigid_arm, np.ones((3, 2))).share == 0
 
 
-# A link that is thrown about: it bends by 47, 25 and 4 % of its length in 0.7, 1 and 2 s
+# A link that is thrown about: it bends by over 50, 25 and 4 % of its length in 0.65, 1 and 2 s
 
 
 def soft_plan(duration: float, allowed: bool) -> Plan:
@@ -54,7 +57,7 @@ def soft_plan(duration: float, allowed: bool) -> Plan:
 
 @pytest.fixture(scope='module')
 def refused() -> Plan:
-    return soft_plan(0.7, allowed=False)
+    return soft_plan(0.65, allowed=False)
 
 
 def largest(plan: Plan) -> float:
@@ -72,9 +75,9 @@ def test_link_that_bends_further_than_its_model_is_refused(refused: Plan) -> Non
 
 
 def test_large_bending_may_be_allowed(refused: Plan) -> None:
-    plan = soft_plan(0.7, allowed=True)
+    plan = soft_plan(0.65, allowed=True)
     assert plan.solved, plan.message
-    assert plan.cost == refused.cost
+    assert plan.cost == pytest.approx(refused.cost, rel=1e-9)
     (told,) = [one for one in plan.warnings if one.kind is WarningKind.BENDING]
     assert told.value == pytest.approx(largest(plan), rel=1e-3)
     assert told.time is not None
@@ -87,6 +90,33 @@ def test_what_bends_less_is_solved_with_a_warning_or_without() -> None:
         assert plan.solved, plan.message
         assert (largest(plan) > 0.1) is warned
         assert (WarningKind.BENDING in {one.kind for one in plan.warnings}) is warned
+
+
+def test_motion_is_bent_to_what_the_model_holds() -> None:
+    plan, free = soft_plan(0.8, allowed=False), soft_plan(0.8, allowed=True)
+    assert plan.solved, plan.message
+    assert largest(free) > 0.31
+    assert 0.29 < largest(plan) <= 0.3
+    assert free.cost < plan.cost < 1.2 * free.cost
+    assert CertificateLimits().violations(plan.certificate) == []
+    (told,) = [one for one in plan.warnings if one.kind is WarningKind.BENDING]
+    assert 'the motion of least cost would bend them by more than the 30%' in told.sentence
+    # its texts lead to the same limits, as in messages and recordings
+    assert keeps_model(replace(plan.task, path_constraints=[
+        read_constraint('limit', write_constraint(one)) for one in plan.task.path_constraints]))
+
+
+def test_searches_end_where_the_model_does() -> None:
+    task = soft_plan(1.0, allowed=False).task
+    found = find_max_payload(replace(task, payload_mass=0.0), accuracy=1e-3)
+    assert found.status is PlanStatus.SOLVED, found.message
+    assert found.plan is not None and found.plan.solved
+    assert 0.29 < largest(found.plan) <= 0.3
+    assert not plan_path(replace(task, payload_mass=found.payload + 5e-3)).solved
+    fastest = find_min_duration(task)
+    assert fastest.status is PlanStatus.SOLVED, fastest.message
+    assert fastest.plan is not None and 0.29 < largest(fastest.plan) <= 0.3
+    assert fastest.duration < 0.8
 
 
 def test_limit_on_the_way_is_told_before_bending(refused: Plan) -> None:

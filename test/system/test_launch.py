@@ -82,6 +82,25 @@ def test_nodes_follow_the_clock_if_they_are_told_to() -> None:
         assert node['parameters'][-1]['use_sim_time'] is True
 
 
+def test_urdf_goes_to_the_nodes_and_to_a_robot_state_publisher() -> None:
+    urdf = ROOT / 'examples' / 'urdf' / 'two_tubes.urdf'
+    nodes = started('simulation.launch.py', urdf=str(urdf), arm='two_tubes.yaml', rviz='true')[1]
+    assert [node['executable'] for node in nodes] == [
+        'planner', 'arm_simulator', 'robot_state_publisher', 'rviz2']
+    for node in nodes[:3]:
+        assert node['parameters'][-1]['robot_description'].value == urdf.read_text()
+    # alone, it is the arm: no preset and none of its parameters
+    (planner,) = started('planner.launch.py', urdf=str(urdf))[1]
+    assert [list(entry) for entry in planner['parameters']] == [['robot_description']]
+
+
+def test_rviz_shows_topics_that_are_there() -> None:
+    (path,) = ROOT.glob('rviz/*.rviz')
+    displays = yaml.safe_load(path.read_text())['Visualization Manager']['Displays']
+    topics = {display['Topic']['Value'] for display in displays if 'Topic' in display}
+    assert topics == {'flex_planner/markers', 'arm_simulator/markers'}
+
+
 def test_controllers_file_is_that_of_the_default_controller_of_the_planner() -> None:
     text = (ROOT / 'config' / 'controllers.yaml').read_text()
     content = {key.removeprefix('/**/'): value['ros__parameters']

@@ -117,7 +117,7 @@ def test_entry_point_can_be_called(name):
 
 def test_parameter_and_launch_files_are_installed():
     share = Path(get_package_share_directory('flex_planner'))
-    for pattern in ('config/*.yaml', 'config/arms/*.yaml', 'launch/*.py'):
+    for pattern in ('config/*.yaml', 'config/arms/*.yaml', 'launch/*.py', 'rviz/*.rviz'):
         wanted = {path.name: path.read_text() for path in ROOT.glob(pattern)}
         installed = {path.name: path.read_text() for path in share.glob(pattern)}
         assert installed == wanted
@@ -129,15 +129,15 @@ def test_parameter_and_launch_files_are_installed():
 def test_parameter_file_lists_every_parameter_with_its_default(node, settings):
     text = (ROOT / 'config' / 'planner.yaml').read_text()
     neutral = yaml.safe_load(text)[f'/**/{node}']['ros__parameters']
-    everything = re.sub(r'^    # (\w+: \[)', r'    \1', text, flags=re.MULTILINE)
+    everything = re.sub(r'^    # (\w+: \[|base_frame: )', r'    \1', text, flags=re.MULTILINE)
     written = yaml.safe_load(everything)[f'/**/{node}']['ros__parameters']
     defaults = as_mapping(settings.for_arm(load_arm(written.pop('arm'))))
     assert written == defaults
     assert {name: type(value) for name, value in written.items()} == {
         name: type(value) for name, value in defaults.items()}
-    # what has an entry per joint is left out, and follows any arm
+    # what has an entry per joint, and a name of the arm, is left out and follows any arm
     lists = {name for name, value in defaults.items() if isinstance(value, list)}
-    assert neutral.keys() - {'arm'} == defaults.keys() - lists
+    assert neutral.keys() - {'arm'} == defaults.keys() - lists - {'base_frame'}
 
 
 @pytest.mark.parametrize(('node', 'settings'), [

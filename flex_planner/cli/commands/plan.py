@@ -49,6 +49,9 @@ def add_commands(commands: Commands) -> None:
     plan = commands.add_parser(
         'plan', help='plan a motion', description='Plan the motion of least cost.')
     add_task(plan, payload='mass at the tip (default: 0)')
+    plan.add_argument('--to-orientation', dest='goal_orientation', metavar='DEG,DEG,DEG',
+                      help='of the tip at the point of --to, of a spatial arm: roll, pitch and '
+                      'yaw of its frame in that of the base, as gravity bends the arm')
     add_objectives(plan)
     _add_kinds(plan)
     plan.add_argument('--kind', type=integer_argument, default=1, metavar='N',

@@ -8,6 +8,8 @@ import math
 from typing import Any, TYPE_CHECKING
 
 from flex_planner.arms.arm import Arm
+from flex_planner.arms.joint_units import units_of
+from flex_planner.arms.spatial_joint import slides
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.validation import integer, number
 from flex_planner.optimal_control.path_constraints.path_constraint import (
@@ -57,7 +59,8 @@ class JointRange(PathConstraint):
 
     def labels(self, arm: Arm) -> list[SlackLabel]:
         """Return the names of the finite limits."""
-        return [SlackLabel(name=f'{kind} limit of joint {self.joint}', unit='rad',
+        unit = 'm' if slides(arm.joints[self.joint - 1]) else 'rad'
+        return [SlackLabel(name=f'{kind} limit of joint {self.joint}', unit=unit,
                            scale=self._width) for kind, _ in self._sides]
 
     def numbers(self, arm: Arm) -> list[float]:
@@ -119,7 +122,8 @@ class JointSpeed(PathConstraint):
 
     def labels(self, arm: Arm) -> list[SlackLabel]:
         """Return the names of both directions."""
-        return [SlackLabel(name=f'speed of joint {self.joint} {way}', unit='rad/s',
+        unit = units_of(arm.joints[self.joint - 1]).speed
+        return [SlackLabel(name=f'speed of joint {self.joint} {way}', unit=unit,
                            scale=self.limit) for way in ('forwards', 'backwards')]
 
     def numbers(self, arm: Arm) -> list[float]:

@@ -60,15 +60,14 @@ class PathSlacks:
                                  dtype=float)
         self._functions = _load(arm, constraints) if self.count else {}
 
-    def reconstruction_arguments(self) -> tuple[Arm, tuple[PathConstraint, ...], Array]:
+    def reconstruction_arguments(self) -> tuple[object, ...]:
         """Return what a saved plan keeps."""
         return self.arm, self.constraints, self.relief
 
     @classmethod
-    def reconstruct(cls, arm: Arm, constraints: tuple[PathConstraint, ...],
-                    relief: Array) -> PathSlacks:
+    def reconstruct(cls, *arguments: object) -> PathSlacks:
         """Return what a plan has kept."""
-        return cls(arm, constraints, relief)
+        return cls(*arguments)  # type: ignore[arg-type]
 
     def owners(self) -> list[int]:
         """Return the index of the constraint that each slack belongs to."""
@@ -82,13 +81,23 @@ class PathSlacks:
         is given up then. All others have a reserve for what is between the points of a mesh.
 
         """
-        lowest = (self(ends) - self.relief).min(axis=0)
-        return PathSlacks(self.arm, self.constraints, np.maximum(least - lowest, -_RESERVE))
+        lowest = self.evaluate(ends).min(axis=0)
+        return self.with_relief(np.maximum(least - lowest, -_RESERVE))
+
+    def with_relief(self, relief: Array) -> PathSlacks:
+        """Return the same slacks with something else added to them."""
+        return PathSlacks(self.arm, self.constraints, relief)
 
     def __call__(self, states: Array) -> Array:
         """Return the slacks in states (k, 2 n_t), shape (k, n_c)."""
-        slacks: Array = self._functions['slacks'](states, self._numbers)[0] + self.relief
+        slacks: Array = self.evaluate(states) + self.relief
         return slacks
+
+    def evaluate(self, states: Array) -> Array:
+        """Return the slacks in states (k, 2 n_t) without relief, shape (k, n_c)."""
+        if not self._functions:
+            return np.zeros((len(states), 0))
+        return self._functions['slacks'](states, self._numbers)[0]
 
     def linearise(self, states: Array, multipliers: Array) -> tuple[Array, Array, Array]:
         """
@@ -108,9 +117,18 @@ class PathSlacks:
             (k, 2 n_t, 2 n_t).
 
         """
+        slacks, slopes, curvature = self.differentiate(states, multipliers)
+        return slacks + self.relief, slopes, curvature
+
+    def differentiate(self, states: Array, multipliers: Array) -> tuple[Array, Array, Array]:
+        """Return slacks without relief and derivatives, see `linearise`."""
+        count, half = states.shape
+        if not self._functions:
+            return (np.zeros((count, 0)), np.zeros((count, 0, half)),
+                    np.zeros((count, half, half)))
         slacks, slopes, curvature = self._functions['linearised_slacks'](
             states, multipliers, self._numbers)
-        return slacks + self.relief, slopes.reshape(len(states), self.count, -1), curvature
+        return slacks, slopes.reshape(count, slacks.shape[1], -1), curvature
 
 
 def _load(arm: Arm, constraints: Sequence[PathConstraint]) -> dict[str, BatchFunction]:

@@ -43,7 +43,9 @@ def find_obstacles(slacks: PathSlacks, values: Array) -> list[KeepOut]:
     for owner, slack in zip(slacks.owners(), values.min(axis=0).tolist(), strict=True):
         least[owner] = min(slack, least.get(owner, 0.0))
     passed = sorted((slack, owner) for owner, slack in least.items() if slack < 0)
-    every = (slacks.constraints[owner] for _, owner in passed)
+    # motors, which are no obstacles, count on after the constraints
+    count = len(slacks.constraints)
+    every = (slacks.constraints[owner] for _, owner in passed if owner < count)
     return [one for one in every if isinstance(one, KeepOut) and one.is_obstacle]
 
 

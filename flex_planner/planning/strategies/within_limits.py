@@ -27,7 +27,7 @@ from flex_planner.collocation.junctions import double_nodes
 from flex_planner.optimal_control.barrier_problem import MotionBarrier
 from flex_planner.optimal_control.constrained_motion import ConstrainedMotion
 from flex_planner.optimal_control.motion_problem import MotionProblem
-from flex_planner.optimal_control.path_barrier import PathBarrier
+from flex_planner.optimal_control.path_barrier import limit_states
 from flex_planner.optimal_control.path_constraints import PathSlacks
 from flex_planner.optimal_control.totals import integrate_totals
 from flex_planner.optimal_control.via_points import free_times
@@ -75,7 +75,7 @@ def approach_limits(problem: MotionProblem, slacks: PathSlacks, near: Collocatio
         If the monitor stopped it.
 
     """
-    barrier, rate = PathBarrier(MotionBarrier(problem), slacks), find_cost_rate(problem, near)
+    barrier, rate = limit_states(problem, slacks), find_cost_rate(problem, near)
     guess = near.on_mesh(first_mesh(problem, solver), GaussRule.of(STAGES))
     for first, slack in _FIRST:
         schedule = _schedule(first * rate, _COARSE * rate, solver)
@@ -145,7 +145,7 @@ def solve_again(problem: MotionProblem, slacks: PathSlacks, near: CollocationSol
     kept = result.converged and _keeps(limited, result.solution)
     if kept or result.status in INTERRUPTED:
         return limited, result
-    barrier = PathBarrier(MotionBarrier(problem), slacks)
+    barrier = limit_states(problem, slacks)
     guess, mu = near.on_mesh(first_mesh(problem, solver), GaussRule.of(STAGES)), limited.mu
     met = solve_barrier(barrier, guess, barrier.guess(guess, _NEAR * mu),
                         _schedule(_NEAR * mu, _NEAR * mu, solver), solver.monitor)
@@ -172,10 +172,10 @@ def _schedule(first: float, last: float, solver: Solver) -> BarrierSchedule:
 def _follow(problem: MotionProblem, slacks: PathSlacks, met: BarrierOutcome, last: float,
             solver: Solver) -> BarrierOutcome:
     """Return the motion at the end of the barrier, which keeps its limits between points, too."""
-    half, barrier = problem.size // 2, PathBarrier(MotionBarrier(problem), slacks)
+    states, barrier = problem.layout.states, limit_states(problem, slacks)
     return follow_barrier(
         barrier, met.solution, met.y, _schedule(met.mu, min(last, met.mu), solver),
-        solver.monitor, slacks=lambda z: slacks(z[:, :half]), count=slacks.count,
+        solver.monitor, slacks=lambda z: slacks(z[:, states]), count=slacks.count,
         most_intervals=solver.settings.max_intervals)
 
 
@@ -203,10 +203,9 @@ def _at_best_times(limited: ConstrainedMotion, result: CollocationResult,
 
 def _keeps(limited: ConstrainedMotion, solution: CollocationSolution) -> bool:
     """Return whether a motion keeps its limits between the points of its mesh, too."""
-    half = limited.size // 2
     between = np.linspace(0, 1, _BETWEEN, dtype=np.float64)
-    states = solution.values_at(between)[..., :half].reshape(-1, half)
-    return bool((limited.slacks(states) > 0).all())
+    z = solution.values_at(between).reshape(-1, limited.size)
+    return bool((limited.slacks(z[:, limited.layout.states]) > 0).all())
 
 
 def find_cost_rate(problem: MotionProblem, near: CollocationSolution) -> float:

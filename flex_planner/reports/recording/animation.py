@@ -1,4 +1,4 @@
-"""The moving arm of a report, as data for arm.js: links as they bend, at even times."""
+"""The moving arm of a report, as data for scripts: links as they bend, at even times."""
 
 from __future__ import annotations
 
@@ -7,11 +7,13 @@ from typing import Any
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import link_points, payload_position
+from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.base.colours import ARM, FLEXIBLE, PLANNED, REFUSED
 from flex_planner.base.validation import Array
 from flex_planner.optimal_control.path_constraints import PathConstraint
 from flex_planner.planning.region_outlines import find_keep_outs, outline_region
 from flex_planner.reports.recording.contents import RecordedMotion
+from flex_planner.reports.recording.space_view import space_view
 import numpy as np
 
 _FRAMES, _STATIONS, _DIGITS = 201, 13, 4
@@ -22,7 +24,7 @@ _MARGIN = 0.06
 def animation(arm: Arm, motion: RecordedMotion,
               constraints: Sequence[PathConstraint] = ()) -> dict[str, Any]:
     """
-    Return what arm.js draws of a motion.
+    Return what arm.js draws of a motion in the plane, or space.js of one in space.
 
     Parameters
     ----------
@@ -38,27 +40,39 @@ def animation(arm: Arm, motion: RecordedMotion,
     dict
         ``times`` (F,) [s]; ``links`` (F, n, 2 k), of each link the points x, y, x, y ... from its
         joint to its end [mm]; ``payload`` (F, 2) [mm]; ``tip`` (2 m,), its recorded path [mm];
-        ``keep_outs``, of each region the corners of its outline [mm];
-        which links are ``flexible``; colours; ``box``, left, low, width and height [mm].
+        which links are ``flexible``; colours. In the plane ``keep_outs``, of each region the
+        corners of its outline [mm], and ``box``, left, low, width and height [mm]. In space points
+        have three coordinates, of a rigid link only its ends, and there is what `space_view`
+        returns.
 
     """
     times, coordinates = _even(motion)
     points = link_points(arm, coordinates, _STATIONS)
     payload = payload_position(arm, coordinates)
-    everything = np.concatenate([points.reshape(-1, 2), payload, motion.tip, np.zeros((1, 2))])
-    low, high = everything.min(axis=0), everything.max(axis=0)
-    margin = _MARGIN * arm.reach
-    return {
-        'times': times.round(6).tolist(),
-        'links': [[_flat(link) for link in frame] for frame in points],
-        'payload': [_flat(place) for place in payload], 'tip': _flat(motion.tip),
-        'keep_outs': [_flat(outline_region(one.region, arm.reach))
-                      for one in find_keep_outs(constraints)],
-        'flexible': [bool(link.modes) for link in arm.links],
+    shown = {
+        'times': times.round(6).tolist(), 'payload': [_flat(place) for place in payload],
+        'tip': _flat(motion.tip), 'flexible': [bool(link.modes) for link in arm.links],
         'loaded': bool(motion.payload_mass),
         'colours': {'flexible': FLEXIBLE, 'rigid': '#444444', 'aside': ARM, 'tip': PLANNED,
-                    'refused': REFUSED},
-        'box': _flat(np.concatenate([low - margin, high - low + 2 * margin]))}
+                    'refused': REFUSED}}
+    if isinstance(arm, SpatialArm):
+        kept = [slice(None) if link.modes else [0, -1] for link in arm.links]
+        everything = np.concatenate([points.reshape(-1, 3), payload, motion.tip])
+        return {**shown, **space_view(arm, coordinates, everything), 'links': [
+            [_flat(link[stations]) for link, stations in zip(frame, kept, strict=True)]
+            for frame in points]}
+    return {**shown, 'links': [[_flat(link) for link in frame] for frame in points],
+            'keep_outs': [_flat(outline_region(one.region, arm.reach))
+                          for one in find_keep_outs(constraints)],
+            'box': _box(np.concatenate([points.reshape(-1, 2), payload, motion.tip]), arm.reach)}
+
+
+def _box(points: Array, reach: float) -> list[float]:
+    """Return left, low, width and height of what holds points and the base [mm]."""
+    everything = np.concatenate([points, np.zeros((1, 2))])
+    low, high = everything.min(axis=0), everything.max(axis=0)
+    margin = _MARGIN * reach
+    return _flat(np.concatenate([low - margin, high - low + 2 * margin]))
 
 
 def _even(motion: RecordedMotion) -> tuple[Array, Array]:

@@ -175,7 +175,7 @@ def _deviation_from_request(request: RecordedRequest, motion: RecordedMotion,
     for (name, by_angles), coordinates, tip in zip(ends, found, tips, strict=True):
         point = getattr(task, f'{name}_point')
         miss = (coordinates[:n] - getattr(task, f'{name}_positions') if by_angles
-                else tip - (point.x, point.y))
+                else tip - [getattr(point, axis) for axis in 'xyz'[:tip.size]])
         findings.append(Finding(
             name=f'deviation from task, {name}', unit='rad' if by_angles else 'm',
             limit=limits.end_error, value=float(np.abs(miss).max())))

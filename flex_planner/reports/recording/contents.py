@@ -9,6 +9,7 @@ from typing import Any
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import arm_from_plain
+from flex_planner.arms.frames import name_joints
 from flex_planner.base.errors import FlexPlannerError, RecordingError
 from flex_planner.base.paths import expand_path
 from flex_planner.base.validation import Array
@@ -58,7 +59,7 @@ class RecordedMotion:
         Efforts of the joint trajectory [N m].
     position_costates, velocity_costates : numpy.ndarray, shape (k, n_t)
         psi_1 and psi_2.
-    tip : numpy.ndarray, shape (k, 2)
+    tip : numpy.ndarray, shape (k, 2), of a spatial arm (k, 3)
         [m].
     payload_mass : float
         Planned for [kg].
@@ -79,8 +80,8 @@ class RecordedMotion:
     begin: float = 0.0
 
     @classmethod
-    def of(cls, message: Any, begin: float) -> RecordedMotion:
-        """Return the motion of a FlexibleTrajectory."""
+    def of(cls, message: Any, begin: float, dimension: int = 2) -> RecordedMotion:
+        """Return the motion of a FlexibleTrajectory, whose points have so many coordinates."""
         joints, bends = message.joint_trajectory.points, message.points
         stamps = [point.time_from_start for point in joints]
         return cls(
@@ -91,7 +92,7 @@ class RecordedMotion:
             accelerations=_rows(joints, 'accelerations'), torques=_rows(joints, 'effort'),
             position_costates=_rows(bends, 'position_costates'),
             velocity_costates=_rows(bends, 'velocity_costates'),
-            tip=np.array([(point.x, point.y) for point in message.tip_path]),
+            tip=np.array([(point.x, point.y, point.z)[:dimension] for point in message.tip_path]),
             payload_mass=float(message.payload_mass), begin=begin)
 
     @property
@@ -202,7 +203,8 @@ class RecordedRequest:
             settings = dict(scenario['parameters'])
             # older recordings do not know of it
             begin = float(getattr(found.messages['PlanReport'], 'start_hold', 0.0))
-            motion = RecordedMotion.of(trajectory, begin) if trajectory else None
+            motion = (RecordedMotion.of(trajectory, begin, arm.dimension) if trajectory
+                      else None)
             if motion is not None:
                 _check_sizes(arm, motion)
             request = cls(
@@ -284,7 +286,7 @@ def _joint_names(settings: Mapping[str, Any], arm: Arm) -> tuple[str, ...]:
     names = settings.get('joint_names')
     if isinstance(names, list) and len(names) == arm.n_joints:
         return tuple(map(str, names))
-    return tuple(f'joint{i}' for i in range(1, arm.n_joints + 1))
+    return name_joints(arm)
 
 
 def _rows(points: Sequence[Any], field: str) -> Array:
@@ -295,7 +297,7 @@ def _rows(points: Sequence[Any], field: str) -> Array:
 def _check_sizes(arm: Arm, motion: RecordedMotion) -> None:
     """Raise ValueError unless a motion is one of an arm."""
     count, n_t = motion.times.size, arm.n_coordinates
-    shapes = {'coordinates': n_t, 'rates': n_t, 'torques': arm.n_joints, 'tip': 2,
+    shapes = {'coordinates': n_t, 'rates': n_t, 'torques': arm.n_joints, 'tip': arm.dimension,
               'accelerations': arm.n_joints,
               'position_costates': n_t, 'velocity_costates': n_t}
     for name, columns in shapes.items():

@@ -89,7 +89,7 @@ class MotionCheck:
     ----------
     findings : tuple of Finding
         In the order in which they are shown.
-    tip : numpy.ndarray, shape (k, 2)
+    tip : numpy.ndarray, shape (k, 2), or (k, 3) of a spatial arm
         Tip of the re-simulated arm at the recorded times [m].
 
     """

@@ -35,8 +35,8 @@ class NaturalFrequencies:
 
     @classmethod
     def of(cls, request: RecordedRequest) -> NaturalFrequencies | None:
-        """Return them; None where nothing moves, bends, or comes to rest."""
-        if request.motion is None or not request.arm.n_modes:
+        """Return them; None where nothing moves, bends, twists, or comes to rest."""
+        if request.motion is None or not request.arm.n_passive:
             return None
         # read from disk where the arm was planned for, else compiled
         model, n = ArmModel(request.arm), request.arm.n_joints

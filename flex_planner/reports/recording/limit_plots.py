@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from flex_planner.arms.joint_units import position_scales
 from flex_planner.base.colours import coordinate_colour, REFUSED, VIA
 from flex_planner.base.validation import Array
 from flex_planner.optimal_control.path_constraints import JointRange, JointSpeed
@@ -28,7 +29,10 @@ def add_limits(request: RecordedRequest, motion: RecordedMotion,
     """
     added = {'positions': [*_angle_bounds(request, motion), *_passed_angles(request, motion)],
              'speeds': _speed_bounds(request, motion),
-             'tip': [*_regions(request), *_passed_points(request, motion)]}
+             'tip': [*_regions(request), *_passed_points(request, motion, (0, 1))]}
+    if motion.tip.shape[1] == 3:  # no regions: they are of the plane
+        added |= {f'tip_{"xyz"[i]}{"xyz"[j]}': _passed_points(request, motion, (i, j))
+                  for i, j in ((0, 1), (0, 2), (1, 2))}
     bands = _active_bands(request, motion)
     return [replace(plot, series=[*plot.series, *added.get(plot.key, [])],
                     bands=bands if plot.group == _OVER_TIME else plot.bands) for plot in plots]
@@ -45,8 +49,9 @@ def _active_bands(request: RecordedRequest, motion: RecordedMotion) -> Bands | N
 
 
 def _angle_bounds(request: RecordedRequest, motion: RecordedMotion) -> list[Series]:
-    """Return the finite limits of joint angles [deg]."""
-    return [_bound(request, motion, one.joint, name, float(np.degrees(angle)))
+    """Return the finite limits of joint angles [deg], or of ways [mm]."""
+    scales = position_scales(request.arm)
+    return [_bound(request, motion, one.joint, name, float(scales[one.joint - 1] * angle))
             for one in request.path_constraints if isinstance(one, JointRange)
             for name, angle in (('lower limit', one.lower), ('upper limit', one.upper))
             if np.isfinite(angle)]
@@ -84,16 +89,17 @@ def find_via_times(request: RecordedRequest, motion: RecordedMotion) -> Array:
     return passed
 
 
-def _passed_points(request: RecordedRequest, motion: RecordedMotion) -> list[Series]:
-    """Return where the tip is at via points."""
+def _passed_points(request: RecordedRequest, motion: RecordedMotion,
+                   sides: tuple[int, int]) -> list[Series]:
+    """Return two of the tip's coordinates at via points."""
     times = find_via_times(request, motion)
-    x, y = (np.interp(times, motion.times, column) for column in motion.tip.T)
+    x, y = (np.interp(times, motion.times, column) for column in motion.tip[:, sides].T)
     return [Series(name='via points', x=x, y=y, colour=VIA, dots=True)] if times.size else []
 
 
 def _passed_angles(request: RecordedRequest, motion: RecordedMotion) -> list[Series]:
-    """Return the joint angles at via points [deg]."""
-    times = find_via_times(request, motion)
+    """Return the joint angles at via points [deg], or ways [mm]."""
+    times, scales = find_via_times(request, motion), position_scales(request.arm)
     return [Series(name=f'{name} at via points', x=times, dots=True, colour=coordinate_colour(i),
-                   y=np.degrees(np.interp(times, motion.times, motion.coordinates[:, i])))
+                   y=scales[i] * np.interp(times, motion.times, motion.coordinates[:, i]))
             for i, name in enumerate(request.joint_names)] if times.size else []

@@ -1,9 +1,9 @@
 """
 A report as one HTML file that needs nothing else.
 
-The plots are drawn by ``plots.js`` and the moving arm by ``arm.js`` beside this module, which
-are copied into the page: a library like plotly would make it 4 MB larger, and would be one more
-dependency.
+The plots are drawn by ``plots.js`` and the moving arm by ``arm.js`` or, in space, ``space.js``
+beside this module, which are copied into the page: a library like plotly would make it 4 MB
+larger, and would be one more dependency.
 
 """
 
@@ -34,7 +34,7 @@ from flex_planner.reports.recording.report_table import ReportTable
 from flex_planner.reports.recording.tables import tables, verdict
 
 _FOLDER = Path(__file__).parent
-_SCRIPTS = ('arm.js', 'plots.js')
+_SCRIPTS = ('player.js', 'arm.js', 'space.js', 'plots.js')
 _DIGITS = 9
 _PLAIN = ('key', 'title', 'x_label', 'y_label', 'group', 'log', 'equal', 'least')
 

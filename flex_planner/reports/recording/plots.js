@@ -390,7 +390,8 @@ function build() {
   }
   if (content.arm) {
     const timed = plots.filter((plot) => plot.spec.group === 'time');
-    const arm = new Arm(content.arm, document.getElementById('moving'), () => {});
+    const Shown = content.arm.radius ? SpatialArm : PlanarArm;
+    const arm = new Shown(content.arm, document.getElementById('moving'), () => {});
     // once it is shown: marks before it moves would say nothing
     arm.tell = (time) => timed.length && timed[0].share('mark', { x: time });
   }

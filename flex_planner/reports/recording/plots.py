@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from flex_planner.arms.joint_units import label_joints, position_scales
 from flex_planner.base.colours import (
     ASIDE,
     CARRIED,
@@ -28,6 +29,8 @@ from numpy.typing import NDArray
 
 _TIME = 'time [s]'
 _MILLI, _TINY = 1e3, 1e-300
+# of a path in space: what it is seen from, and the coordinates that are seen
+TIP_SIDES = (('from above', 0, 1), ('from the front', 0, 2), ('from the right', 1, 2))
 
 
 def plots(request: RecordedRequest, check: MotionCheck | None = None,
@@ -44,11 +47,11 @@ def _motion_plots(request: RecordedRequest, motion: RecordedMotion, check: Motio
     joints, modes, t = request.joint_names, arm.passive_names, motion.times
     found = [
         _torques(request, motion),
-        _over_time('positions', 'Joint angles', 'angle [deg]', t,
-                   np.degrees(motion.coordinates[:, :n]), joints, least=0.1),
-        _over_time('speeds', 'Joint speeds', 'speed [rad/s]', t, motion.rates[:, :n], joints,
-                   least=1e-3),
-        _tip(motion, check)]
+        _over_time('positions', 'Joint angles', label_joints(arm, 'angle [deg]', 'way [mm]'), t,
+                   position_scales(arm) * motion.coordinates[:, :n], joints, least=0.1),
+        _over_time('speeds', 'Joint speeds', label_joints(arm, 'speed [rad/s]', '[m/s]'), t,
+                   motion.rates[:, :n], joints, least=1e-3),
+        *_tips(motion, check)]
     if arm.n_passive:
         moving = motion.moving
         bends, rates = motion.coordinates[:, n:] * _MILLI, motion.rates[:, n:] * _MILLI
@@ -76,7 +79,8 @@ def _motion_plots(request: RecordedRequest, motion: RecordedMotion, check: Motio
 def _torques(request: RecordedRequest, motion: RecordedMotion) -> Plot:
     """Return the torques between their bounds, eq. (15)."""
     n = request.arm.n_joints
-    plot = _over_time('torques', 'Torques between their bounds', 'torque [N m]', motion.times,
+    plot = _over_time('torques', 'Torques between their bounds',
+                      label_joints(request.arm, 'torque [N m]', 'force [N]'), motion.times,
                       motion.torques, request.joint_names, least=1e-3)
     for name, values in zip(('lowest', 'highest'),
                             TorqueLimits.of(request.arm).bounds(motion.rates[:, :n]), strict=True):
@@ -120,17 +124,27 @@ def _spectrum(key: str, title: str, unit: str, times: Array, values: Array,
                 series=_columns(frequencies, amplitudes, names, first, log=True))
 
 
-def _tip(motion: RecordedMotion, check: MotionCheck | None) -> Plot:
-    """Return the path of the tip as planned, and as re-simulated by the check."""
-    path = motion.tip
-    series = [Series(name='planned', x=path[:, 0], y=path[:, 1], colour=PLANNED)]
+def _tips(motion: RecordedMotion, check: MotionCheck | None) -> list[Plot]:
+    """Return the path of the tip as planned and as re-simulated, in space from three sides."""
+    if motion.tip.shape[1] == 2:
+        return [_tip('tip', 'Path of the tip', motion, check, (0, 1))]
+    return [_tip(f'tip_{"xyz"[i]}{"xyz"[j]}', f'Path of the tip, {side}', motion, check, (i, j))
+            for side, i, j in TIP_SIDES]
+
+
+def _tip(key: str, title: str, motion: RecordedMotion, check: MotionCheck | None,
+         sides: tuple[int, int]) -> Plot:
+    """Return the path of the tip in two of its coordinates."""
+    x, y = motion.tip[:, sides].T
+    series = [Series(name='planned', x=x, y=y, colour=PLANNED)]
     if check is not None:
-        series.append(Series(name='re-simulated', x=check.tip[:, 0], y=check.tip[:, 1],
-                             colour=CARRIED_OUT,
+        done = check.tip[:, sides].T
+        series.append(Series(name='re-simulated', x=done[0], y=done[1], colour=CARRIED_OUT,
                              dashed=True))
-    series += [Series(name=name, x=path[k:k + 1, 0], y=path[k:k + 1, 1], colour=colour, dots=True)
-               for name, k, colour in (('start', 0, ASIDE), ('goal', len(path) - 1, CARRIED))]
-    return Plot(key='tip', title='Path of the tip', x_label='x [m]', y_label='y [m]', equal=True,
+    series += [Series(name=name, x=x[k:k + 1], y=y[k:k + 1], colour=colour, dots=True)
+               for name, k, colour in (('start', 0, ASIDE), ('goal', len(x) - 1, CARRIED))]
+    first, second = ('xyz'[i] for i in sides)
+    return Plot(key=key, title=title, x_label=f'{first} [m]', y_label=f'{second} [m]', equal=True,
                 series=series)
 
 

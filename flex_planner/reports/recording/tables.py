@@ -7,6 +7,9 @@ from dataclasses import fields
 from itertools import zip_longest
 from typing import Any
 
+from flex_planner.arms.arm import Arm
+from flex_planner.arms.joint_units import units_of
+from flex_planner.base.validation import Array
 from flex_planner.planning.certificate import CertificateLimits
 from flex_planner.planning.warnings import WarningKind
 from flex_planner.reports.execution import execution_rows, vibrations
@@ -74,8 +77,8 @@ def numbers(values: Iterable[float]) -> str:
 def _task(request: RecordedRequest) -> ReportTable:
     """Return the task of the request."""
     task = request.task
-    ends = [_say_end(task, 'start', task.space == task.CARTESIAN),
-            _say_end(task, 'goal', task.space != task.JOINT)]
+    ends = [_say_end(request, 'start', task.space == task.CARTESIAN),
+            _say_end(request, 'goal', task.space != task.JOINT)]
     rows = [('start', ends[0]), *_via_points(request), ('goal', ends[1]),
             ('duration', f'{task.duration:g} s'),
             ('payload', f'{task.payload_mass:g} kg, '
@@ -102,22 +105,37 @@ def _via_points(request: RecordedRequest) -> list[tuple[str, str]]:
     passed = list(getattr(request.report, 'via_times', ())) or list(times)
     rows = []
     for k, (time, when) in enumerate(zip(times, passed, strict=False)):
-        angles = np.degrees(task.via_positions[k * n:(k + 1) * n])
-        place = (f'({numbers(angles)}) deg' if np.isfinite(angles).any()
-                 else f'({task.via_points[k].x:g}, {task.via_points[k].y:g}) m')
+        angles = np.asarray(task.via_positions[k * n:(k + 1) * n], dtype=np.float64)
+        place = (_say_positions(request.arm, angles) if np.isfinite(angles).any()
+                 else _say_point(task.via_points[k], request.arm.dimension))
         at = f' at {when:.6g} s' if when else ''
         rows.append((f'via point {k + 1}', f'{place}{at}{"" if time else " (free time)"}'))
     return rows
 
 
-def _say_end(task: Any, name: str, is_point: bool) -> str:
+def _say_end(request: RecordedRequest, name: str, is_point: bool) -> str:
     """Return start or goal in words."""
+    task = request.task
     if name == 'start' and int(getattr(task, 'start', False)):  # that of the arm was never known
         return 'where the arm is'
     if is_point:
-        point = getattr(task, f'{name}_point')
-        return f'({point.x:g}, {point.y:g}) m'
-    return f'({numbers(np.degrees(getattr(task, f"{name}_positions")))}) deg'
+        return _say_point(getattr(task, f'{name}_point'), request.arm.dimension)
+    return _say_positions(request.arm, getattr(task, f'{name}_positions'))
+
+
+def _say_positions(arm: Arm, positions: Sequence[float] | Array) -> str:
+    """Return joint positions in words; a request that was refused may have others than n."""
+    units, values = [units_of(joint) for joint in arm.joints], np.array(positions, dtype=float)
+    scales = np.ones(max(len(units), values.size))
+    scales[:len(units)] = [unit.scale for unit in units]
+    shown = ', '.join(dict.fromkeys(unit.position for unit in units))
+    return f'({numbers(scales[:values.size] * values)}) {shown}'
+
+
+def _say_point(point: Any, dimension: int) -> str:
+    """Return a point of a message in words."""
+    values = [point.x, point.y, point.z][:dimension]
+    return f'({", ".join(f"{value:g}" for value in values)}) m'
 
 
 def _outcome(request: RecordedRequest) -> ReportTable:
@@ -131,7 +149,7 @@ def _outcome(request: RecordedRequest) -> ReportTable:
              ('iterations', str(report.iterations)), ('intervals', str(report.mesh_intervals))]
     if report.map_cell:
         rows.append(('started from', report.map_cell))
-    rows += _arm_and_controller(report)
+    rows += _arm_and_controller(request.arm, report)
     if request.motion is not None:
         rows += [('payload', f'{request.motion.payload_mass:.6g} kg'),
                  ('cost J', f'{report.cost:.6g}'), ('effort', f'{report.effort:.6g} N²m²s'),
@@ -140,11 +158,11 @@ def _outcome(request: RecordedRequest) -> ReportTable:
     return ReportTable(title='Outcome', rows=tuple(rows))
 
 
-def _arm_and_controller(report: Any) -> list[tuple[str, str]]:
+def _arm_and_controller(arm: Arm, report: Any) -> list[tuple[str, str]]:
     """Return where the arm was, and what its controller did; older recordings have neither."""
     rows = []
     if len(getattr(report, 'measured_positions', ())):
-        rows.append(('arm measured at', f'({numbers(np.degrees(report.measured_positions))}) deg'))
+        rows.append(('arm measured at', _say_positions(arm, report.measured_positions)))
     took = getattr(report, 'execution_time', None)
     if took is not None and (took.sec or took.nanosec):
         accepted = 'accepted' if report.execution_accepted else 'not accepted'
@@ -211,13 +229,14 @@ def _joints(request: RecordedRequest) -> ReportTable:
     columns = [values if len(values) == n else np.full(n, np.nan) for values in (
         report.peak_torques, report.peak_torque_shares, report.peak_speeds,
         report.peak_speed_shares, report.saturation)]
-    rows = zip(request.joint_names, *columns, strict=True)
+    units = [units_of(joint) for joint in request.arm.joints]
+    rows = zip(request.joint_names, units, *columns, strict=True)
     return ReportTable(
         title='Motors', columns=('', 'peak torque', 'of its limit', 'peak speed',
                                  'of no-load speed', 'time on its limit'),
-        rows=tuple((name, f'{torque:.4g} N m', _percent(part), f'{speed:.4g} rad/s',
-                    _percent(share), _percent(full))
-                   for name, torque, part, speed, share, full in rows))
+        rows=tuple((name, f'{torque:.4g} {unit.torque}', _percent(part),
+                    f'{speed:.4g} {unit.speed}', _percent(share), _percent(full))
+                   for name, unit, torque, part, speed, share, full in rows))
 
 
 def _frequencies(frequencies: NaturalFrequencies) -> ReportTable:

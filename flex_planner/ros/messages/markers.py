@@ -10,7 +10,7 @@ from flex_planner.base.validation import Array
 from flex_planner.optimal_control.path_constraints import PathConstraint
 from flex_planner.planning.region_outlines import find_keep_outs, outline_region
 from flex_planner.planning.sampling import SampledPlan
-from geometry_msgs.msg import Point
+from flex_planner.ros.messages.points import point_message
 import numpy as np
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
@@ -67,6 +67,28 @@ def motion_markers(arm: Arm, reference: SampledPlan, frame: str,
     return MarkerArray(markers=markers)
 
 
+def arm_markers(arm: Arm, coordinates: Array, frame: str) -> MarkerArray:
+    """
+    Return the bent links as they are: namespaces ``links`` and ``tip``.
+
+    Parameters
+    ----------
+    arm : Arm
+        n_t coordinates.
+    coordinates : numpy.ndarray, shape (n_t,)
+        q.
+    frame : str
+        Of the base.
+
+    """
+    links, width = link_points(arm, coordinates, _STATIONS), _reach(arm) / 100
+    markers = [_line('links', i, points, (*_LINK, 1.0), width) for i, points in enumerate(links)]
+    markers.append(_ball('tip', links[-1][-1], (*_PATH, 1.0), 2 * width))
+    for marker in markers:
+        marker.header.frame_id = frame
+    return MarkerArray(markers=markers)
+
+
 def _reach(arm: Arm) -> float:
     return float(sum(link.length for link in arm.links))
 
@@ -82,7 +104,7 @@ def _marker(namespace: str, number: int, kind: int, color: tuple[float, ...]) ->
 def _line(namespace: str, number: int, points: Array, color: tuple[float, ...],
           width: float) -> Marker:
     marker = _marker(namespace, number, Marker.LINE_STRIP, color)
-    marker.points = [Point(x=float(x), y=float(y), z=0.0) for x, y in points]
+    marker.points = [point_message(point) for point in points]
     marker.scale.x = width
     return marker
 
@@ -90,6 +112,6 @@ def _line(namespace: str, number: int, points: Array, color: tuple[float, ...],
 def _ball(namespace: str, place: Array, color: tuple[float, ...], size: float,
           number: int = 0) -> Marker:
     marker = _marker(namespace, number, Marker.SPHERE, color)
-    marker.pose.position = Point(x=float(place[0]), y=float(place[1]), z=0.0)
+    marker.pose.position = point_message(place)
     marker.scale.x = marker.scale.y = marker.scale.z = size
     return marker

@@ -38,9 +38,9 @@ from flex_planner.ros.messages.classes import (
     JointTrajectoryPoint,
     MotionTask,
     PlanReport,
-    Point,
 )
 from flex_planner.ros.messages.measured_starts import ArmStateError
+from flex_planner.ros.messages.points import point_coordinates, point_message
 from flex_planner.ros.messages.robustness import add_robustness, robustness_from_message
 from flex_planner.ros.messages.spaces import SPACES
 from flex_planner.ros.messages.via_points import via_points_from_message
@@ -149,7 +149,8 @@ def _ends(message: MotionTask, arm: Arm, settings: PlannerSettings) -> dict[str,
     if message.elbow not in (-1, 0, 1):
         raise InvalidValueError('elbow', message.elbow, '-1, +1, or 0 for the default')
     elbow = message.elbow or settings.elbow
-    start, goal = ((point.x, point.y) for point in (message.start_point, message.goal_point))
+    start, goal = (point_coordinates(point, arm)
+                   for point in (message.start_point, message.goal_point))
     if message.space == MotionTask.CARTESIAN:
         return ends_at_points(arm, start, goal, elbow)
     return angles | ends_at_points(arm, None, goal, elbow, vector(
@@ -283,7 +284,7 @@ def flexible_trajectory(plan: Plan, reference: SampledPlan, joints: JointTraject
         joint_trajectory=joints, modal_names=list(plan.arm.passive_names),
         points=[_flexible_point(plan.arm.n_joints, samples, k, time)
                 for k, time in enumerate(reference.times_ns)],
-        tip_path=[Point(x=float(x), y=float(y), z=0.0) for x, y in samples.tip],
+        tip_path=[point_message(place) for place in samples.tip],
         payload_mass=plan.task.payload_mass)
     message.header.frame_id = frame
     return message

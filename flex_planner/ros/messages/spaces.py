@@ -28,4 +28,4 @@ def _means_points(message: MotionTask) -> bool:
     """Return whether a request has points, or lacks joint angles."""
     points = (message.start_point, message.goal_point)
     return (not (message.start_positions and message.goal_positions)
-            or any(point.x or point.y for point in points))
+            or any(point.x or point.y or point.z for point in points))

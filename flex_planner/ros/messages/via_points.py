@@ -7,6 +7,7 @@ from flex_planner.base.errors import InvalidSizeError, InvalidValueError
 from flex_planner.optimal_control.task import Task
 from flex_planner.optimal_control.via_points import MOST_VIA_POINTS, ViaPoint
 from flex_planner.ros.messages.classes import MotionTask, Point
+from flex_planner.ros.messages.points import point_coordinates, point_message
 import numpy as np
 
 
@@ -42,7 +43,7 @@ def via_points_from_message(message: MotionTask, arm: Arm) -> tuple[ViaPoint, ..
             found.append(ViaPoint(positions=positions[k], time=time))
         else:
             point = message.via_points[k]
-            found.append(ViaPoint(point=[point.x, point.y], time=time))
+            found.append(ViaPoint(point=point_coordinates(point, arm), time=time))
     return tuple(found)
 
 
@@ -55,5 +56,5 @@ def fill_via_points(message: MotionTask, task: Task) -> None:
     message.via_positions = np.concatenate([
         via.positions if via.positions.size else np.full(n, np.nan)
         for via in task.via_points]).tolist()
-    message.via_points = [Point(x=float(via.point[0]), y=float(via.point[1]))
-                          if via.point.size else Point() for via in task.via_points]
+    message.via_points = [point_message(via.point) if via.point.size else Point()
+                          for via in task.via_points]

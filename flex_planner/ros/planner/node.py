@@ -28,6 +28,7 @@ from flex_planner.ros.planner.request_queue import PendingRequest, RequestQueue,
 from flex_planner.ros.planner.streamer import Streamer
 from flex_planner.ros.runtime.parameters import (
     apply_changes,
+    ARM_PARAMETERS,
     declare,
     declare_arm,
     judge_changes,
@@ -88,7 +89,7 @@ class PlannerNode(Node):  # type: ignore[misc]
         if WHY_NOT_ROS:
             raise FlexPlannerError(WHY_NOT_ROS)
         super().__init__('flex_planner')
-        warn_of_unknown(self, PlannerSettings, ['arm'])
+        warn_of_unknown(self, PlannerSettings, ARM_PARAMETERS)
         helper_processes()  # what the environment says is refused at once
         arm = declare_arm(self)
         self._settings = declare(self, PlannerSettings.for_arm(arm))

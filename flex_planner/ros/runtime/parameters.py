@@ -7,10 +7,10 @@ from dataclasses import fields, replace
 from typing import Any, TypeVar
 
 from flex_planner.arms.arm import Arm
-from flex_planner.arms.arm_files import load_arm
-from flex_planner.arms.planar_only import require_planar
+from flex_planner.arms.arm_files import arm_from_mapping, load_arm
 from flex_planner.base.errors import FlexPlannerError, InvalidValueError
 from flex_planner.base.suggestions import nearest_name
+from flex_planner.ros.runtime.descriptions import hear_description
 from flex_planner.ros.settings.fields import Description
 from rcl_interfaces.msg import (
     FloatingPointRange,
@@ -24,6 +24,7 @@ import yaml
 
 Settings = TypeVar('Settings')
 
+ARM_PARAMETERS = ('arm', 'robot_description', 'robot_description_topic')
 _DEFAULT_ARM = 'korayem_ei50'
 # of ROS itself: none of a node's own, and not declared before they are used
 _OF_ROS = 'qos_overrides', 'use_sim_time', 'start_type_description_service'
@@ -135,22 +136,42 @@ def _list(text: str) -> object:
 
 def declare_arm(node: Node) -> Arm:
     """
-    Declare the read-only parameter ``arm`` and return the arm that it names.
+    Declare the read-only parameters `ARM_PARAMETERS` and return the arm that they describe.
 
     Raises
     ------
-    ArmFileError
-        If there is no such arm, or its file is wrong.
-    PlanarOnlyError
-        If it is a spatial one.
+    FlexPlannerError
+        If there is no such arm, its file or its URDF is wrong, or no URDF comes in time.
 
     """
     description = Description(
         text='Name of a preset in config/arms, or path of an arm file.', read_only=True)
+    given = 'arm' in _given(node)
     name = str(node.declare_parameter('arm', _DEFAULT_ARM, _descriptor(description, '')).value)
-    arm = load_arm(name)
-    require_planar(arm, 'the nodes')
-    return arm
+    text = declare_description(node)
+    return arm_from_mapping({}, description=text) if text and not given else load_arm(name, text)
+
+
+def declare_description(node: Node) -> str:
+    """
+    Declare the parameters of a robot's description and return it, empty if there is none.
+
+    Raises
+    ------
+    FlexPlannerError
+        If both are given, or nothing comes on the topic.
+
+    """
+    texts = ('Text of a URDF file, in place of the one that the arm file names; without an arm '
+             'file every link is rigid.', 'Topic on which such a text comes, of a '
+             'robot_state_publisher for example; empty: none.')
+    text, topic = (str(node.declare_parameter(
+        name, '', _descriptor(Description(text=about, read_only=True), '')).value)
+        for name, about in zip(ARM_PARAMETERS[1:], texts, strict=True))
+    if text and topic:
+        raise InvalidValueError(ARM_PARAMETERS[2], topic, f'empty where {ARM_PARAMETERS[1]} is '
+                                'given')
+    return hear_description(node, topic) if topic else text
 
 
 def apply_changes(settings: Settings, changes: list[Parameter]) -> Settings:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from flex_planner.arms.arm import Arm
+from flex_planner.arms.frames import name_frames, name_joints
 from flex_planner.base.errors import InvalidSizeError, InvalidValueError
 from flex_planner.base.paths import expand_path, folder_from_environment
 from flex_planner.base.validation import plain_names, vector
@@ -178,9 +179,9 @@ class PlannerSettings:
     @classmethod
     def for_arm(cls, arm: Arm) -> PlannerSettings:
         """Return the defaults for an arm."""
-        names = [f'joint{i}' for i in range(1, arm.n_joints + 1)]
         gains = default_gains(ArmDynamics.of(arm))
-        return replace(cls(), joint_names=names, effort_weights=[1.0] * arm.n_joints,
+        return replace(cls(), joint_names=list(name_joints(arm)),
+                       base_frame=name_frames(arm)[0], effort_weights=[1.0] * arm.n_joints,
                        controller_stiffness=gains.stiffness.tolist(),
                        controller_damping=gains.damping.tolist())
 

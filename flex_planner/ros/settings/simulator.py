@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from flex_planner.arms.arm import Arm, Joint
+from flex_planner.arms.frames import name_frames, name_joints
 from flex_planner.base.validation import plain_names, vector
 from flex_planner.control.default_gains import default_gains
 from flex_planner.control.joint_controller import EffortHold, Gains, MAX_RATE, MIN_RATE
@@ -94,11 +95,18 @@ class SimulatorSettings:
     start_tolerance: float = parameter_field(
         0.05, 'A trajectory that starts further from the arm than this is refused [rad].',
         lowest=0.0, highest=10.0, read_only=True)
-    base_frame: str = parameter_field('base_link', 'Frame of the tip.', read_only=True)
+    base_frame: str = parameter_field('base_link', 'Frame of the base.', read_only=True)
+    frame_prefix: str = parameter_field(
+        'bent_', 'What the names of the frames of the links and of the tip begin with on /tf, '
+        'beside those of a robot_state_publisher, whose links do not bend.', read_only=True)
+    picture_rate: float = parameter_field(
+        25.0, 'Rate of the markers and frames [Hz]; 0: none.', lowest=0.0, highest=1000.0,
+        read_only=True)
 
     def __post_init__(self) -> None:
         count = len(self.joint_names)
         plain_names('joint_names', self.joint_names)
+        plain_names('frame_prefix', [self.frame_prefix])
         for name in ('stiffness', 'damping', 'added_friction'):
             vector(name, getattr(self, name), count, at_least=0, at_most=MAX_GAIN)
         vector('initial_positions', self.initial_positions, count, at_least=-MAX_JOINT_ANGLE,
@@ -110,7 +118,8 @@ class SimulatorSettings:
     def for_arm(cls, arm: Arm) -> SimulatorSettings:
         """Return the defaults for an arm."""
         n, gains = arm.n_joints, default_gains(ArmDynamics.of(arm))
-        return replace(cls(), joint_names=[f'joint{i}' for i in range(1, n + 1)],
+        return replace(cls(), joint_names=list(name_joints(arm)),
+                       base_frame=name_frames(arm)[0],
                        initial_positions=[_within_limits(joint) for joint in arm.joints],
                        stiffness=gains.stiffness.tolist(),
                        damping=gains.damping.tolist(), added_friction=[0.0] * n)

@@ -339,7 +339,7 @@ def test_script_is_sound() -> None:
     if node is None:
         pytest.skip('no node is installed')
     folder = Path(__file__).parents[3] / 'flex_planner' / 'reports' / 'recording'
-    for name in ('arm.js', 'plots.js'):
+    for name in ('player.js', 'arm.js', 'space.js', 'plots.js'):
         subprocess.run([node, '--check', str(folder / name)], check=True)
 
 
