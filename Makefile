@@ -1,5 +1,6 @@
 .DEFAULT_GOAL := help
-.PHONY: help setup demo demo-library paper test test-thorough lint docs bench clean
+.PHONY: help setup demo demo-library paper test test-thorough test-thorough-beside \
+        test-thorough-alone lint lint-types lint-style docs bench clean
 
 # The interpreter for .venv; a finished .venv stays as it is unless PYTHON is given.
 ifeq ($(origin PYTHON),undefined)
@@ -44,17 +45,32 @@ test: lint
 test-thorough: setup
 	$(call run_tests,thorough)
 
+# the same in two parts, for who has something else to do beside the second
+test-thorough-beside: setup
+	$(call run_beside,thorough)
+
+test-thorough-alone: setup
+	$(call run_alone,thorough)
+
+run_beside = tools/run python -m pytest -n auto --dist loadfile -m '$(1) and not alone'
+run_alone = tools/run python -m pytest -m '$(1) and alone'
+
 # run_tests MARKS: first what runs beside others, then what does not, also if the first fails
 define run_tests
 @failed=0; \
-tools/run python -m pytest -n auto --dist loadfile -m '$(1) and not alone' || failed=1; \
-tools/run python -m pytest -m '$(1) and alone' || failed=1; \
+$(call run_beside,$(1)) || failed=1; \
+$(call run_alone,$(1)) || failed=1; \
 exit $$failed
 endef
 
 lint: setup
-	tools/run ruff check
+	@$(MAKE) --no-print-directory -j2 lint-types lint-style
+
+lint-types:
 	tools/run mypy
+
+lint-style:
+	tools/run ruff check
 	tools/run codespell
 	@mkdir -p log
 	@tools/run ament_flake8 $(CODE) >log/lint.txt || { cat log/lint.txt; exit 1; }

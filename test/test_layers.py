@@ -20,14 +20,14 @@ FLOORS = {
     'optimal_control': 3,
     'control': 4,
     'planning': 5,
-    'capacity': 6, 'simulation': 6,
-    'plotting': 7, 'reports': 7,
+    'capacity': 6, 'identification': 6, 'simulation': 6,
+    'logs': 7, 'plotting': 7, 'reports': 7,
     'maps': 8, 'paper': 8,
     'ros': 9,
     'cli': 10,
 }
 CORE = ('base', 'arms', 'collocation', 'dynamics', 'optimal_control', 'control', 'planning',
-        'capacity', 'simulation')
+        'capacity', 'identification', 'simulation')
 # what the core must do without
 BLOCKED = ['rclpy', 'flex_planner_interfaces', 'matplotlib', 'mcap', 'mcap_ros2', 'rosbags',
            'geometry_msgs', 'sensor_msgs', 'trajectory_msgs', 'builtin_interfaces']
@@ -126,7 +126,7 @@ def test_casadi_is_imported_only_to_derive_and_to_compile() -> None:
     assert users == {
         'dynamics.body_power', 'dynamics.build_chain', 'dynamics.chain',
         'dynamics.dynamics_functions', 'dynamics.function_source', 'dynamics.joint_power',
-        'dynamics.moving_frame', 'dynamics.torque_bounds',
+        'dynamics.moving_frame', 'dynamics.torque_bounds', 'identification.loop_functions',
         'optimal_control.direct.programme', 'optimal_control.free_rates',
         'optimal_control.barrier_conditions', 'optimal_control.offset_conditions',
         'optimal_control.path_constraints.obstacles',

@@ -25,6 +25,7 @@ SECTIONS = {
                       'flex_planner.arms.spatial_body',
                       'flex_planner.arms.spatial_inverse_kinematics'),
     'Tasks and plans': ('flex_planner.optimal_control.task',
+                        'flex_planner.optimal_control.goal_in_pose',
                         'flex_planner.optimal_control.path_constraints',
                         'flex_planner.optimal_control.via_points',
                         'flex_planner.planning.objectives',

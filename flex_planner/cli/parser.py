@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from flex_planner.base.version import VERSION
 from flex_planner.cli.command_parser import CommandParser
-from flex_planner.cli.commands import arm, cache, compare, gains, paper, plan, recordings
+from flex_planner.cli.commands import arm, cache, compare, gains, identify, paper, plan, recordings
 from flex_planner.cli.commands import map as maps
 from flex_planner.cli.options import join_lists
 
@@ -27,6 +27,7 @@ def build_parser() -> argparse.ArgumentParser:
     plan.add_commands(commands)
     compare.add_command(commands)
     gains.add_command(commands)
+    identify.add_command(commands)
     maps.add_command(commands)
     paper.add_command(commands)
     cache.add_command(commands)

@@ -76,6 +76,6 @@ def _follow(dynamics: ArmDynamics, arm: SpatialArm, q: Array,
     if q.size == n:
         return moves
     stiffness = dynamics.static_forces(q[None], parameters.physical)[1][0]
-    follows: Array = moves[:, :n] - moves[:, n:] @ np.linalg.solve(stiffness[n:, n:],
-                                                                  stiffness[n:, :n])
+    sagging = np.linalg.solve(stiffness[n:, n:], stiffness[n:, :n])
+    follows: Array = moves[:, :n] - moves[:, n:] @ sagging
     return follows
