@@ -236,7 +236,7 @@ def _plan_smoothly(problem: MotionProblem, solver: Solver,
     if isinstance(start, Plan) and start.solution is not None and start.problem.layout.torques:
         plan = plan_problem(problem, solver, tuple(_given(start, problem, solver)))
         if plan.certified:
-            return keep_limits(plan, solver, effort)
+            return _keep(plan, solver, None, effort)
     task = without_torque_rates(problem.task)
     stiff = find_stiff_links(MotionProblem(problem.model, task, problem.parameters), solver)
     if stiff is not None:
@@ -247,7 +247,7 @@ def _plan_smoothly(problem: MotionProblem, solver: Solver,
                       strategies=strategies, search=effort)
     if plain.status is PlanStatus.INFEASIBLE:  # nor is a motion whose torques are less free
         return replace(plain, task=problem.task, problem=problem)
-    return keep_limits(plan_without_jumps(problem, plain, solver), solver, effort)
+    return _keep(plan_without_jumps(problem, plain, solver), solver, None, effort)
 
 
 def _not_possible(problem: MotionProblem, why: str) -> Plan:
