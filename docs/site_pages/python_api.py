@@ -31,6 +31,7 @@ SECTIONS = {
                         'flex_planner.planning.objectives',
                         'flex_planner.planning.plan', 'flex_planner.planning.plan_path',
                         'flex_planner.planning.certificate', 'flex_planner.planning.warnings',
+                        'flex_planner.planning.replan',
                         'flex_planner.planning.sampling', 'flex_planner.planning.robustness',
                         'flex_planner.planning.robust.objective',
                         'flex_planner.planning.robust.effort_front'),

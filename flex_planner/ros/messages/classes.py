@@ -17,6 +17,7 @@ TYPES: Final = MessageTypes.load([definition_folder(PACKAGE)])
 try:
     from builtin_interfaces.msg import Duration
     from flex_planner_interfaces.msg import (
+        FeedbackGains,
         FlexiblePoint,
         FlexibleTrajectory,
         MotionTask,
@@ -27,7 +28,8 @@ try:
     from sensor_msgs.msg import JointState
     from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-    for _class in (FlexiblePoint, FlexibleTrajectory, MotionTask, PayloadSearch, PlanReport):
+    for _class in (FeedbackGains, FlexiblePoint, FlexibleTrajectory, MotionTask, PayloadSearch,
+                   PlanReport):
         _known = TYPES.fields(f'{PACKAGE}/msg/{_class.__name__}')
         if list(_class.get_fields_and_field_types()) != list(_known):
             raise ImportError(f'the installed {PACKAGE} are of another version of flex_planner: '
@@ -37,6 +39,7 @@ except ImportError as _error:
     WHY_NOT_ROS = str(_error)
     _find: Any = StandIns(TYPES).find
     Duration = _find('builtin_interfaces/msg/Duration')
+    FeedbackGains = _find(f'{PACKAGE}/msg/FeedbackGains')
     FlexiblePoint = _find(f'{PACKAGE}/msg/FlexiblePoint')
     FlexibleTrajectory = _find(f'{PACKAGE}/msg/FlexibleTrajectory')
     MotionTask = _find(f'{PACKAGE}/msg/MotionTask')
@@ -49,6 +52,7 @@ except ImportError as _error:
 
 __all__ = [
     'Duration',
+    'FeedbackGains',
     'FlexiblePoint',
     'FlexibleTrajectory',
     'JointState',

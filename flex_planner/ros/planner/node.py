@@ -13,6 +13,7 @@ from flex_planner.base.text import printable
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.planning.robustness import prepare_robustness
 from flex_planner.ros.messages.classes import WHY_NOT_ROS
+from flex_planner.ros.messages.feedback import feedback_message
 from flex_planner.ros.messages.markers import motion_markers
 from flex_planner.ros.messages.plans import duration_seconds, planning_time_limit
 from flex_planner.ros.planner.arm_state import ArmState
@@ -37,7 +38,7 @@ from flex_planner.ros.runtime.parameters import (
 from flex_planner.ros.runtime.running import run_node
 from flex_planner.ros.settings.planner import PlannerSettings
 from flex_planner_interfaces import action
-from flex_planner_interfaces.msg import FlexibleTrajectory, MotionTask
+from flex_planner_interfaces.msg import FeedbackGains, FlexibleTrajectory, MotionTask
 from flex_planner_interfaces.srv import FindMaxPayload, PlanPath
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
@@ -74,6 +75,8 @@ class PlannerNode(Node):  # type: ignore[misc]
     ----------------
     ~/joint_trajectory : trajectory_msgs/msg/JointTrajectory, latched
     ~/flexible_trajectory : flex_planner_interfaces/msg/FlexibleTrajectory, latched
+    ~/feedback_gains : flex_planner_interfaces/msg/FeedbackGains, latched
+        With the parameter feedback_gains.
     ~/reference_states : sensor_msgs/msg/JointState, along a published plan, by another process
     ~/markers : visualization_msgs/msg/MarkerArray, latched
     /diagnostics : diagnostic_msgs/msg/DiagnosticArray
@@ -112,6 +115,7 @@ class PlannerNode(Node):  # type: ignore[misc]
         self._joints = self.create_publisher(JointTrajectory, '~/joint_trajectory', LATCHED)
         self._flexible = self.create_publisher(
             FlexibleTrajectory, '~/flexible_trajectory', LATCHED)
+        self._gains = self.create_publisher(FeedbackGains, '~/feedback_gains', LATCHED)
         self._markers = self.create_publisher(MarkerArray, '~/markers', LATCHED)
         self._record = Record()
         self._diagnostics = Diagnostics(self, self._queue, self._record, self._streamer,
@@ -194,6 +198,9 @@ class PlannerNode(Node):  # type: ignore[misc]
             return
         markers = motion_markers(plan.arm, reference, settings.base_frame,
                                  plan.task.path_constraints, plan.via_times)
+        if outcome.gains is not None:  # first: a controller has them when it begins
+            self._gains.publish(feedback_message(outcome.gains, plan, settings.joint_names,
+                                                 settings.base_frame))
         self._joints.publish(outcome.trajectory.joint_trajectory)
         self._flexible.publish(outcome.trajectory)
         self._markers.publish(markers)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from flex_planner.base.progress import StopReason
+from flex_planner.planning.feedback.gains import FeedbackGains
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.sampling import SampledPlan
 from flex_planner.ros.messages.classes import FlexibleTrajectory, PayloadSearch, PlanReport
@@ -25,6 +26,8 @@ class Outcome:
         Empty unless there is a plan.
     plan, reference : Plan, SampledPlan or None
         What the trajectory was made of.
+    gains : FeedbackGains or None
+        Of feedback along the trajectory, where they are asked for.
     search : PayloadSearch or None
         Result of a search for the maximum payload.
 
@@ -34,6 +37,7 @@ class Outcome:
     trajectory: FlexibleTrajectory
     plan: Plan | None = None
     reference: SampledPlan | None = None
+    gains: FeedbackGains | None = None
     search: PayloadSearch | None = None
 
     @property

@@ -15,6 +15,8 @@ from flex_planner.base.text import printable
 from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.task import Task
+from flex_planner.planning.feedback.find_gains import find_feedback_gains, GainSettings
+from flex_planner.planning.feedback.gains import FeedbackGains
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_kind
 from flex_planner.planning.robustness import assess_robustness
@@ -278,4 +280,16 @@ def _outcome(report: PlanReport, plan: Plan | None, settings: PlannerSettings,
     broken = trajectory_violations(trajectory.joint_trajectory, settings.joint_names)
     if broken:
         raise RuntimeError(f'the trajectory would be refused: {"; ".join(broken)}')
-    return Outcome(report=report, trajectory=trajectory, plan=plan, reference=reference)
+    return Outcome(report=report, trajectory=trajectory, plan=plan, reference=reference,
+                   gains=_find_gains(plan, settings, monitor))
+
+
+def _find_gains(plan: Plan, settings: PlannerSettings, monitor: Monitor) -> FeedbackGains | None:
+    """Return gains of feedback, None where they are not asked for or the motion has none."""
+    if not settings.feedback_gains:
+        return None
+    try:
+        return find_feedback_gains(plan, GainSettings(controller=settings.controller()), monitor)
+    except FlexPlannerError as error:
+        _LOG.warning('no gains of feedback: %s', error)
+        return None

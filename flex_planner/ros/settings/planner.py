@@ -105,6 +105,9 @@ class PlannerSettings:
         0.0, 'How long a trajectory holds the arm before a motion that starts at rest, with the '
         'torque that this takes; at least four periods of the controller. A controller leads the '
         'arm there first. 0: not at all [s].', lowest=0.0, highest=MAX_START_HOLD)
+    feedback_gains: bool = parameter_field(
+        False, 'Whether gains of feedback are looked for along every plan, which takes some '
+        'tenths of a second, and published with it. Not for arms in space.')
     reference_rate: float = parameter_field(
         100.0, 'Rate of the states that are streamed along a published plan [Hz].', lowest=1.0,
         highest=1000.0)

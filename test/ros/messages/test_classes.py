@@ -15,7 +15,8 @@ from flex_planner.ros.messages.classes import TYPES, WHY_NOT_ROS
 import pytest
 
 OWN = [f'flex_planner_interfaces/msg/{name}' for name in (
-    'FlexiblePoint', 'FlexibleTrajectory', 'MotionTask', 'PayloadSearch', 'PlanReport')]
+    'FeedbackGains', 'FlexiblePoint', 'FlexibleTrajectory', 'MotionTask', 'PayloadSearch',
+    'PlanReport')]
 OTHERS = ['builtin_interfaces/msg/Duration', 'geometry_msgs/msg/Point',
           'sensor_msgs/msg/JointState', 'trajectory_msgs/msg/JointTrajectory',
           'trajectory_msgs/msg/JointTrajectoryPoint', 'sensor_msgs/msg/CameraInfo']

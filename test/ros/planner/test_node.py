@@ -18,6 +18,7 @@ from flex_planner.optimal_control.task import postures_from_points
 from flex_planner.ros.messages.trajectory_rules import trajectory_violations
 from flex_planner.ros.runtime.processes import NodeProcess
 from flex_planner_interfaces.msg import (
+    FeedbackGains,
     FlexibleTrajectory,
     MotionTask,
     PayloadSearch,
@@ -458,6 +459,17 @@ def test_parameter_that_is_set_counts(rigid: Planner) -> None:
     assert rigid.set_parameter('sampling_step', 0.01).successful
     assert len(after.points) < len(before.points) / 2
     assert rigid.plan().trajectory == before
+
+
+def test_gains_are_published_with_a_plan_where_they_are_asked_for(rigid: Planner) -> None:
+    assert rigid.set_parameter('feedback_gains', True).successful
+    gains = rigid.listen(FeedbackGains, f'{rigid.name}/feedback_gains')
+    assert rigid.report(publish=True).error_code == PlanReport.NONE
+    rigid.wait('gains', lambda: bool(gains))
+    assert gains[-1].message == 'stable on 3 arms at 1000 Hz'
+    assert len(gains[-1].p) == len(gains[-1].joint_names) == 2
+    assert rigid.set_parameter('feedback_gains', False).successful
+
 
 
 @pytest.mark.parametrize(('name', 'value', 'reason'), [
