@@ -12,6 +12,7 @@ CODE := bench docs examples flex_planner launch test tools setup.py
 
 help:
 	@echo 'make demo     plan motions of a flexible arm through a ROS 2 node; results in output/'
+	@echo '              (make demo ARM=spatial_3r: of an arm in space)'
 	@echo 'make demo-library   plan and draw the same motion with the library alone, without ROS 2'
 	@echo 'make paper    recompute Korayem et al. 2009 and write docs/paper.md (1 to 3 minutes)'
 	@echo 'make test     check the style, run all unit tests and a node test of each kind (4 minutes)'
@@ -29,7 +30,7 @@ setup:
 	@$(PYTHON) tools/setup_environment.py $(SETUP_FLAGS)
 
 demo: setup
-	@tools/run python -m flex_planner.cli.demo
+	@tools/run python -m flex_planner.cli.demo $(if $(ARM),--arm '$(ARM)')
 
 demo-library:
 	@$(PYTHON) tools/setup_environment.py --library $(SETUP_FLAGS)

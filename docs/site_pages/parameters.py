@@ -22,11 +22,13 @@ _HEAD = """\
 Made from the dataclasses that declare them. `config/planner.yaml` has all of them with their
 defaults, and `ros2 param describe` says the same of a running node. Those that are fixed can only
 be set when the node starts. Lists with one entry per joint follow the arm where they are not
-given: names are `joint1`, `joint2` and so on, gains suit the inertia of each joint
-([execution.md](../execution.md)).
+given: names are `joint1`, `joint2` and so on, or those of the URDF, whose base is `base_frame`
+then; gains suit the inertia of each joint ([execution.md](../execution.md)).
 
 The planner and the simulated arm have `arm` besides, the path of an [arm file](../arm_files.md) or
-the name of a preset. It is fixed.
+the name of a preset. `robot_description` is the text of a URDF file in place of the one that the
+arm file names, `robot_description_topic` the topic on which it comes
+([spatial_arms.md](../spatial_arms.md)). They are fixed.
 """
 
 

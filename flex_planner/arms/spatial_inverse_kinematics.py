@@ -135,11 +135,16 @@ def check_spatial_singularity(arm: SpatialArm, positions: Array,
             f'is below {_SINGULAR * arm.reach:.3g} m')
 
 
+def farthest_reach(arm: SpatialArm) -> float:
+    """Return how far the tip of the unbent arm may get from its first joint at most [m]."""
+    return arm.reach + sum(
+        float(np.abs(limits).max()) for joint, limits in zip(
+            arm.joints, zip(*arm.angle_limits(), strict=True), strict=True) if joint.slides)
+
+
 def _check_reach(arm: SpatialArm, point: Array, slack: float = _EXACT) -> None:
     """Raise UnreachableError if a point is farther than the arm is long, slides included."""
-    far = arm.reach
-    for joint, limits in zip(arm.joints, zip(*arm.angle_limits(), strict=True), strict=True):
-        far += float(np.abs(limits).max()) if joint.slides else 0.0
+    far = farthest_reach(arm)
     distance = float(np.linalg.norm(point - arm.base))
     if distance > far + slack * arm.reach:
         raise UnreachableError(f'the point {_say(point)} m is {distance:.6g} m from the first '

@@ -1,8 +1,8 @@
 """
-The paper's motion over real ROS 2: planned, published, carried out by a simulated arm, recorded.
+A motion over real ROS 2: planned, published, carried out by a simulated arm, recorded.
 
-Korayem et al. 2009, section 5.2, with links of E I = 50 N m^2. Starts the planner and the
-simulator in processes of their own, and asks as any other node would.
+By default that of Korayem et al. 2009, section 5.2, with links of E I = 50 N m^2. Starts the
+planner and the simulator in processes of their own, and asks as any other node would.
 
 """
 
@@ -18,9 +18,9 @@ from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import load_arm
 from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.validation import Array
+from flex_planner.cli.demo_motions import DEFAULT_ARM, demo_motion, DemoMotion
 from flex_planner.cli.pictures import drawn
 from flex_planner.cli.signals import SIGNALS
-from flex_planner.optimal_control.task import postures_from_points
 from flex_planner.plotting.motion import Execution, Motion
 from flex_planner.reports.motion import (
     certificate_rows,
@@ -30,11 +30,12 @@ from flex_planner.reports.motion import (
     table,
 )
 from flex_planner.ros.messages.plans import duration_seconds
+from flex_planner.ros.messages.points import point_coordinates, point_message
 from flex_planner.ros.planner.diagnostics import SUBSCRIBERS
 from flex_planner.ros.runtime.processes import NodeProcess
 from flex_planner_interfaces.msg import FlexibleTrajectory, MotionTask, PlanReport
 from flex_planner_interfaces.srv import PlanPath
-from geometry_msgs.msg import Point, PointStamped
+from geometry_msgs.msg import PointStamped
 import numpy as np
 import rclpy
 from rclpy.node import Node
@@ -44,9 +45,6 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from trajectory_msgs.msg import JointTrajectory
 
-ARM = 'korayem_ei50'
-START, GOAL, ELBOW = (0.5, 0.0), (0.5, 0.5), -1
-PAYLOAD, DURATION = 1.0, 1.0
 PATIENCE = 120.0  # [s], for the first plan, in which much is compiled, on a busy machine
 SETTLING = 1.0  # [s], that the simulator watches the arm by default
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -99,12 +97,9 @@ class DemoClient(Node):  # type: ignore[misc]
         # what the planner does not know of yet would miss the trajectory
         self.wait('connection', lambda: self.subscribers >= 2, 60)
 
-    def plan(self) -> tuple[PlanPath.Response, float]:
-        """Ask for the motion; return the answer and the time until it was on the topic [s]."""
-        task = MotionTask(
-            space=MotionTask.CARTESIAN, start_point=Point(x=START[0], y=START[1]),
-            goal_point=Point(x=GOAL[0], y=GOAL[1]), elbow=ELBOW, duration=DURATION,
-            payload_mass=PAYLOAD, effort_weights=[1 / 8, 1 / 8], publish=True)
+    def plan(self, motion: DemoMotion) -> tuple[PlanPath.Response, float]:
+        """Ask for a motion; return the answer and the time until it was on the topic [s]."""
+        task = _task(motion)
         began = self.get_clock().now().nanoseconds
         future = self._planner.call_async(PlanPath.Request(task=task))
         self.wait('answer', future.done, PATIENCE + 30)
@@ -114,7 +109,7 @@ class DemoClient(Node):  # type: ignore[misc]
         self.wait('trajectory on the topic', lambda: bool(self.arrived), 10)
         return response, (self.arrived[0][0] - began) * 1e-9
 
-    def watch(self) -> Execution:
+    def watch(self, arm: Arm) -> Execution:
         """Follow the arm until it says what was left of its motion, however late it is."""
         began = self.arrived[0][0]
         self.wait('motion', lambda: bool(self.settled), 60)
@@ -131,7 +126,20 @@ class DemoClient(Node):  # type: ignore[misc]
             speeds=np.array([state.velocity for state in states]),
             torques=np.array([state.effort for state in states]),
             tip_times=np.array([since(tip) for tip in tips]),
-            tip=np.array([(tip.point.x, tip.point.y) for tip in tips]))
+            tip=np.array([point_coordinates(tip.point, arm) for tip in tips]))
+
+
+def _task(motion: DemoMotion) -> MotionTask:
+    """Return the request of a motion."""
+    task = MotionTask(
+        space=MotionTask.CARTESIAN_GOAL, start_positions=motion.start_positions,
+        goal_point=point_message(np.array(motion.goal)), elbow=motion.ELBOW,
+        duration=motion.duration, payload_mass=motion.payload,
+        effort_weights=motion.effort_weights, publish=True)
+    if motion.start_point:
+        task.space = MotionTask.CARTESIAN
+        task.start_point = point_message(np.array(motion.start_point))
+    return task
 
 
 def motion_from_message(trajectory: FlexibleTrajectory, arm: Arm) -> Motion:
@@ -147,18 +155,18 @@ def motion_from_message(trajectory: FlexibleTrajectory, arm: Arm) -> Motion:
         coordinates=np.hstack([rows(joints, 'positions'), rows(bending, 'modal_displacements')]),
         rates=np.hstack([rows(joints, 'velocities'), rows(bending, 'modal_rates')]),
         torques=rows(joints, 'effort'),
-        tip=np.array([(point.x, point.y) for point in trajectory.tip_path]))
+        tip=np.array([point_coordinates(point, arm) for point in trajectory.tip_path]))
 
 
-def _table(arm: Arm, report: PlanReport, delay: float, execution: Execution,
-           files: list[Row]) -> str:
+def _table(arm: Arm, motion: DemoMotion, report: PlanReport, delay: float,
+           execution: Execution, files: list[Row]) -> str:
     """Return the results of the demonstration, as lines of text."""
     late = execution.tip[execution.tip_times > execution.tip_times[-1] - SETTLING / 2]
-    errors = np.linalg.norm(late - GOAL, axis=1) * 1e3
+    errors = np.linalg.norm(late - motion.goal, axis=1) * 1e3
     planning = duration_seconds(report.planning_time)
     return table([
         ('arm', arm.name),
-        ('motion', f'{START} m to {GOAL} m in {DURATION:g} s with {PAYLOAD:g} kg'),
+        ('motion', str(motion)),
         planning_row(planning, report.strategy, f'{report.iterations} iterations',
                      f'{report.mesh_intervals} intervals'),
         *(('warning', sentence) for sentence in report.warnings),
@@ -172,26 +180,26 @@ def _table(arm: Arm, report: PlanReport, delay: float, execution: Execution,
         *files])
 
 
-def run(folder: Path) -> str:
-    """Run the demonstration, write into a folder, return the table."""
-    arm = load_arm(ARM)
-    start, _ = postures_from_points(arm, START, GOAL, ELBOW)
+def run(folder: Path, name: str = DEFAULT_ARM) -> str:
+    """Run the demonstration of a preset, write into a folder, return the table."""
+    motion, arm = demo_motion(name), load_arm(name)
+    start = motion.initial_positions(arm)
     with ExitStack() as stack:
         with SIGNALS.patient():  # what is begun must be known, to be ended
             stack.enter_context(NodeProcess(
                 'flex_planner.ros.planner.node',
-                {'arm': ARM, 'recording_folder': folder / 'recordings',
+                {'arm': name, 'recording_folder': folder / 'recordings',
                  'allowed_planning_time': PATIENCE}))
             stack.enter_context(NodeProcess(
                 'flex_planner.ros.arm_simulator',
-                {'arm': ARM, 'payload_mass': PAYLOAD, 'initial_positions': start.tolist()},
+                {'arm': name, 'payload_mass': motion.payload, 'initial_positions': start.tolist()},
                 {'joint_trajectory': '/flex_planner/joint_trajectory'}))
         SIGNALS.check()
         client = DemoClient()
         try:
             client.wait_for_nodes()
-            response, delay = client.plan()
-            execution = client.watch()
+            response, delay = client.plan(motion)
+            execution = client.watch(arm)
         finally:
             client.destroy_node()
 
@@ -203,14 +211,14 @@ def run(folder: Path) -> str:
     with SIGNALS.patient():
         files = [*drawn('picture', folder / 'motion.png', draw),
                  ('recording', response.report.recording), ('output folder', str(folder))]
-    return _table(arm, response.report, delay, execution, files)
+    return _table(arm, motion, response.report, delay, execution, files)
 
 
-def demonstrate(folder: Path) -> None:
+def demonstrate(folder: Path, arm: str = DEFAULT_ARM) -> None:
     """Run the demonstration, and print the table."""
     # signals are handled by whoever calls
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
-        print(run(folder))
+        print(run(folder, arm))
     finally:
         rclpy.try_shutdown()

@@ -7,7 +7,17 @@ from collections.abc import Sequence
 
 from flex_planner.base.version import VERSION
 from flex_planner.cli.command_parser import CommandParser
-from flex_planner.cli.commands import arm, cache, compare, gains, identify, paper, plan, recordings
+from flex_planner.cli.commands import (
+    arm,
+    cache,
+    compare,
+    excite,
+    gains,
+    identify,
+    paper,
+    plan,
+    recordings,
+)
 from flex_planner.cli.commands import map as maps
 from flex_planner.cli.options import join_lists
 
@@ -28,6 +38,7 @@ def build_parser() -> argparse.ArgumentParser:
     compare.add_command(commands)
     gains.add_command(commands)
     identify.add_command(commands)
+    excite.add_command(commands)
     maps.add_command(commands)
     paper.add_command(commands)
     cache.add_command(commands)

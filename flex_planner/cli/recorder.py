@@ -106,6 +106,8 @@ def task_message(request: Request) -> MotionTask:
         payload_mass=task.payload_mass, payload_inertia=task.payload_inertia,
         position_weights=task.position_weights.tolist(),
         velocity_weights=task.velocity_weights.tolist(),
+        torque_rate_weight=task.torque_rate_weight.tolist(),
+        max_torque_rate=task.max_torque_rate.tolist(),
         effort_weights=task.effort_weights.tolist(), tolerance=task.tolerance,
         allow_large_bending=task.allow_large_bending,
         path_constraints=[write_constraint(one) for one in task.path_constraints],

@@ -160,6 +160,12 @@ def add_task(parser: argparse.ArgumentParser, payload: str) -> None:
                        ('velocity', 'velocities, W_2 in the cost (default: zeros)'),
                        ('position', 'positions, W_1 in the cost (default: zeros)')):
         add(f'--{name}-weights', metavar='W,W,...', help=f'weights of the squared {what}')
+    add('--torque-rate-weight', metavar='W,W,...',
+        help='weights of the squared rates of the torques, one per joint or one for all: torques '
+        'have no jumps then, and start and end at what holds the arm (default: they may jump)')
+    add('--max-torque-rate', metavar='NM/S,NM/S,...',
+        help='largest rates of the torques, one per joint or one for all, inf for none; likewise '
+        'without jumps')
     add('--tolerance', type=number_argument, default=1e-3, metavar='EPS',
         help='largest allowed boundary error, half the squared error of the final state '
         '(default: 0.001)')
@@ -319,5 +325,11 @@ def _weights(options: argparse.Namespace, arm: Arm) -> dict[str, Any]:
     """Return the weights that are given."""
     one, any_kind = [arm.n_joints], sorted({arm.n_joints, arm.n_coordinates})
     sizes = {'effort_weights': one, 'velocity_weights': any_kind, 'position_weights': any_kind}
-    return {name: numbers(f'--{name.replace("_", "-")}', getattr(options, name), size)
-            for name, size in sizes.items() if getattr(options, name) is not None}
+    given: dict[str, Any] = {
+        name: numbers(f'--{name.replace("_", "-")}', getattr(options, name), size)
+        for name, size in sizes.items() if getattr(options, name) is not None}
+    for name in ('torque_rate_weight', 'max_torque_rate'):
+        if getattr(options, name) is not None:  # may be inf, which the task says of each
+            given[name] = numbers(f'--{name.replace("_", "-")}', getattr(options, name),
+                                  finite=False)
+    return given

@@ -23,7 +23,7 @@ TOLERANCE, COARSE = 1e-9, 1e-5
 """Of a fit whose values count, and of one that they are compared with."""
 _MOST_EVALUATIONS = 40
 _RUN_AWAY = 1e6
-_NORMAL_95 = 1.96
+_NORMAL_95, _SINGULAR = 1.96, 1e-14
 # samples that errors of a wrong model are alike for
 _BLOCK = 100
 
@@ -182,6 +182,24 @@ def judge_parameters(model: LoopModel, experiments: Sequence[Experiment],
     return fit_parameters(model, experiments, values, (), monitor)
 
 
+def predict_half_widths(model: LoopModel, experiments: Sequence[Experiment], values: Array,
+                        free: Sequence[int], monitor: Monitor | None = None) -> Array:
+    """Return half of the intervals of 95 % that logs would lead to, if the model is the plant."""
+    problem = _Problem(model, experiments, values, free, monitor or Monitor())
+    jacobian = problem.evaluate(problem.first)[1]
+    return _plain_widths(jacobian)[:len(problem.free)]
+
+
+def _plain_widths(jacobian: Array) -> Array:
+    """Return half of the intervals; infinite where the errors say nothing."""
+    scale = np.linalg.norm(jacobian, axis=0)
+    seen = scale > 0
+    inverse = np.linalg.pinv(_normal(jacobian[:, seen] / scale[seen]), rcond=_SINGULAR)
+    widths = np.full(scale.size, np.inf)
+    widths[seen] = _NORMAL_95 * np.sqrt(np.diag(inverse)) / scale[seen]
+    return widths
+
+
 def _summarize(problem: _Problem, unknowns: Array, converged: bool) -> Fit:
     """Return the fit at some unknowns."""
     errors, jacobian = problem.evaluate(unknowns)
@@ -191,7 +209,7 @@ def _summarize(problem: _Problem, unknowns: Array, converged: bool) -> Fit:
     variance = float(errors @ errors) / freedom
     scale = np.linalg.norm(jacobian, axis=0)
     scale[scale == 0] = 1.0  # nothing says anything of it: its interval is infinite below
-    inverse = np.linalg.pinv((jacobian / scale).T @ (jacobian / scale), rcond=1e-14)
+    inverse = np.linalg.pinv(_normal(jacobian / scale), rcond=_SINGULAR)
     plain = np.diag(inverse) * (variance if _is_input(problem) else max(variance, 1.0))
     blocked = np.diag(inverse @ _scores(problem, errors, jacobian / scale) @ inverse)
     unseen = np.linalg.norm(jacobian, axis=0) == 0
@@ -206,6 +224,11 @@ def _summarize(problem: _Problem, unknowns: Array, converged: bool) -> Fit:
                fit_percent=np.array([one.fit_percent(part) for one, part in zip(
                    problem.experiments, parts, strict=True)]),
                evaluations=problem.evaluations, converged=converged)
+
+
+def _normal(jacobian: Array) -> Array:
+    product: Array = jacobian.T @ jacobian
+    return product
 
 
 def _is_input(problem: _Problem) -> bool:

@@ -60,8 +60,10 @@ def _scale(title: str) -> AxisKind:
 AXES: Mapping[str, AxisKind] = MappingProxyType({
     'goal_x': _place('x of the goal'),
     'goal_y': _place('y of the goal'),
+    'goal_z': _place('z of the goal'),
     'start_x': _place('x of the start'),
     'start_y': _place('y of the start'),
+    'start_z': _place('z of the start'),
     'duration': AxisKind(title='duration', unit='s', above=0, at_most=MAX_DURATION),
     'payload_mass': AxisKind(title='payload', unit='kg', at_least=0, at_most=MAX_PAYLOAD),
     'stiffness_scale': _scale('factor on the flexural rigidities'),

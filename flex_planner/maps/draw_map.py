@@ -30,7 +30,8 @@ from matplotlib.figure import Figure
 import numpy as np
 from numpy.typing import NDArray
 
-_PLANES = (('goal_x', 'goal_y'), ('start_x', 'start_y'))
+_PLANES = tuple((f'{end}_{first}', f'{end}_{second}') for end in ('goal', 'start')
+                for first, second in ('xy', 'xz', 'yz'))
 _SIDE = 4.6  # [in]
 # height by width of a square diagram with its labels
 _FLAT = 0.92

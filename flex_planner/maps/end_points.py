@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.inverse_kinematics import check_angle_limits, posture_near_point, workspace
+from flex_planner.arms.spatial_arm import SpatialArm
+from flex_planner.arms.spatial_inverse_kinematics import farthest_reach
 from flex_planner.base.errors import InvalidValueError, SingularError, UnreachableError
 from flex_planner.base.validation import Array, number, vector
 from flex_planner.maps.axes import Axis, MAX_COORDINATE
@@ -14,6 +16,7 @@ from flex_planner.optimal_control.task import MAX_JOINT_ANGLE, Task
 import numpy as np
 
 _CANDIDATES = 25
+_MOST = 3  # coordinates of a point
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -25,7 +28,7 @@ class End:
     ----------
     name : str
         ``start`` or ``goal``; its axes are called ``start_x`` and so on.
-    point : numpy.ndarray, shape (2,)
+    point : numpy.ndarray, shape (2,), or (3,) of a spatial arm
         Of the tip; NaN where an axis gives it [m].
     angles : numpy.ndarray, shape (n,)
         Of the joints, instead of the point; empty if there is one [rad].
@@ -43,9 +46,9 @@ class End:
             object.__setattr__(self, name, copy)
 
     @property
-    def axes(self) -> tuple[str, str]:
-        """Return the names of the axes that move it."""
-        return f'{self.name}_x', f'{self.name}_y'
+    def axes(self) -> tuple[str, ...]:
+        """Return the names of the axes that may move it."""
+        return axes_of(self.name, self.point.size)
 
     def check(self, arm: Arm, axes: Sequence[Axis]) -> None:
         """
@@ -57,7 +60,7 @@ class End:
             Naming the field as in a study file.
 
         """
-        moved = [axis.name for axis in axes if axis.name in self.axes]
+        moved = [axis.name for axis in axes if axis.name in axes_of(self.name, _MOST)]
         if self.angles.size:
             field = f'{self.name}_angles'
             vector(field, self.angles, arm.n_joints, at_least=-MAX_JOINT_ANGLE,
@@ -67,16 +70,19 @@ class End:
                 raise InvalidValueError(f'axes.{moved[0]}', 'given',
                                         f'left out: {field} gives the {self.name}')
             return
+        for name in moved:
+            if name not in axes_of(self.name, arm.dimension):
+                raise InvalidValueError(f'axes.{name}', 'given', 'left out: the arm is planar')
+        vector(self.name, np.nan_to_num(self.point), arm.dimension)
         for entry, name in zip(self.point, self.axes, strict=True):
             if name not in moved or not np.isnan(entry):
                 number(self.name, float(entry), at_least=-MAX_COORDINATE, at_most=MAX_COORDINATE,
                        unit='m')
 
     def at(self, values: Mapping[str, float]) -> Array:
-        """Return the point (2,) for values of the axes [m]."""
-        x, y = self.point
-        along, across = self.axes
-        return np.array([values.get(along, x), values.get(across, y)])
+        """Return the point (2,), or (3,) of a spatial arm, for values of the axes [m]."""
+        return np.array([values.get(name, entry)
+                         for name, entry in zip(self.axes, self.point, strict=True)])
 
     def posture(self, arm: Arm, values: Mapping[str, float], elbow: int,
                 near: Array | None) -> Array:
@@ -98,9 +104,18 @@ class End:
 
     def is_too_far(self, arm: Arm, values: Mapping[str, float]) -> bool:
         """Return whether a point is farther from the base, or nearer, than the tip gets."""
+        if self.angles.size:
+            return False
+        if isinstance(arm, SpatialArm):
+            away = float(np.linalg.norm(self.at(values) - arm.base))
+            return away > farthest_reach(arm)
         nearest, farthest = workspace(arm)
-        distance = float(np.hypot(*self.at(values)))
-        return not self.angles.size and not nearest <= distance <= farthest
+        return not nearest <= float(np.hypot(*self.at(values))) <= farthest
+
+
+def axes_of(name: str, count: int) -> tuple[str, ...]:
+    """Return the names of the axes of an end's point with so many coordinates."""
+    return tuple(f'{name}_{letter}' for letter in 'xyz'[:count])
 
 
 def middle_posture(arm: Arm, end: End, axes: tuple[Axis, ...], elbow: int) -> Array | None:

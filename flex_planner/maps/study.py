@@ -96,7 +96,8 @@ class Study:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, 'name', printable(self.name, LONGEST_NAME))
-        require_planar(self.arm, 'maps')
+        if self.quantity is Quantity.RESIDUAL_VIBRATION:
+            require_planar(self.arm, 'maps of residual vibrations')
         check_motors(self.quantity, self.arm)
         check_axes(self.quantity, self.arm, self.axes)
         check_limit_axis(self.motion.limits, self.axes)
@@ -217,8 +218,8 @@ class Study:
         """
         Return the cells that fail without any solve, in the order of their indices.
 
-        With up to two links these are all that `task` refuses. With more, where postures take an
-        iteration, only points out of the workspace are.
+        In the plane with up to two links these are all that `task` refuses. Elsewhere, where
+        postures take an iteration, only points out of the workspace are.
 
         Parameters
         ----------
@@ -244,9 +245,8 @@ class Study:
     def _failure(self, index: tuple[int, ...]) -> CellResult | None:
         """Return the result of a cell that has no motion, None if it may have one."""
         values = self.values(index)
-        quick = self.arm.n_joints <= 2 or any(end.is_too_far(self.arm, values)
-                                              for end in self.motion.ends)
-        if not quick:
+        quick = self.arm.dimension == 2 and self.arm.n_joints <= 2
+        if not quick and not any(end.is_too_far(self.arm, values) for end in self.motion.ends):
             return None
         try:
             self._postures(values)

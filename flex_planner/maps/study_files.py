@@ -21,7 +21,7 @@ from flex_planner.base.validation import Array, integer, number, vector
 from flex_planner.base.yaml_files import YamlSection
 from flex_planner.control.joint_controller import Gains
 from flex_planner.maps.axes import Axis, read_axes
-from flex_planner.maps.end_points import End
+from flex_planner.maps.end_points import axes_of, End
 from flex_planner.maps.quantities import Quantity
 from flex_planner.maps.simulated_arm import SimulatedArm
 from flex_planner.maps.study_motion import StudyMotion
@@ -47,8 +47,8 @@ def read_fields(top: YamlSection, folder: Path) -> dict[str, Any]:
     name, quantity = top.text('name'), _quantity(top)
     arm = _arm(top, folder)
     axes = read_axes(top.section('axes'))
-    _refuse_given_twice(top, axes)
-    motion = _motion(top, axes)
+    _refuse_given_twice(top, axes, arm.dimension)
+    motion = _motion(top, axes, arm.dimension)
     limit = {key: top.take(key) for key in ('cell_time_limit',) if top.has(key)}
     return {'name': name, 'arm': arm, 'quantity': quantity, 'axes': axes, 'motion': motion,
             **limit,
@@ -94,21 +94,22 @@ def _arm_path(given: str, folder: Path) -> str:
     return str(folder.absolute() / given) if is_file else given
 
 
-def _refuse_given_twice(top: YamlSection, axes: tuple[Axis, ...]) -> None:
+def _refuse_given_twice(top: YamlSection, axes: tuple[Axis, ...], dimension: int) -> None:
     """Refuse a field whose value an axis gives."""
     names = {axis.name for axis in axes}
     for key, axis in _GIVEN_BY.items():
         if axis in names and top.has(key):
             raise InvalidValueError(key, top.take(key), f'left out: the axis {axis} gives it')
     for key in ('start', 'goal'):
-        if {f'{key}_x', f'{key}_y'} <= names and top.has(key):
-            raise InvalidValueError(key, top.take(key),
-                                    f'left out: the axes {key}_x and {key}_y give it')
+        moving = axes_of(key, dimension)
+        if set(moving) <= names and top.has(key):
+            raise InvalidValueError(key, top.take(key), 'left out: the axes '
+                                    f'{", ".join(moving[:-1])} and {moving[-1]} give it')
 
 
-def _motion(top: YamlSection, axes: tuple[Axis, ...]) -> StudyMotion:
+def _motion(top: YamlSection, axes: tuple[Axis, ...], dimension: int) -> StudyMotion:
     """Return the motion of all cells."""
-    start, goal = (_end(top, name, axes) for name in ('start', 'goal'))
+    start, goal = (_end(top, name, axes, dimension) for name in ('start', 'goal'))
     given: dict[str, Any] = {key: top.take(key) for key in (
         'duration', 'payload_mass', 'effort_weights', 'velocity_weights', 'tolerance', 'elbow')
         if top.has(key)}
@@ -119,21 +120,22 @@ def _motion(top: YamlSection, axes: tuple[Axis, ...]) -> StudyMotion:
     return StudyMotion(start=start, goal=goal, **given)
 
 
-def _end(top: YamlSection, name: str, axes: tuple[Axis, ...]) -> End:
+def _end(top: YamlSection, name: str, axes: tuple[Axis, ...], dimension: int) -> End:
     """Return the start or the goal, given as a point, as angles or by axes."""
     angles = f'{name}_angles'
     if top.has(angles):
         if top.has(name):
             raise InvalidValueError(angles, top.take(angles), f'left out where {name} is given')
         return End(name=name, angles=_numbers(angles, top.take(angles)))
-    if {f'{name}_x', f'{name}_y'} <= {axis.name for axis in axes}:
-        return End(name=name)
+    if set(axes_of(name, dimension)) <= {axis.name for axis in axes}:
+        return End(name=name, point=np.full(dimension, np.nan))
     if not top.has(name):
         raise InvalidValueError(f'{name} or {angles}', None,
                                 f'given, exactly one of them{top.misspelt(name, angles)}')
     point = _numbers(name, top.take(name))
-    if point.size != 2:
-        raise InvalidValueError(name, point.tolist(), 'a point [x, y] in m')
+    if point.size != dimension:
+        raise InvalidValueError(name, point.tolist(),
+                                f'a point [{", ".join("xyz"[:dimension])}] in m')
     return End(name=name, point=point)
 
 

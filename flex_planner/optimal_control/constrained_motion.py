@@ -15,6 +15,10 @@ from flex_planner.collocation.problem import CompiledRate
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.path_constraints import limits_of_arm, PathSlacks
 from flex_planner.optimal_control.path_constraints.path_constraint import PathConstraint
+from flex_planner.optimal_control.smoothed_torque_state import (
+    smooth_rates,
+    SmoothedTorqueState,
+)
 from flex_planner.optimal_control.torque_slacks import TorqueSlacks
 import numpy as np
 
@@ -47,12 +51,13 @@ class ConstrainedMotion(MotionProblem):
         super().__init__(motion.model, motion.task, motion.parameters,
                          via_times=motion.junctions if motion.junctions.size else None)
         self.slacks, self.mu = slacks, mu
+        self.conditions = smooth_rates(self.conditions, mu)
         self.floor: Array = np.zeros(slacks.count) if floor is None else floor
 
     def rate(self, t: Array, z: Array) -> Array:
         """Return z'."""
         rate, layout = super().rate(t, z), self.layout
-        rate[:, layout.costates] += add_multipliers(self.slacks, z[:, layout.states],
+        rate[:, layout.costates] += add_multipliers(self.slacks, layout.take_states(z),
                                                     self.multipliers(z))
         return rate
 
@@ -61,7 +66,7 @@ class ConstrainedMotion(MotionProblem):
         rate, jacobian = super().rate_jacobian(t, z)
         states, costates = self.layout.states, self.layout.costates
         lam = self.multipliers(z)
-        slacks, slopes, curvature = self.slacks.linearise(z[:, states], lam)
+        slacks, slopes, curvature = self.slacks.linearise(self.layout.take_states(z), lam)
         rate[:, costates] += _pull(slopes, lam)
         kept = np.maximum(slacks, self.floor)
         ratio = np.where(kept > 0, self.mu / np.where(kept > 0, kept, 1.0)**2, np.nan)
@@ -74,16 +79,25 @@ class ConstrainedMotion(MotionProblem):
 
     def barrier_rate(self, z: Array) -> Array:
         """Return what the barrier adds to L and H, shape (k,)."""
-        slacks = self.slacks(z[:, self.layout.states])
+        slacks = self.slacks(self.layout.take_states(z))
         with np.errstate(invalid='ignore', divide='ignore'):
             kept, share = np.maximum(slacks, self.floor), np.maximum(1 - slacks / self.floor, 0.0)
             beyond = np.where(slacks < self.floor, share + share**2 / 2, 0.0)
             rate: Array = self.mu * (beyond - np.log(kept)).sum(axis=1)
+        if isinstance(self.conditions, SmoothedTorqueState):
+            rate += self.conditions.barrier_rate(z)
         return rate
+
+    @property
+    def terms(self) -> int:
+        """Return how many logarithms the barrier has."""
+        smoothed = isinstance(self.conditions, SmoothedTorqueState)
+        return self.slacks.count + (
+            2 * int(np.isfinite(self.task.max_torque_rate).sum()) if smoothed else 0)
 
     def multipliers(self, z: Array) -> Array:
         """Return lam at points (k, m), shape (k, n_c)."""
-        slacks = self.slacks(z[:, self.layout.states])
+        slacks = self.slacks(self.layout.take_states(z))
         kept = np.maximum(slacks, self.floor)
         inside = np.where(kept > 0, kept, 1.0)
         lam: Array = np.where(kept > 0, self.mu / inside * (1 + (inside - slacks) / inside),
@@ -106,7 +120,7 @@ class ConstrainedMotion(MotionProblem):
     def floored(self, near: CollocationSolution, share: float) -> ConstrainedMotion:
         """Return the same problem with a floor at a share of the smallest slacks of a motion."""
         z = near.stage_values().reshape(-1, self.size)
-        least = np.maximum(self.slacks(z[:, self.layout.states]).min(axis=0), _LEAST_FLOOR)
+        least = np.maximum(self.slacks(self.layout.take_states(z)).min(axis=0), _LEAST_FLOOR)
         return ConstrainedMotion(self, self.slacks, self.mu, share * least)
 
 

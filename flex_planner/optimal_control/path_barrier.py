@@ -43,8 +43,7 @@ class PathBarrier:
         self.free: int = inner.free
         self.explicit: Indices = inner.explicit
         self.junctions = inner.junctions
-        self._states: Indices = inner.motion.layout.states
-        self._costates: Indices = inner.motion.layout.costates
+        self._layout = inner.motion.layout
 
     def scale(self, mu: float) -> Array:
         """Return the smallest magnitudes of z that matter."""
@@ -53,9 +52,10 @@ class PathBarrier:
     def condense(self, z: Array, y: Array, mu: float) -> tuple[Array, Array]:
         """Return F and J of the step z' = F + J dz."""
         own, sigma, lam = self.split(y)
-        states, costates = self._states, self._costates
+        states, costates = self._layout.states, self._layout.costates
         rate, jacobian = self.inner.condense(z, own, mu)
-        pull, stiffness = eliminate_slacks(self.slacks, z[:, states], sigma, lam, mu)
+        pull, stiffness = eliminate_slacks(self.slacks, self._layout.take_states(z), sigma, lam,
+                                           mu)
         rate[:, costates] += pull
         jacobian[:, costates[:, None], states] += stiffness
         return rate, jacobian
@@ -63,9 +63,9 @@ class PathBarrier:
     def find_step(self, z: Array, y: Array, dz: Array, mu: float) -> Array:
         """Return the step of y that goes with one of z."""
         own, sigma, lam = self.split(y)
-        states = self._states
+        take = self._layout.take_states
         step = self.inner.find_step(z, own, dz, mu)
-        steps = step_slacks(self.slacks, z[:, states], sigma, lam, dz[:, states], mu)
+        steps = step_slacks(self.slacks, take(z), sigma, lam, take(dz), mu)
         return self._join(step, *steps)
 
     def longest(self, node: Array, step: Array) -> float:
@@ -89,7 +89,8 @@ class PathBarrier:
         """Return torques inside their limits, slacks of at least so much, and multipliers."""
         own = self.inner.guess(solution, mu)
         z = solution.stage_values().reshape(-1, solution.nodes.shape[1])
-        sigma = np.maximum(self.slacks(z[:, self._states]), least).reshape(*own.shape[:2], -1)
+        slacks = self.slacks(self._layout.take_states(z))
+        sigma = np.maximum(slacks, least).reshape(*own.shape[:2], -1)
         return self._join(own, sigma, mu / sigma)
 
     def split(self, y: Array) -> tuple[Array, Array, Array]:

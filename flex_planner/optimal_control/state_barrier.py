@@ -6,6 +6,7 @@ from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationSolution
 from flex_planner.collocation.problem import Indices
 from flex_planner.optimal_control.motion_problem import MotionProblem
+from flex_planner.optimal_control.smoothed_torque_state import smooth_rates
 import numpy as np
 
 
@@ -13,7 +14,8 @@ class StateBarrier:
     """
     A motion as a `BarrierProblem` with nothing to eliminate: y is empty.
 
-    Its rates follow from z alone. `PathBarrier` adds limits of the states.
+    Its rates follow from z alone, bounded rates of torques by a barrier. `PathBarrier` adds limits
+    of the states.
 
     Parameters
     ----------
@@ -35,7 +37,7 @@ class StateBarrier:
 
     def condense(self, z: Array, y: Array, mu: float) -> tuple[Array, Array]:
         """Return F and J of the step z' = F + J dz."""
-        return self.motion.rate_jacobian(np.zeros(len(z)), z)
+        return smooth_rates(self.motion.conditions, mu).rate_jacobian(z)
 
     def find_step(self, z: Array, y: Array, dz: Array, mu: float) -> Array:
         """Return the step of y, which is empty."""

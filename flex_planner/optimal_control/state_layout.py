@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+from flex_planner.base.validation import Array
 from flex_planner.collocation.problem import Indices
 import numpy as np
 
@@ -54,6 +55,11 @@ class StateLayout:
         n_t, torques = self.coordinates, self.torque_costate_slice
         found: Indices = np.r_[2 * n_t:4 * n_t, torques.start:torques.stop]
         return found
+
+    def take_states(self, z: Array) -> Array:
+        """Return the states of unknowns (..., m), not copied where they stand side by side."""
+        states: Array = z[..., self.states] if self.torques else z[..., :2 * self.coordinates]
+        return states
 
     @cached_property
     def explicit(self) -> Indices:

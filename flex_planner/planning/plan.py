@@ -37,6 +37,7 @@ from flex_planner.optimal_control.path_constraints import (
     PathSlacks,
     SelfClearance,
 )
+from flex_planner.optimal_control.smoothed_torque_state import SmoothedTorqueState
 from flex_planner.optimal_control.state_layout import StateLayout
 from flex_planner.optimal_control.task import Task
 from flex_planner.optimal_control.torque_conditions import ChosenTorque, TorqueState
@@ -100,6 +101,8 @@ class Samples:
         Of the torques at those speeds, eq. (15) [N m].
     position_costates, velocity_costates : numpy.ndarray, shape (k, n_t)
         psi_1 and psi_2.
+    torque_costates : numpy.ndarray, shape (k, n), or (k, 0) where torques are no states
+        psi_tau.
     hamiltonian : numpy.ndarray, shape (k,)
         H of eq. (8).
     tip : numpy.ndarray, shape (k, 2), or (k, 3) of a spatial arm
@@ -116,6 +119,7 @@ class Samples:
     upper_bounds: Array
     position_costates: Array
     velocity_costates: Array
+    torque_costates: Array
     hamiltonian: Array
     tip: Array
 
@@ -142,7 +146,7 @@ class Plan:
     certificate : Certificate
         Residuals.
     cost : float
-        J of eq. (6).
+        J of eq. (6), with the price of torque rates where they have one.
     effort : float
         Integral of the squared torques [N^2 m^2 s].
     energy : float
@@ -153,8 +157,10 @@ class Plan:
         Share of the time that each motor spends on its limit.
     constraints : tuple of ConstraintMargin
         How near the motion comes to each limit on the way; empty without limits or solution.
+    torque_rates : numpy.ndarray, shape (n,)
+        Largest rates of the torques [N m/s]; empty where torques may jump.
     barrier_gap : float
-        Number of slacks times mu times duration, where limits bent the motion: by at most so much
+        Number of limits times mu times duration, where limits bent the motion: by at most so much
         J is above the least where the task is convex, which motions of arms are not; where it was
         measured, J was nearer by far.
     kinds : tuple of KindOfMotion
@@ -188,6 +194,7 @@ class Plan:
     switching_times: Array = field(default_factory=lambda: np.zeros(0))
     saturation: Array = field(default_factory=lambda: np.zeros(0))
     constraints: tuple[ConstraintMargin, ...] = ()
+    torque_rates: Array = field(default_factory=lambda: np.zeros(0))
     barrier_gap: float = 0.0
     kinds: tuple[KindOfMotion, ...] = ()
     starts: int = 1
@@ -299,7 +306,9 @@ class Plan:
             times=times, coordinates=z[:, :n_t], rates=z[:, n_t:2 * n_t],
             accelerations=control.acceleration, torques=control.torque, lower_bounds=lower,
             upper_bounds=upper, position_costates=z[:, 2 * n_t:3 * n_t],
-            velocity_costates=z[:, 3 * n_t:4 * n_t], hamiltonian=control.hamiltonian,
+            velocity_costates=z[:, 3 * n_t:4 * n_t],
+            torque_costates=z[:, self.problem.layout.torque_costate_slice],
+            hamiltonian=control.hamiltonian,
             tip=tip_position(arm, z[:, :n_t]))
 
     def _within(self, times: ArrayLike) -> Array:
@@ -330,7 +339,8 @@ _SAVED = (Plan, PlanStatus, Certificate, Task, Arm, Link, BeamSection, Joint, El
           ExploredMotion, PlanWarning, WarningKind, TriedStrategy, ConstraintMargin,
           ConstrainedMotion, PathSlacks, JointRange, JointSpeed, KeepOut, Circle, Capsule,
           HalfPlane, SelfClearance, BendingMoment, Deflection, ViaPoint, ViaConditions,
-          StateLayout, ChosenTorque, TorqueState, TorqueEnds, TorqueSlacks, TorqueLimits,
+          StateLayout, ChosenTorque, TorqueState, SmoothedTorqueState, TorqueEnds,
+          TorqueSlacks, TorqueLimits,
           OffsetProblem, TorqueOffset, Robustness, RobustSearch, RobustTrial, JointController,
           Gains, EffortHold)
 

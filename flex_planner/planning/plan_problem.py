@@ -16,6 +16,7 @@ from flex_planner.planning.certificate import CertificateLimits, certify
 from flex_planner.planning.kinds.cheaper import find_cheaper
 from flex_planner.planning.kinds.clusters import are_alike, MOST_KINDS
 from flex_planner.planning.kinds.effort import SearchEffort
+from flex_planner.planning.largest_rates import find_largest_rates
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.strategies.catalogue import CATALOGUE
 from flex_planner.planning.strategies.initial_guesses import WARM_START
@@ -226,7 +227,8 @@ def _certify(plan: Plan, result: CollocationResult, solver: Solver) -> Plan:
         total = integrate_totals(problem, result.solution)
         plan = replace(plan, solution=result.solution, certificate=certificate, cost=total.cost,
                        effort=total.effort, energy=total.energy,
-                       switching_times=result.switches, saturation=total.saturation)
+                       switching_times=result.switches, saturation=total.saturation,
+                       torque_rates=find_largest_rates(problem, result.solution))
         reasons = limits.violations(certificate)
         if not reasons:
             return judge(replace(plan, message=describe_choice(plan)))

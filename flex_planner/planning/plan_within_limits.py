@@ -286,7 +286,7 @@ def _describe(plan: Plan) -> Plan:
     assert isinstance(limited, ConstrainedMotion)
     tightest = min(plan.constraints, key=lambda one: one.slack)
     others = ''.join(f'; {kind.sentence}: J = {kind.value:.3g}' for kind in plan.kinds[1:])
-    gap = limited.slacks.count * limited.mu * plan.task.duration
+    gap = limited.terms * limited.mu * plan.task.duration
     return replace(plan, barrier_gap=gap, message=(
         f'{PlanStatus.SOLVED.value}, planned within all limits on the way ({tightest})'
         + (f'; other kinds of motion{others}' if others else '')))

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import link_points
-from flex_planner.arms.planar_only import require_planar
 from flex_planner.base.colours import ARM, coordinate_colour, FLEXIBLE
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.statics import equilibrium, natural_modes
@@ -14,6 +13,7 @@ from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.plotting.figures import explain_lines, finish, Picture, plain
 from flex_planner.plotting.posture import draw_posture
+from flex_planner.plotting.spatial_arm import draw_spatial_arm
 from matplotlib.axes import Axes
 from matplotlib.figure import FigureBase
 import numpy as np
@@ -30,14 +30,15 @@ def draw_arm(model: ArmModel, postures: Sequence[Array], payload_mass: float = 0
     Draw an arm.
 
     It shows the arm at rest in each posture; the assumed shapes of each flexible link; and the
-    natural modes in the last posture with joints locked, if anything bends or twists.
+    natural modes in the last posture with joints locked, if anything bends or twists. A spatial
+    arm is drawn in three dimensions, without the shapes.
 
     Parameters
     ----------
     model : ArmModel
         n joints.
     postures : sequence of numpy.ndarray, shape (n,)
-        Joint angles, at least one [rad].
+        Joint angles, at least one [rad]; ways of joints that slide [m].
     payload_mass : float
         At its tip [kg].
 
@@ -46,14 +47,10 @@ def draw_arm(model: ArmModel, postures: Sequence[Array], payload_mass: float = 0
     Picture
         A Matplotlib figure.
 
-    Raises
-    ------
-    PlanarOnlyError
-        If the arm is a spatial one.
-
     """
     arm = model.arm
-    require_planar(arm, 'pictures of arms')
+    if arm.dimension == 3:
+        return draw_spatial_arm(model, postures, payload_mass)
     parameters = Parameters.of(arm, payload_mass=payload_mass)
     flexible = [i for i, link in enumerate(arm.links) if link.modes]
     shown = min(arm.n_passive, _NATURAL_MODES)

@@ -39,16 +39,15 @@ def draw_path_in_space(axes: Any, arm: Arm, coordinates: Array, tip: Array) -> N
     axes.plot(*tip.T, color=PLANNED, linewidth=1.5, label='tip, planned')
     axes.plot(*tip[:1].T, 'o', color=PLANNED, label='start')
     axes.plot(*tip[-1:].T, 's', color=PLANNED, label='goal')
-    _same_scale(axes, np.concatenate(shown))
-    for name in 'xyz':
-        getattr(axes, f'set_{name}label')(f'{name} [m]')
+    show_space(axes, np.concatenate(shown))
     axes.set_title('path of the tip')
 
 
-def _same_scale(axes: Any, points: Array) -> None:
-    """Give all axes the same scale."""
+def show_space(axes: Any, points: Array) -> None:
+    """Show points (k, 3) [m] with the same scale in every direction, and name the axes."""
     low, high = points.min(axis=0), points.max(axis=0)
     middle, half = (low + high) / 2, max(float((high - low).max()), _LEAST_SIDE) / 2
     for name, centre in zip('xyz', middle, strict=True):
         getattr(axes, f'set_{name}lim')(centre - half, centre + half)
+        getattr(axes, f'set_{name}label')(f'{name} [m]')
     axes.set_box_aspect((1, 1, 1))

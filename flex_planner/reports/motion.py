@@ -109,10 +109,21 @@ def motion_rows(plan: Plan, peaks: Peaks) -> list[Row]:
             peaks.speeds, peaks.speed_shares, peaks.torques, peaks.torque_shares,
             map(slides, plan.arm.joints)))),
         ('motors on their limit', _saturation(plan)),
+        *torque_rate_rows(plan.torque_rates.tolist(), list(map(slides, plan.arm.joints))),
         *(('passes', sentence) for sentence in say_via_points(plan.task.via_points,
                                                               plan.via_times)),
         *limit_rows(plan),
         *certificate_rows(plan.certificate)]
+
+
+def torque_rate_rows(rates: Sequence[float], sliding: Sequence[bool] = ()) -> list[Row]:
+    """Return the largest rates of torques without jumps; empty where torques may jump."""
+    if not len(rates):
+        return []
+    each = ', '.join(f'joint {i} {rate:.4g} {"N/s" if slide else "N m/s"}' for i, (
+        rate, slide) in enumerate(zip(rates, sliding or [False] * len(rates), strict=True), 1))
+    return [('largest torque rates', f'{each}; no jumps, from and to the torques that hold the '
+             'arm where it rests')]
 
 
 def list_failures(text: str, plan: Plan) -> str:

@@ -7,7 +7,7 @@ import math
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.joint_units import units_of
 from flex_planner.arms.spatial_arm import SpatialArm
-from flex_planner.arms.spatial_body import SpatialBody
+from flex_planner.arms.spatial_body import Matrix, SpatialBody
 from flex_planner.arms.spatial_joint import slides, SpatialJoint
 from flex_planner.arms.spatial_link import SpatialLink
 from flex_planner.base.validation import Array
@@ -36,6 +36,8 @@ def describe_spatial_links(arm: SpatialArm, payload_mass: float) -> list[str]:
     """Return masses, reach, coordinates and gravity of an arm, then a line per link."""
     mass = sum(link.mass for link in arm.links)
     place = f' at {_say(arm.payload_com)} m from the tip' if arm.payload_com.any() else ''
+    if np.any(arm.payload_tensor):
+        place += f', principal moments {_moments(arm.payload_tensor)} kg m^2'
     count = len(arm.elastic_joints)
     twists = f'{count} twist{"s" if count > 1 else ""}, ' if count else ''
     lines = [f'mass: {mass:.4g} kg, payload {payload_mass:.4g} kg{place}',
@@ -76,9 +78,14 @@ def _describe_body(body: SpatialBody) -> str:
     """Return where a body's centre of mass is, and its principal moments."""
     if body.is_nothing:
         return ', without mass'
-    moments = ', '.join(f'{max(moment, 0.0):.3g}'
-                        for moment in np.linalg.eigvalsh(np.array(body.inertia)))
-    return f', centre of mass at {_say(body.center_of_mass)} m, principal moments {moments} kg m^2'
+    return (f', centre of mass at {_say(body.center_of_mass)} m, principal moments '
+            f'{_moments(body.inertia)} kg m^2')
+
+
+def _moments(inertia: Matrix) -> str:
+    """Return principal moments in words."""
+    return ', '.join(f'{max(moment, 0.0):.3g}'
+                     for moment in np.linalg.eigvalsh(np.array(inertia)))
 
 
 def _say(values: object) -> str:

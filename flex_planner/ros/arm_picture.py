@@ -45,11 +45,12 @@ class ArmPicture:
         self._frames = node.create_publisher(TFMessage, '/tf', _DEPTH)
 
     def show(self, coordinates: Array, stamp: Time) -> None:
-        """Publish the arm with coordinates q (n_t,) at a time."""
-        markers = arm_markers(self._arm, coordinates, self._base)
-        for marker in markers.markers:
-            marker.header.stamp = stamp
-        self._markers.publish(markers)
-        if self._frames is not None:
+        """Publish the arm with coordinates q (n_t,) at a time, to those who listen."""
+        if self._markers.get_subscription_count():
+            markers = arm_markers(self._arm, coordinates, self._base)
+            for marker in markers.markers:
+                marker.header.stamp = stamp
+            self._markers.publish(markers)
+        if self._frames is not None and self._frames.get_subscription_count():
             self._frames.publish(self._message(transforms=frame_transforms(
                 self._arm, coordinates, self._names, stamp)))

@@ -108,6 +108,20 @@ def test_arm_file_has_what_was_found(folder: Path, capsys: pytest.CaptureFixture
     assert payload['value'] == pytest.approx(0.11, rel=2e-3)
 
 
+def test_motions_to_record_are_planned_there_and_back(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / 'drive.yaml').write_text('rate: 500\nstiffness: 40\ndamping: 4\n')
+    code = main(['excite', 'korayem_rigid', '--from', '0.5,0', '--to', '0.5,0.5', '--duration',
+                 '1', '--payload', '1', '--drive', str(tmp_path / 'drive.yaml'), '--output',
+                 str(tmp_path / 'motions')])
+    assert code == 0 and 'payload_mass' in capsys.readouterr().out
+    there, back = (np.genfromtxt(tmp_path / 'motions' / f'{name}.csv', delimiter=',', names=True)
+                   for name in ('there', 'back'))
+    for name in ('qd1', 'qd2'):
+        assert (there[name][0], there[name][-1]) == pytest.approx((back[name][-1], back[name][0]))
+    assert there['t'][1] == pytest.approx(2e-3) and there['t'][-1] > 1.9
+
+
 @pytest.mark.parametrize(('options', 'message'), [
     (['--free', 'mass'], "free is 'mass', but must be"),
     (['--topic', '/states'], 'must have one topic of joint states'),

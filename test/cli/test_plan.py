@@ -352,6 +352,8 @@ def test_time_limit_is_named_where_it_ends_a_search() -> None:
     ([*MOTION, '--tolerance', '2'], '--tolerance is 2.0, but must be a number > 0 and <= 1'),
     ([*MOTION, '--time-limit', '0'], '--time-limit is 0.0, but must be a number > 0'),
     ([*MOTION, '--effort-weights', '1'], '--effort-weights has 1 number, but must be a list of'),
+    ([*MOTION, '--torque-rate-weight', '0'], '--torque-rate-weight[0] is 0.0, but must be a'),
+    ([*MOTION, '--max-torque-rate', '1,2,3'], '--max-torque-rate has 3 numbers, but must be'),
     ([*MOTION, '--velocity-weights', '-1,0'], '--velocity-weights[0] is -1.0, but must be'),
     ([*MOTION, '--position-weights', '1,2,3'], '--position-weights has 3 numbers'),
     (['--from', '0.5,0', '--to-angles', '0,1', '--duration', '1'],

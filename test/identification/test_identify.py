@@ -11,6 +11,7 @@ from flex_planner.arms.arm_files import load_arm
 from flex_planner.control.joint_controller import Gains
 from flex_planner.control.joint_reference import JointReference
 from flex_planner.identification.drive import Drive
+from flex_planner.identification.excitation import predict_identification
 from flex_planner.identification.experiments import LogError, Method
 from flex_planner.identification.identification import Finding, Identification, Verdict
 from flex_planner.identification.identify import ALL, identify
@@ -88,6 +89,23 @@ def test_rounded_angles_lead_into_the_intervals() -> None:
     assert 0.8 < found.best.rms < 1.25
     # intervals of 95 %: three of them bound nearly all
     assert (errors(found) < 3 * widths).all()
+
+
+def test_intervals_are_those_that_were_predicted() -> None:
+    known = replace(DRIVE, resolution=LSB)
+    found = identify(one_link(), record(resolution=LSB, every=10), payload_mass=0.1, drive=known,
+                     more_modes=0)
+    predicted = predict_identification(
+        found.identified_arm(), [swing(1.2), swing(-0.8)], known,
+        payload_mass=found.payload_mass, settling=0.7)
+    assert [one.parameter for one in predicted] == [one.parameter for one in found.estimates]
+    for one, estimate in zip(predicted, found.estimates, strict=True):
+        # errors of one log are not exactly as large as expected
+        assert one.half_width == pytest.approx(estimate.half_width, rel=0.5)
+    assert not any(one.is_weak for one in predicted)
+    slow = predict_identification(found.identified_arm(), [swing(0.01, 5.0)], known,
+                                  payload_mass=found.payload_mass)
+    assert slow[1].is_weak
 
 
 def test_input_error_finds_what_the_motors_have_to_move() -> None:

@@ -8,6 +8,10 @@ from factories import TaskFactory
 from flex_planner.base.validation import Array
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
+from flex_planner.optimal_control.smoothed_torque_state import (
+    smooth_rates,
+    SmoothedTorqueState,
+)
 from flex_planner.optimal_control.state_layout import StateLayout
 import numpy as np
 import pytest
@@ -82,6 +86,23 @@ def test_rates_switch_where_their_bound_is(problem: MotionProblem, points: Array
     values = problem.switches(np.zeros(len(points)), points)
     free = -points[:, -1] / 3e-3
     np.testing.assert_allclose(values, np.stack([free - 40, free + 40], axis=1), rtol=1e-12)
+
+
+def test_barrier_keeps_rates_within_their_bounds(problem: MotionProblem, points: Array) -> None:
+    mu, times = 1e-3, np.zeros(len(points))
+    smooth = smooth_rates(problem.conditions, mu)
+    assert isinstance(smooth, SmoothedTorqueState)
+    rate, jacobian = smooth.rate_jacobian(points)
+    assert (np.abs(rate[:, problem.layout.torque_slice][:, 1]) < 40).all()
+    expected = differences(smooth.rate, points)
+    size = np.maximum(np.abs(expected).max(axis=2, keepdims=True), 1.0)
+    assert np.abs((jacobian - expected) / size).max() < ERROR
+    gradient = differences(lambda z: smooth.controls(z).hamiltonian + smooth.barrier_rate(z),
+                           points)[:, problem.layout.torque_costate_slice]
+    np.testing.assert_allclose(gradient, rate[:, problem.layout.torque_slice], rtol=1e-4,
+                               atol=1e-2)
+    nearly = smooth_rates(problem.conditions, 1e-9).rate(points)
+    np.testing.assert_allclose(nearly, problem.rate(times, points), rtol=1e-4, atol=1e-6)
 
 
 def test_torques_are_free_at_ends_where_the_arm_moves(problem: MotionProblem) -> None:

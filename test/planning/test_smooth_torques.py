@@ -148,6 +148,14 @@ def test_motors_limits_are_kept_and_their_price_is_that_of_more_torque(
     assert heavy.cost - stronger.cost == pytest.approx(price * more, rel=0.05)
 
 
+def test_rates_and_torques_are_bounded_at_once(heavy: Plan, rigid_model: ArmModel) -> None:
+    task = replace(heavy.task, max_torque_rate=900.0)
+    plan = plan_path(task, model=rigid_model, search='fast')
+    assert plan.solved and heavy.cost < plan.cost < 1.1 * heavy.cost, plan.message
+    assert (plan.torque_rates < 900).all() and (heavy.torque_rates > 900).all()
+    assert plan.certificate.limit_slack > 0 and plan.certificate.hamiltonian_drift < 1e-5
+
+
 def test_plan_comes_back_from_a_file(heavy: Plan, tmp_path: Path) -> None:
     heavy.save(tmp_path / 'heavy.plan')
     again, times = Plan.load(tmp_path / 'heavy.plan'), np.linspace(0, 1, 11)

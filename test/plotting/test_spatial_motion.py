@@ -1,14 +1,15 @@
-"""Motions in space are drawn in three dimensions; arms in space are not drawn in the plane."""
+"""Motions and arms in space are drawn in three dimensions."""
 
 from __future__ import annotations
 
-from flex_planner.arms.planar_only import PlanarOnlyError
+from flex_planner.arms.kinematics import tip_position
+from flex_planner.dynamics.statics import equilibrium
 from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan_path import plan_path
 from flex_planner.plotting import draw_arm, draw_motion
 import numpy as np
-import pytest
 from spatial_arms import yaw_pitch
 
 
@@ -25,6 +26,13 @@ def test_path_of_the_tip_is_drawn_in_space() -> None:
     np.testing.assert_allclose(sides, sides[0])  # a length is a length in every direction
 
 
-def test_arm_in_space_is_not_drawn_in_the_plane() -> None:
-    with pytest.raises(PlanarOnlyError, match='pictures of arms do not know spatial arms'):
-        draw_arm(ArmModel.of(yaw_pitch()), [np.zeros(2)])
+def test_arm_in_space_is_drawn_at_rest_and_in_its_natural_modes() -> None:
+    model, postures = ArmModel.of(yaw_pitch()), [np.zeros(2), np.array([0.5, -0.4])]
+    figure = draw_arm(model, postures, 0.4)
+    titles = [axes.get_title() for axes in figure.axes]
+    assert titles[:2] == ['at (0, 0) deg', 'at (28.65, -22.92) deg']
+    assert [title.startswith('natural mode') for title in titles] == [False] * 2 + [True] * 2
+    rest, _ = equilibrium(model, postures[1], Parameters.of(model.arm, payload_mass=0.4))
+    (line,) = (one for one in figure.axes[1].lines if one.get_label() == 'flexible')
+    drawn = np.array(line.get_data_3d()).T  # type: ignore[attr-defined]
+    np.testing.assert_allclose(drawn[-1], tip_position(model.arm, rest), atol=1e-12)

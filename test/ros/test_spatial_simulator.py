@@ -98,7 +98,8 @@ class FakeNode:
         self.said: list[str] = []
 
     def create_publisher(self, kind: Any, topic: str, depth: int) -> SimpleNamespace:
-        return SimpleNamespace(publish=self.sent.setdefault(topic, []).append)
+        return SimpleNamespace(publish=self.sent.setdefault(topic, []).append,
+                               get_subscription_count=lambda: 1)
 
     def get_logger(self) -> SimpleNamespace:
         return SimpleNamespace(info=self.said.append)

@@ -6,8 +6,15 @@ from collections.abc import Iterator
 from pathlib import Path
 import re
 
+from flex_planner.arms.arm_files import load_arm
+from flex_planner.base.errors import InvalidValueError
 from flex_planner.cli import demonstration
+from flex_planner.cli.demo_motions import demo_motion
+from flex_planner.ros.messages.plans import task_from_message
+from flex_planner.ros.settings.planner import PlannerSettings
+from flex_planner_interfaces.msg import MotionTask
 from flex_planner_interfaces.srv import PlanPath
+import numpy as np
 import pytest
 import rclpy
 from ros_support import DOMAIN
@@ -61,6 +68,25 @@ def test_picture_and_recording_are_in_the_folder(table: dict[str, str], folder: 
     assert recording.parent == folder / 'recordings'
     with AnyReader([recording]) as reader:
         assert '/flex_planner/joint_trajectory' in reader.topics
+
+
+@pytest.mark.parametrize(('name', 'space'), [
+    ('korayem_ei50', MotionTask.CARTESIAN), ('spatial_3r', MotionTask.CARTESIAN_GOAL),
+    ('tudor_like', MotionTask.CARTESIAN_GOAL)])
+def test_arms_in_space_have_a_motion_to_a_point_too(name: str, space: int) -> None:
+    motion, arm = demo_motion(name), load_arm(name)
+    message = demonstration._task(motion)
+    assert message.space == space
+    assert message.publish
+    task = task_from_message(message, arm, PlannerSettings.for_arm(arm))
+    assert task.goal_point.tolist() == list(motion.goal)
+    start = motion.initial_positions(arm)
+    np.testing.assert_allclose(task.start_positions, start, atol=1e-12)
+
+
+def test_arm_without_a_motion_is_refused_by_name() -> None:
+    with pytest.raises(InvalidValueError, match='--arm is .* did you mean tudor_like'):
+        demo_motion('tudorlike')
 
 
 def test_demonstration_waits_for_nodes_with_a_limit(ros: None) -> None:

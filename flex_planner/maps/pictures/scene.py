@@ -56,6 +56,8 @@ class Scene:
         plane, if any [rad].
     given_name : str
         ``start`` or ``goal``.
+    sides : tuple of int
+        The coordinates of points that are shown, to the right and up.
 
     """
 
@@ -63,12 +65,13 @@ class Scene:
     given: Array
     best: Array | None
     given_name: str
+    sides: tuple[int, int] = (0, 1)
 
     def joint_points(self, posture: Array) -> Array:
         """Return the ends of the unbent links in a posture, shape (n + 1, 2) [m]."""
         bent = np.concatenate([posture, np.zeros(self.arm.n_passive)])
         points = link_points(self.arm, bent)
-        return np.concatenate([np.zeros((1, 2)), points[:, -1]])
+        return np.concatenate([points[:1, 0], points[:, -1]])[:, self.sides]
 
     @property
     def lines(self) -> list[Array]:
@@ -86,13 +89,14 @@ def study_of(dataset: xr.Dataset) -> Study | None:
     """
     try:
         content = parse_yaml(dataset.attrs['study'])
+        arm = arm_from_plain(parse_yaml(dataset.attrs['arm']))
         quantity = Quantity[str(dataset.attrs['quantity']).upper()]
         return Study(
             name=str(dataset.attrs['title']), quantity=quantity, text=dataset.attrs['study'],
-            arm=arm_from_plain(parse_yaml(dataset.attrs['arm'])),
+            arm=arm,
             axes=tuple(Axis(name=str(name), values=dataset[name].values)
                        for name in dataset['code'].dims),
-            motion=StudyMotion(start=_end('start', content), goal=_end('goal', content),
+            motion=StudyMotion(start=_end('start', content, arm), goal=_end('goal', content, arm),
                                elbow=content.get('elbow', -1), payload_mass=_PAYLOAD),
             accuracy=_ACCURACY if quantity.is_searched else math.nan)
     except (FlexPlannerError, KeyError, TypeError, ValueError, AttributeError) as error:
@@ -101,10 +105,10 @@ def study_of(dataset: xr.Dataset) -> Study | None:
         return None
 
 
-def _end(name: str, content: Mapping[str, Any]) -> End:
+def _end(name: str, content: Mapping[str, Any], arm: Arm) -> End:
     """Return the common start or goal of the motions of a study."""
     angles = np.array(content.get(f'{name}_angles', []), dtype=float)
-    point = np.array(content.get(name, [np.nan, np.nan]), dtype=float)
+    point = np.array(content.get(name, [np.nan] * arm.dimension), dtype=float)
     return End(name=name, point=point, angles=angles)
 
 
@@ -119,10 +123,12 @@ def find_scene(data: MapData, plane: tuple[int, int], fixed: Mapping[int, int],
     if task is None:
         return None
     ends = {'start': task.start_positions, 'goal': task.goal_positions}
-    moved = data.axes[plane[0]].name.removesuffix('_x')
+    names = [data.axes[place].name for place in plane]
+    moved = names[0][:-2]
+    right, up = ('xyz'.index(name[-1]) for name in names)
     given = 'start' if moved == 'goal' else 'goal'
     return Scene(arm=task.arm, given=ends[given], given_name=given,
-                 best=ends[moved] if known else None)
+                 best=ends[moved] if known else None, sides=(right, up))
 
 
 def _first_task(data: MapData, plane: tuple[int, int], fixed: Mapping[int, int], study: Study,
@@ -138,19 +144,24 @@ def _first_task(data: MapData, plane: tuple[int, int], fixed: Mapping[int, int],
 
 
 def draw_arm(axes: Axes, scene: Scene) -> list[Artist]:
-    """Draw the arm, and how far it reaches; return entries of a legend."""
-    near, far = workspace(scene.arm)
-    for radius in {near, far} - {0.0}:
-        axes.add_patch(Circle((0, 0), radius, fill=False, color=_ARM, linestyle='--',
-                              linewidth=1))
+    """Draw the arm, and in the plane how far it reaches; return entries of a legend."""
     entries: list[Artist] = []
     if scene.best is not None:
         other = 'start' if scene.given_name == 'goal' else 'goal'
         entries.append(_posture(axes, scene, scene.best, '*', f'arm at the best {other}', 0.45))
     entries.append(_posture(axes, scene, scene.given, 'o', f'arm at the {scene.given_name}', 1))
-    entries.append(Line2D([], [], color=_ARM, linestyle='--', linewidth=1,
-                          label='reach of the arm'))
+    if scene.arm.dimension == 2:
+        entries.append(_reach(axes, scene.arm))
     return entries[::-1]
+
+
+def _reach(axes: Axes, arm: Arm) -> Artist:
+    """Draw how near and how far a planar arm reaches; return an entry of a legend."""
+    near, far = workspace(arm)
+    for radius in {near, far} - {0.0}:
+        axes.add_patch(Circle((0, 0), radius, fill=False, color=_ARM, linestyle='--',
+                              linewidth=1))
+    return Line2D([], [], color=_ARM, linestyle='--', linewidth=1, label='reach of the arm')
 
 
 def frame(axes: Axes, x: MapAxis, y: MapAxis, scene: Scene | None) -> None:

@@ -111,7 +111,7 @@ def lines_through_points(data: MapData, plane: tuple[int, int]
     cells = [known[k] for k in spread(len(known), _MOST_POINTS)]
     lines = [dict(zip(plane, map(int, cell), strict=True)) for cell in cells]
     x, y = (data.axes[place] for place in plane)
-    kind = x.name.removesuffix('_x')
+    kind = x.name[:-2]
     labels = [f'{kind} ({x.values[i]:.3g}, {y.values[j]:.3g}) m' for i, j in cells]
     missing = len(known) - len(cells)
     return lines, labels, [f'{missing} of {len(known)} points'] if missing else []

@@ -29,6 +29,7 @@ from flex_planner.reports.recording.execution import (
 from flex_planner.reports.recording.findings import CheckLimits, Finding, MotionCheck
 from flex_planner.reports.recording.forgiveness import recorded_offset
 from flex_planner.reports.recording.optimality import optimality_findings
+from flex_planner.reports.recording.torque_rates import RecordedRates, torque_rate_findings
 import numpy as np
 
 _MICROMETRE = 1e-6
@@ -79,10 +80,21 @@ def check_motion(request: RecordedRequest, model: ArmModel | None = None,
         *_way(motion, states, tip, request.arm, limits),
         *_deviation_at_ends(request, motion, ends, limits),
         *_deviation_from_request(request, motion, limits),
-        *optimality_findings(model, motion, parameters, limits, effort_delay(request),
-                             efforts_settled(request, motion),
-                             float(request.report.torque_interpolation_error),
-                             _given_via_times(request, motion), recorded_offset(request))))
+        *_optimality(request, motion, model, limits)))
+
+
+def _optimality(request: RecordedRequest, motion: RecordedMotion, model: ArmModel,
+                limits: CheckLimits) -> list[Finding]:
+    """Return whether efforts and costates are those of an optimal motion."""
+    error, delay = float(request.report.torque_interpolation_error), effort_delay(request)
+    prices, via_times = RecordedRates.of(request), _given_via_times(request, motion)
+    if prices is not None:
+        return torque_rate_findings(model, motion, request.parameters, prices, limits,
+                                    delay=delay, settled=efforts_settled(request, motion),
+                                    interpolation_error=error, via_times=via_times)
+    return optimality_findings(model, motion, request.parameters, limits, delay,
+                               efforts_settled(request, motion), error, via_times,
+                               recorded_offset(request))
 
 
 def _states(execution: Execution, motion: RecordedMotion, monitor: Monitor | None) -> Array:

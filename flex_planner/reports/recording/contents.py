@@ -59,6 +59,8 @@ class RecordedMotion:
         Efforts of the joint trajectory [N m].
     position_costates, velocity_costates : numpy.ndarray, shape (k, n_t)
         psi_1 and psi_2.
+    torque_costates : numpy.ndarray, shape (k, n), or (k, 0) where torques may jump
+        psi_tau.
     tip : numpy.ndarray, shape (k, 2), of a spatial arm (k, 3)
         [m].
     payload_mass : float
@@ -75,6 +77,7 @@ class RecordedMotion:
     torques: Array
     position_costates: Array
     velocity_costates: Array
+    torque_costates: Array
     tip: Array
     payload_mass: float
     begin: float = 0.0
@@ -92,6 +95,8 @@ class RecordedMotion:
             accelerations=_rows(joints, 'accelerations'), torques=_rows(joints, 'effort'),
             position_costates=_rows(bends, 'position_costates'),
             velocity_costates=_rows(bends, 'velocity_costates'),
+            torque_costates=np.array([getattr(point, 'torque_costates', ()) for point in bends],
+                                     dtype=np.float64),
             tip=np.array([(point.x, point.y, point.z)[:dimension] for point in message.tip_path]),
             payload_mass=float(message.payload_mass), begin=begin)
 
@@ -299,7 +304,8 @@ def _check_sizes(arm: Arm, motion: RecordedMotion) -> None:
     count, n_t = motion.times.size, arm.n_coordinates
     shapes = {'coordinates': n_t, 'rates': n_t, 'torques': arm.n_joints, 'tip': arm.dimension,
               'accelerations': arm.n_joints,
-              'position_costates': n_t, 'velocity_costates': n_t}
+              'position_costates': n_t, 'velocity_costates': n_t,
+              'torque_costates': arm.n_joints if motion.torque_costates.size else 0}
     for name, columns in shapes.items():
         shape = getattr(motion, name).shape
         if shape != (count, columns):

@@ -73,11 +73,11 @@ def optimality_findings(model: ArmModel, motion: RecordedMotion, parameters: Par
         Finding(name='torques against the costates', unit='N m', limit=size,
                 value=float(np.abs(expected - efforts).max())),
         Finding(name='Hamiltonian drift', unit='', limit=limits.hamiltonian_drift,
-                value=_spread(controls.hamiltonian - law.due(times, controls),
-                              motion.times[moving], via_times) / scale)]
+                value=spread_between(controls.hamiltonian - law.due(times, controls),
+                                     motion.times[moving], via_times) / scale)]
 
 
-def _spread(values: Array, times: Array, jumps: Array) -> float:
+def spread_between(values: Array, times: Array, jumps: Array) -> float:
     """Return the largest spread of values between times at which they may jump."""
     phases = np.searchsorted(jumps, times + _SAME_TIME, side='right')
     return max(float(np.ptp(values[phases == k])) for k in np.unique(phases))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from flex_planner.arms.spatial_arm import SpatialArm
-from flex_planner.arms.spatial_body import SpatialBody
+from flex_planner.arms.spatial_body import Matrix, SpatialBody
 from flex_planner.arms.spatial_link import SpatialLink
 from flex_planner.reports.recording.report_table import (
     numbered_table,
@@ -59,14 +59,22 @@ def _body(body: SpatialBody) -> str:
     """Return mass, centre of mass and principal moments of a body."""
     if body.is_nothing:
         return ''
-    moments = np.maximum(np.linalg.eigvalsh(np.array(body.inertia)), 0.0)
     return (f'{body.mass:g} kg at {_vector(body.center_of_mass)} m, '
-            f'{", ".join(f"{moment:.3g}" for moment in moments)} kg m²')
+            f'{_moments(body.inertia)} kg m²')
 
 
 def _payload(arm: SpatialArm) -> str:
-    """Return where the arm carries its payload."""
-    return f'centre at {_vector(arm.payload_com)} m from the tip' if arm.payload_com.any() else ''
+    """Return where the arm carries its payload, and its inertia if that is a tensor."""
+    place = f'centre at {_vector(arm.payload_com)} m from the tip'
+    moments = f'principal moments {_moments(arm.payload_tensor)} kg m²'
+    return ', '.join(text for text, is_there in (
+        (place, arm.payload_com.any()), (moments, np.any(arm.payload_tensor))) if is_there)
+
+
+def _moments(inertia: Matrix) -> str:
+    """Return principal moments in words."""
+    return ', '.join(f'{max(moment, 0.0):.3g}'
+                     for moment in np.linalg.eigvalsh(np.array(inertia)))
 
 
 def _vector(values: Iterable[float]) -> str:

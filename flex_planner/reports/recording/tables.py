@@ -92,8 +92,9 @@ def _task(request: RecordedRequest) -> ReportTable:
     for name in ('start_velocities', 'start_modal_displacements'):
         if np.any(getattr(task, name)):
             rows.append((name.replace('_', ' '), numbers(getattr(task, name))))
-    for name in ('max_joint_speeds', 'max_torque_shares', 'max_modal_rates'):
-        if len(getattr(task, name)):
+    for name in ('max_joint_speeds', 'max_torque_shares', 'max_modal_rates',
+                 'torque_rate_weight', 'max_torque_rate'):
+        if len(getattr(task, name, ())):
             rows.append((name.replace('_', ' '), numbers(getattr(task, name))))
     return ReportTable(title='Task', rows=tuple(rows))
 

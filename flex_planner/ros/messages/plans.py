@@ -105,6 +105,8 @@ def task_from_message(message: MotionTask, arm: Arm, settings: PlannerSettings) 
         effort_weights=np.asarray(message.effort_weights or settings.effort_weights),
         position_weights=np.asarray(message.position_weights),
         velocity_weights=np.asarray(message.velocity_weights),
+        torque_rate_weight=np.asarray(message.torque_rate_weight),
+        max_torque_rate=np.asarray(message.max_torque_rate),
         via_points=via_points_from_message(message, arm),
         tolerance=tolerance or settings.tolerance,
         allow_large_bending=message.allow_large_bending,
@@ -200,6 +202,9 @@ def report_from_plan(plan: Plan) -> PlanReport:
     add_warnings(report, plan.warnings)
     report.velocity_weights = plan.task.velocity_weights.tolist()
     report.effort_weights = plan.task.effort_weights.tolist()
+    report.peak_torque_rates = plan.torque_rates.tolist()
+    if plan.task.has_torque_rates:
+        report.torque_rate_weight = plan.task.torque_rate_prices.tolist()
     add_kinds(report, plan.kinds, plan.starts)
     trials = plan.objectives.trials if plan.objectives else ()
     report.tried_objectives = [trial.objective.value for trial in trials]
@@ -304,7 +309,8 @@ def _flexible_point(n: int, samples: Samples, k: int, time: int) -> FlexiblePoin
         modal_displacements=samples.coordinates[k, n:].tolist(),
         modal_rates=samples.rates[k, n:].tolist(),
         position_costates=samples.position_costates[k].tolist(),
-        velocity_costates=samples.velocity_costates[k].tolist())
+        velocity_costates=samples.velocity_costates[k].tolist(),
+        torque_costates=samples.torque_costates[k].tolist())
 
 
 def reference_state(plan: Plan, samples: Samples, k: int, names: Sequence[str],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 import json
 from pathlib import Path
 import shutil
@@ -135,7 +136,9 @@ def test_tables_have_bodies_and_planes_of_bending_and_units_of_slides() -> None:
     told = [row[moves].split()[0] for row in joints.rows]
     assert set(told) == {'slides', 'turns'}
     assert 'stall torque [N m, N]' in joints.columns
-    links, joints = arm_tables(flexible_3r())
+    links, joints = arm_tables(replace(flexible_3r(), payload_tensor=[0.01, 0.03, 0.02]))
+    assert links.rows[-1][-1] == (
+        'centre at (0.05, 0, 0) m from the tip, principal moments 0.01, 0.02, 0.03 kg m²')
     assert {row[links.columns.index('modes')] for row in links.rows} == {
         'rigid', '1 across, 1 across2, clamped_mass'}
     assert 'stall torque [N m]' in joints.columns

@@ -94,8 +94,11 @@ def test_empty_fields_take_the_defaults_of_the_parameters(ei50_arm: Arm,
 def test_fields_that_are_given_count(ei50_arm: Arm, settings: PlannerSettings) -> None:
     message = MotionTask(**JOINT_TASK, duration=2.0, payload_mass=0.7, effort_weights=[2.0, 3.0],
                          position_weights=[1.0] * 6, velocity_weights=[4.0, 5.0],
+                         torque_rate_weight=[1e-4], max_torque_rate=[np.inf, 50.0],
                          tolerance=1e-5, allowed_planning_time=0.5, allow_large_bending=True)
     made = task_from_message(message, ei50_arm, settings)
+    assert made.torque_rate_weight.tolist() == [1e-4, 1e-4]
+    assert made.max_torque_rate.tolist() == [np.inf, 50.0]
     assert made.start_positions.tolist() == [0.1, 0.2]
     assert made.goal_positions.tolist() == [0.3, 0.4]
     assert (made.duration, made.payload_mass, made.tolerance) == (2.0, 0.7, 1e-5)

@@ -22,6 +22,7 @@ from geometry_msgs.msg import Point
 import numpy as np
 import pytest
 from ros_support import Planner
+from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -44,6 +45,7 @@ class Answer:
     response: PlanPath.Response
     plan: Plan
     sampled: SampledPlan
+    stream: list[JointState]
 
 
 @pytest.fixture(scope='module')
@@ -61,8 +63,9 @@ def answer(planner: Planner) -> Answer:
     task = Task.to_point(arm, START, GOAL, duration=1.0, payload_mass=0.1)
     settings = replace(PlannerSettings.for_arm(arm), search='fast')
     plan = plan_path(task, model=ArmModel.of(arm), search=SearchEffort.FAST)
+    stream = planner.listen(JointState, f'{planner.name}/reference_states', 1000)
     return Answer(planner, planner.plan(**MOTION, publish=True), plan,
-                  sample_plan(plan, settings.sampling()))
+                  sample_plan(plan, settings.sampling()), stream)
 
 
 def tips(trajectory: FlexibleTrajectory) -> np.ndarray[Any, Any]:
@@ -88,6 +91,17 @@ def test_plan_is_published(answer: Answer) -> None:
     latched = answer.planner.latched
     assert latched(JointTrajectory, f'{name}/joint_trajectory') == trajectory.joint_trajectory
     assert latched(FlexibleTrajectory, f'{name}/flexible_trajectory') == trajectory
+
+
+def test_reference_states_lead_to_the_goal(answer: Answer) -> None:
+    samples = answer.sampled.samples
+    rest = samples.coordinates[-1]
+    answer.planner.wait('the end of the stream', lambda: bool(answer.stream) and np.allclose(
+        answer.stream[-1].position, rest, atol=1e-6))
+    last = answer.stream[-1]
+    assert last.name == ['joint1', 'joint2', 'joint3', *answer.plan.arm.modal_names]
+    np.testing.assert_allclose(last.effort[:3], samples.torques[-1], atol=1e-4)
+    assert list(last.effort[3:]) == [0.0] * 4
 
 
 def test_markers_are_the_bent_links_in_space(answer: Answer) -> None:
