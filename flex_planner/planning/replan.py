@@ -82,8 +82,7 @@ def replan(plan: Plan, at: float, *, state: Array | None = None, goal: Array | N
     ----------
     plan : Plan
         That runs; solved, to a goal where the arm comes to rest, without via points, limits
-        on the way that bend it, a free duration, a price on torque rates, or robustness. It stays
-        as it is.
+        on the way that bend it, a free duration, torque rates, or robustness. It stays as it is.
     at : float
         When the new plan begins, at least 1 ms before the arrival of the running one [s].
     state : numpy.ndarray, shape (2 n_t,), optional
@@ -143,9 +142,10 @@ def _check(plan: Plan) -> None:
                'does not end at rest': not task.ends_at_rest,
                'has via points': bool(task.via_points),
                'has a free duration': bool(task.time_weight),
-               'has torques without jumps': task.has_torque_rates,
                'has limits on the way': bool(task.path_constraints)
                or isinstance(problem, ConstrainedMotion),
+               'has prices or limits of torque rates': bool(
+                   task.torque_rate_weight.size or task.max_torque_rate.size),
                'forgives errors of the model': isinstance(problem, OffsetProblem)}
     for reason, holds in reasons.items():
         if holds:

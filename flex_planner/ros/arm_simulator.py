@@ -7,11 +7,14 @@ import time
 
 from builtin_interfaces.msg import Time
 from flex_planner.arms.kinematics import tip_position
+from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.text import printable
 from flex_planner.base.validation import Array
 from flex_planner.control.joint_reference import JointReference
+from flex_planner.control.linear_feedback import LinearFeedback
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.ros.arm_picture import ArmPicture
+from flex_planner.ros.messages.feedback import law_from_message
 from flex_planner.ros.messages.plans import duration_seconds
 from flex_planner.ros.messages.points import point_message
 from flex_planner.ros.messages.trajectory_rules import range_violations, trajectory_violations
@@ -26,6 +29,7 @@ from flex_planner.ros.runtime.running import run_node
 from flex_planner.ros.settings.simulator import SimulatorSettings
 from flex_planner.simulation.plant import Plant, RunawayError
 from flex_planner.simulation.settling import ArrivalWatch, ResidualVibration
+from flex_planner_interfaces.msg import FeedbackGains
 from geometry_msgs.msg import PointStamped
 import numpy as np
 from rclpy.clock import Clock, ClockType
@@ -49,6 +53,8 @@ class ArmSimulator(Node):  # type: ignore[misc]
     Topics subscribed
     -----------------
     joint_trajectory : trajectory_msgs/msg/JointTrajectory
+    feedback_gains : flex_planner_interfaces/msg/FeedbackGains
+        With the parameter of that name.
 
     Topics published
     ----------------
@@ -76,6 +82,7 @@ class ArmSimulator(Node):  # type: ignore[misc]
         arm = declare_arm(self)
         self._settings = declare(self, SimulatorSettings.for_arm(arm))
         self._arm = self._settings.mismatch.apply(arm)
+        self._law: LinearFeedback | None = None
         self._plant, self._passed = self._new_plant(), ElapsedTime()
         self._watch = ArrivalWatch(self._arm, self._settings.vibration_window)
         self._joints = self.create_publisher(JointState, 'joint_states', 10)
@@ -85,6 +92,8 @@ class ArmSimulator(Node):  # type: ignore[misc]
         self._bending = self.create_publisher(Float64, '~/residual_bending', _LATCHED)
         self._picture = ArmPicture(self, self._arm, self._settings)
         self.create_subscription(JointTrajectory, 'joint_trajectory', self._on_trajectory, 1)
+        if self._settings.feedback_gains:
+            self.create_subscription(FeedbackGains, 'feedback_gains', self._on_gains, _LATCHED)
         self.create_timer(1 / self._settings.publish_rate, self._on_timer)
         if self._settings.picture_rate:
             self.create_timer(1 / self._settings.picture_rate, self._on_picture)
@@ -94,10 +103,25 @@ class ArmSimulator(Node):  # type: ignore[misc]
 
     def _new_plant(self) -> Plant:
         settings = self._settings
-        return Plant(ArmDynamics(self._arm), settings.control,
-                     payload_mass=settings.payload_mass,
-                     payload_inertia=settings.payload_inertia or self._arm.payload_inertia,
-                     positions=np.asarray(settings.initial_positions))
+        plant = Plant(ArmDynamics(self._arm), settings.control,
+                      payload_mass=settings.payload_mass,
+                      payload_inertia=settings.payload_inertia or self._arm.payload_inertia,
+                      positions=np.asarray(settings.initial_positions))
+        plant.use_law(self._law)
+        return plant
+
+    def _on_gains(self, message: FeedbackGains) -> None:
+        """Use the gains that leave least in place of the PD, or the PD where there are none."""
+        self._advance()
+        try:
+            law = law_from_message(message)
+            self._plant.use_law(law)
+        except (FlexPlannerError, ValueError) as error:
+            self.get_logger().error(printable(f'gains refused: {error}'))
+            return
+        self._law = law
+        self.get_logger().info(printable('using gains of feedback' if law is not None else
+                                         f'using the PD: {message.message}'))
 
     def _on_trajectory(self, trajectory: JointTrajectory) -> None:
         """Follow a trajectory, or say why not."""

@@ -15,6 +15,7 @@ from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.validation import Array, integer, number, vector
 from flex_planner.control.joint_controller import EffortHold, Gains, MAX_RATE, MIN_RATE
 from flex_planner.control.joint_reference import JointReference
+from flex_planner.control.linear_feedback import LinearFeedback
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.integration import HeldTorqueIntegrator
 from flex_planner.dynamics.physical_parameters import PhysicalParameters
@@ -129,6 +130,8 @@ class Plant:
         self._ticks = self._began = 0
         self._reference = JointReference.hold(rest[:n], self.torque)
         self._moves = False
+        self._law: LinearFeedback | None = None
+        self._law_state: Array = np.zeros(0)
 
     @property
     def time(self) -> float:
@@ -146,8 +149,27 @@ class Plant:
         n, n_t = self.model.arm.n_joints, self.model.arm.n_coordinates
         return self.state[:n], self.state[n_t:n_t + n]
 
+    def use_law(self, law: LinearFeedback | None) -> None:
+        """
+        Use a law in place of the PD from now on; None for the PD.
+
+        Raises
+        ------
+        InvalidValueError
+            If it is for another rate, or another number of joints.
+
+        """
+        if law is not None:
+            integer('joints of the law', law.joints, at_least=self.torque.size,
+                    at_most=self.torque.size)
+            number('rate of the law', law.rate, at_least=self.control.rate,
+                   at_most=self.control.rate, unit='Hz')
+        self._law = law
+        self._law_state = np.zeros(0 if law is None else law.order)
+
     def follow(self, reference: JointReference) -> None:
         """Follow a reference from now on."""
+        self._law_state = np.zeros_like(self._law_state)
         self._reference, self._began, self._moves = reference, self._ticks, True
 
     def advance(self, until: float, observe: Callable[[Plant], None] | None = None) -> None:
@@ -191,13 +213,26 @@ class Plant:
 
     def _command(self, elapsed: float) -> Array:
         """Return the torques of the motors for the coming period."""
-        gains, sensor = self.control.gains, self.sensor
+        sensor = self.sensor
         position, velocity = self._reference.motion(elapsed)
-        torque: Array = (gains.stiffness * (position - sensor.positions)
-                         + gains.damping * (velocity - sensor.speeds))
+        effort: Array = np.zeros_like(position)
         if self.control.feedforward or not self._moves:
             due = elapsed + self.control.hold.delay * self.period
-            torque = torque + self._reference.torque(due)
+            effort = self._reference.torque(due)
+        if self._law is not None:
+            return self._command_by(self._law, sensor.positions - position, effort)
+        gains = self.control.gains
+        return self._limited(effort + gains.stiffness * (position - sensor.positions)
+                             + gains.damping * (velocity - sensor.speeds))
+
+    def _command_by(self, law: LinearFeedback, error: Array, effort: Array) -> Array:
+        """Return the torques of a law, and let it take note of what the motors give."""
+        torque = self._limited(effort + law.C @ self._law_state + law.D @ error)
+        self._law_state = law.A @ self._law_state + law.B @ error + law.E @ (torque - effort)
+        return torque
+
+    def _limited(self, torque: Array) -> Array:
+        """Return the torques that the motors give."""
         if self.control.limit_torques:
             lower, upper = self._limits.bounds(self.joint_state[1])
             torque = np.minimum(np.maximum(torque, lower), upper)

@@ -140,9 +140,9 @@ def test_plans_that_cannot_be_planned_again_are_refused(plan: Plan) -> None:
     unsolved = replace(plan, status=PlanStatus.NOT_CONVERGED)
     via = replace(plan, task=replace(plan.task, via_points=[
         ViaPoint(time=0.5, positions=plan.problem.goal[:2] / 2)]))
-    smooth = replace(plan, task=replace(plan.task, torque_rate_weight=1e-4))
+    calm = replace(plan, task=replace(plan.task, torque_rate_weight=1e-3))
     for wrong, reason in ((unsolved, 'is not solved'), (via, 'has via points'),
-                          (smooth, 'has torques without jumps')):
+                          (calm, 'has prices or limits of torque rates')):
         with pytest.raises(InvalidTaskError, match=f'the running plan {reason}'):
             replan(wrong, 0.3)
 

@@ -19,11 +19,12 @@ from flex_planner.planning.sampling import sample_plan, SamplingSettings
 from flex_planner.ros.messages.plans import joint_trajectory
 from flex_planner.ros.runtime.processes import NodeProcess
 from flex_planner.ros.settings.simulator import SimulatorSettings
+from flex_planner_interfaces.msg import FeedbackGains
 from geometry_msgs.msg import PointStamped
 import numpy as np
 import pytest
 from rclpy.time import Time
-from ros_support import Client, PARAMETER_FILE, STARTING
+from ros_support import Client, LATCHED, PARAMETER_FILE, STARTING
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
@@ -78,7 +79,7 @@ class Simulator(Client):
 
 @pytest.fixture(scope='module')
 def simulator(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Simulator]:
-    with Simulator(tmp_path_factory.mktemp('simulator')) as simulator:
+    with Simulator(tmp_path_factory.mktemp('simulator'), feedback_gains=True) as simulator:
         with simulator.process:
             simulator.wait_until_ready()
             yield simulator
@@ -104,6 +105,23 @@ def test_states_come_at_the_rate_and_are_complete(simulator: Simulator) -> None:
     assert modes.name == ['link1_mode1', 'link1_mode2', 'link2_mode1', 'link2_mode2']
     assert len(modes.position) == len(modes.velocity) == 4
     assert simulator.tips[-1].header.frame_id == 'base_link'
+
+
+def test_gains_take_the_place_of_the_pd(simulator: Simulator) -> None:
+    gains = FeedbackGains(joint_names=['joint1', 'joint2'], rate=1000.0, speed_filter=50.0,
+                          p=[100.0, 100.0], d=[10.0, 10.0], joints_leave=[1e-3],
+                          message='no gains are stable')
+    publisher = simulator.node.create_publisher(FeedbackGains, '/feedback_gains', LATCHED)
+    for changes, reply in (({}, 'using gains of feedback'),
+                           ({'rate': 250.0}, 'gains refused: rate of the law is 250.0'),
+                           ({'d': [1.0]}, 'gains refused: '),
+                           ({'joints_leave': []}, 'using the PD: no gains are stable')):
+        known = simulator.log().count(reply)
+        message = copy.deepcopy(gains)
+        for name, value in changes.items():
+            setattr(message, name, value)
+        publisher.publish(message)
+        simulator.wait(reply, lambda: simulator.log().count(reply) > known)  # noqa: B023
 
 
 def shifted(trajectory: JointTrajectory) -> JointTrajectory:

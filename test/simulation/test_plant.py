@@ -9,8 +9,10 @@ from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.errors import InvalidSizeError, InvalidValueError, NotFiniteError
 from flex_planner.base.validation import Array
+from flex_planner.control.feedback_motion import Course, FeedbackArm
 from flex_planner.control.joint_controller import EffortHold, Gains
 from flex_planner.control.joint_reference import JointReference
+from flex_planner.control.linear_feedback import pd_feedback
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.integration import simulate
 from flex_planner.optimal_control.arm_model import ArmModel
@@ -325,3 +327,26 @@ def test_coarse_encoder_makes_the_joints_less_exact(plan: Plan,
         errors.append(np.abs(plant.joint_state[0] - plan.task.goal_positions).max())
     assert errors[0] < 1e-6
     assert 1e-5 < errors[1] < 0.01  # some steps of the encoder
+
+
+def test_plant_under_a_law_is_the_arm_that_gains_are_tried_on(
+        plan: Plan, reference: JointReference) -> None:
+    law = pd_feedback(Gains.of(2, 60.0, 4.0), 1000.0)
+    plant = plant_at_start(plan, payload_mass=1.1, encoder=Encoder(resolution=1e-4))
+    arm = FeedbackArm(dynamics=ArmDynamics.of(plan.arm), parameters=plant.parameters, law=law,
+                      resolution=1e-4)
+    motion = arm.follow(Course.of(reference, EffortHold.END, 1000.0, 0.3), plant.state)
+    plant.use_law(law)
+    plant.follow(reference)
+    plant.advance(0.3)
+    # encoders that round may do so at different moments
+    np.testing.assert_allclose(plant.state[:6], motion.states[-1, :6], rtol=0, atol=1e-5)
+    assert np.abs(motion.states[-1, :2] - reference.motion(0.3)[0]).max() > 1e-4
+
+
+def test_law_for_another_rate_is_refused(plan: Plan) -> None:
+    plant = plant_at_start(plan)
+    with pytest.raises(InvalidValueError, match='rate of the law is 500.0, but must be'):
+        plant.use_law(pd_feedback(GAINS, 500.0))
+    with pytest.raises(InvalidValueError, match='joints of the law is 3, but must be'):
+        plant.use_law(pd_feedback(Gains.of(3, 1.0, 1.0), 1000.0))

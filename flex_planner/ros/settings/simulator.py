@@ -56,6 +56,9 @@ class SimulatorSettings:
         [100.0], 'Proportional gain of each joint [N m/rad].', read_only=True)
     damping: list[float] = parameter_field(
         [10.0], 'Derivative gain of each joint [N m s/rad].', read_only=True)
+    feedback_gains: bool = parameter_field(
+        False, 'Whether gains that come on the topic feedback_gains take the place of the PD.',
+        read_only=True)
     feedforward: bool = parameter_field(
         True, 'Whether the torques of a trajectory are applied; if not, PD alone moves the arm.',
         read_only=True)

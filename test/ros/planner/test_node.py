@@ -471,7 +471,6 @@ def test_gains_are_published_with_a_plan_where_they_are_asked_for(rigid: Planner
     assert rigid.set_parameter('feedback_gains', False).successful
 
 
-
 @pytest.mark.parametrize(('name', 'value', 'reason'), [
     ('tolerance', 2.0, 'tolerance'),
     ('tolerance', math.nan, 'tolerance'),
