@@ -13,6 +13,7 @@ from typing import Any
 from builtin_interfaces.msg import Duration
 from flex_planner.arms.arm import Arm
 from flex_planner.base.errors import InvalidValueError
+from flex_planner.base.validation import Array
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.sampling import sample_plan, SamplingSettings
@@ -96,9 +97,14 @@ def planned(ei50_arm: Arm, ei50_model: ArmModel, paper_task: Any) -> JointTrajec
 
 
 def test_states_come_at_the_rate_and_are_complete(simulator: Simulator) -> None:
-    simulator.wait('states', lambda: len(simulator.states) > 100)
-    stamps = [s.header.stamp.sec + s.header.stamp.nanosec * 1e-9 for s in simulator.states[-80:]]
-    assert np.median(np.diff(stamps)) == pytest.approx(1 / RATE, rel=0.2)
+    def periods() -> Array:
+        stamps = [s.header.stamp.sec + s.header.stamp.nanosec * 1e-9 for s in simulator.states]
+        return np.diff(stamps) * RATE
+
+    # a machine that is busy makes some of them late, and none early
+    simulator.wait('states a period apart', lambda: (
+        np.abs(periods() - 1) < 0.2).sum() > 20)
+    assert periods().mean() > 0.8
     state, modes = simulator.states[-1], simulator.modes[-1]
     assert state.name == ['joint1', 'joint2']
     assert len(state.position) == len(state.velocity) == len(state.effort) == 2
@@ -276,6 +282,8 @@ def test_simulator_follows_a_clock_that_jumps_and_survives_torques_that_no_arm_d
         assert np.abs(moving.velocity).max() > 0.1
         arm.pass_time(3.0, 3.7)
         assert 'the clock has jumped by -999997' in arm.log()
+        arm.wait('where the tip is then', lambda: (
+            arm.tips[-1].header.stamp == arm.states[-1].header.stamp))
         tip = arm.tips[-1].point
         assert (tip.x, tip.y) == pytest.approx(GOAL, abs=5e-5)
         arm.command(torn(copy.deepcopy(planned)), 'following a trajectory')
