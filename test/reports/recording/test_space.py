@@ -35,6 +35,7 @@ def moving(arm: SpatialArm, count: int = 41) -> RecordedMotion:
     return RecordedMotion(
         times=times, coordinates=coordinates, rates=nothing, accelerations=nothing[:, :n],
         torques=nothing[:, :n], position_costates=nothing, velocity_costates=nothing,
+        torque_costates=nothing[:, :0],
         tip=tip_position(arm, coordinates), payload_mass=0.5)
 
 
