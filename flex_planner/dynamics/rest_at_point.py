@@ -116,7 +116,8 @@ class _BentArm:
         Newton's method on the place of the tip and the balance of the links at once.
 
         """
-        n, q, last, exact = self.arm.n_joints, start.copy(), np.inf, False
+        n, q, last = self.arm.n_joints, start.copy(), np.inf
+        polished = q.size == n  # links that bend take one step more, for their derivatives
         for _ in range(_MAX_ITERATIONS):
             try:
                 _, sagging, sag = self._balance(q)
@@ -126,11 +127,12 @@ class _BentArm:
             follows = moves[:, :n] - moves[:, n:] @ sagging
             left = point - tip_position(self._dynamics.arm, q) - moves[:, n:] @ sag
             miss = float(np.linalg.norm(left)) + float(np.abs(sag).max(initial=0.0))
-            if exact or (miss > _SLOW * last and miss <= _ENOUGH * self.arm.reach):
+            near = miss <= _EXACT * self.arm.reach
+            if (near and polished) or (miss > _SLOW * last and miss <= _ENOUGH * self.arm.reach):
                 return (q, turned) if self._is_whole(q, follows) else None
             if not miss < last:
                 return None
-            exact, last = miss <= _EXACT * self.arm.reach, miss
+            polished, last = polished or near, miss
             turned = turned + _least_squares(follows @ self._turning(turned), left)
             angles = self._angles(turned)
             q[n:] += sag - sagging @ (angles - q[:n])
