@@ -1,6 +1,6 @@
 .DEFAULT_GOAL := help
-.PHONY: help setup demo demo-library paper test test-thorough test-thorough-beside \
-        test-thorough-alone lint lint-types lint-style docs bench clean
+.PHONY: help setup demo demo-library paper test test-thorough test-thorough-ci \
+        lint lint-types lint-style docs bench clean
 
 # The interpreter for .venv; a finished .venv stays as it is unless PYTHON is given.
 ifeq ($(origin PYTHON),undefined)
@@ -46,15 +46,12 @@ test: lint
 test-thorough: setup
 	$(call run_tests,thorough)
 
-# the same in two parts, for who has something else to do beside the second
-test-thorough-beside: setup
-	$(call run_beside,thorough)
+# without those that take a minute or so each
+test-thorough-ci: setup
+	$(call run_tests,thorough and not soak)
 
-test-thorough-alone: setup
-	$(call run_alone,thorough)
-
-run_beside = tools/run python -m pytest -n auto --dist loadfile -m '$(1) and not alone'
-run_alone = tools/run python -m pytest -m '$(1) and alone'
+run_beside = tools/run python -m pytest -n auto --dist loadfile -m '($(1)) and not alone'
+run_alone = tools/run python -m pytest -m '($(1)) and alone'
 
 # run_tests MARKS: first what runs beside others, then what does not, also if the first fails
 define run_tests
