@@ -73,9 +73,9 @@ half the size, then one of each with three corrections.
 
 {shares}
 
-The stage elimination inverts 12 x 12 complex matrices by the hundred, which LAPACK does at 1 to 2
-Gflop/s where large matrix products reach 27 on this machine; together with the banded LU that is
-what keeps a plan from the floating-point floor of a few milliseconds an iteration.
+All of it is compiled, and works interval by interval within the cache; the simulation of the
+certificate and the estimate of the error, which solves with a rule of one stage more, take the
+most.
 
 ### Growth
 
