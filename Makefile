@@ -1,6 +1,6 @@
 .DEFAULT_GOAL := help
-.PHONY: help setup demo demo-library paper test test-thorough test-thorough-ci \
-        lint lint-types lint-style docs bench clean
+.PHONY: help setup demo demo-library paper test test-thorough lint lint-types \
+        lint-style docs bench clean
 
 # The interpreter for .venv; a finished .venv stays as it is unless PYTHON is given.
 ifeq ($(origin PYTHON),undefined)
@@ -46,18 +46,11 @@ test: lint
 test-thorough: setup
 	$(call run_tests,thorough)
 
-# without those that take a minute or so each
-test-thorough-ci: setup
-	$(call run_tests,thorough and not soak)
-
-run_beside = tools/run python -m pytest -n auto --dist loadfile -m '($(1)) and not alone'
-run_alone = tools/run python -m pytest -m '($(1)) and alone'
-
 # run_tests MARKS: first what runs beside others, then what does not, also if the first fails
 define run_tests
 @failed=0; \
-$(call run_beside,$(1)) || failed=1; \
-$(call run_alone,$(1)) || failed=1; \
+tools/run python -m pytest -n auto --dist loadfile -m '$(1) and not alone' || failed=1; \
+tools/run python -m pytest -m '$(1) and alone' || failed=1; \
 exit $$failed
 endef
 

@@ -40,11 +40,6 @@ settings.load_profile('repository')
 ALONE = {'ros', 'system'}
 # the ids of files, tests and cases that `make test` leaves out
 THOROUGH = FOLDER / 'thorough.txt'
-# thorough ones that take a minute or so and have a shorter sibling: CI leaves them out
-SOAK = {
-    'test/bench/test_independent.py::test_random_plans_do_what_is_certified',
-    'test/docs/test_notebooks.py::test_notebook_runs_and_shows_pictures[payload_map]',
-    'test/ros/planner/test_node_endurance.py'}
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -58,8 +53,6 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         if matches:
             item.add_marker(pytest.mark.thorough)
             found |= matches
-        if SOAK & {item.nodeid, *_wholes(item.nodeid)}:
-            item.add_marker(pytest.mark.soak)
     if config.args_source is pytest.Config.ArgsSource.TESTPATHS and found != listed:
         raise pytest.UsageError(f'{THOROUGH.name} names no test: {", ".join(listed - found)}')
 
