@@ -21,7 +21,7 @@ from flex_planner.collocation import CollocationSolution, GaussRule
 from flex_planner.collocation.mesh import switching_times
 from flex_planner.collocation.newton import newton
 from flex_planner.dynamics.statics import residual_vibration
-from flex_planner.optimal_control.constrained_motion import ConstrainedMotion
+from flex_planner.optimal_control.constrained_motion import ConstrainedMotion, slacks_of
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
 from flex_planner.optimal_control.task import MAX_DURATION
 from flex_planner.optimal_control.torque_offset import OffsetProblem
@@ -229,12 +229,14 @@ def _look_at(plan: Plan, solution: CollocationSolution, monitor: Monitor,
     half = float(np.nan_to_num(miss @ miss / 2, nan=np.inf))
     vibration = _vibration(problem, miss)
     totals = integrate_totals(problem, solution)
+    # limits on the way are looked at in the solution, not in the simulation
+    known = np.inf if slacks_of(problem) is None else -np.inf
     plan = replace(plan, solution=solution, cost=totals.cost, effort=totals.effort,
                    energy=totals.energy, saturation=totals.saturation,
                    switching_times=switching_times(problem, solution),
                    certificate=Certificate(tip_error=tip_error, boundary_error=half,
                                            residual_vibration=vibration, via_error=0.0,
-                                           limit_slack=np.inf))
+                                           limit_slack=known))
     if not (max(tip_error, vibration) <= tip_tolerance and half <= plan.task.tolerance):
         return replace(plan, status=PlanStatus.CERTIFICATE_FAILED, message=(
             f'the simulated tip arrives {1e3 * tip_error:.2g} mm from the goal and leaves '

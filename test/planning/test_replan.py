@@ -11,6 +11,7 @@ from flex_planner.base.errors import InvalidSizeError, InvalidTaskError, Invalid
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.integration import simulate
+from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import Task
 from flex_planner.optimal_control.via_points import ViaPoint
 from flex_planner.planning.plan import Plan, PlanStatus
@@ -119,6 +120,23 @@ def test_later_arrival_is_taken_where_it_may_be(plan: Plan) -> None:
     free = replan(plan, 0.6, goal=goal, budget=10.0)
     assert not kept.solved and 'more time until the arrival may do' in kept.plan.message
     assert free.solved and free.plan.task.duration > 0.4 * 1.4
+
+
+def test_limits_of_the_arm_are_looked_at_and_what_the_simulation_kept_is_not_claimed(
+        plan: Plan) -> None:
+    n, n_t = plan.arm.n_joints, plan.arm.n_coordinates
+    swing = solution_of(plan)(np.linspace(0.3, 1.0, 701))[:, n_t:n_t + n]
+    joints = list(plan.arm.joints)
+    for share, status in ((1.5, PlanStatus.SOLVED), (0.5, PlanStatus.LIMIT_VIOLATED)):
+        motor = replace(joints[0].motor, max_speed=share * float(np.abs(swing[:, 0]).max()))
+        arm = replace(plan.arm, joints=(replace(joints[0], motor=motor), *joints[1:]))
+        task = replace(plan.task, arm=arm)
+        limited = replace(plan, task=task, problem=MotionProblem(
+            plan.model, task, plan.problem.parameters))
+        found = replan(limited, 0.3, keep_time=True, budget=10.0)
+        assert found.plan.status is status, found.plan.message
+        assert found.plan.certificate.limit_slack == -np.inf  # not known
+    assert replan(plan, 0.3, budget=10.0).plan.certificate.limit_slack == np.inf  # no limits
 
 
 def test_new_plan_can_be_published(plan: Plan) -> None:
