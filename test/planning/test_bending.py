@@ -8,6 +8,7 @@ from flex_planner.arms.arm import Arm, Joint, Link, Motor, Node
 from flex_planner.arms.kinematics import link_points
 from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.capacity.min_duration import find_min_duration
+from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.path_constraints import read_constraint, write_constraint
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.bending import find_largest_bending, keeps_model
@@ -16,6 +17,7 @@ from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.verdict import find_refusal
 from flex_planner.planning.warnings import WarningKind
+from flex_planner.planning.within_model import bound_bending
 import numpy as np
 from plan_checks import solution_of
 import pytest
@@ -104,6 +106,16 @@ def test_motion_is_bent_to_what_the_model_holds() -> None:
     # its texts lead to the same limits, as in messages and recordings
     assert keeps_model(replace(plan.task, path_constraints=[
         read_constraint('limit', write_constraint(one)) for one in plan.task.path_constraints]))
+
+
+def test_ends_that_bend_too_far_cannot_be_mended(refused: Plan) -> None:
+    bounded = bound_bending(refused.problem)
+    assert bounded is not None and keeps_model(bounded.task)
+    assert bound_bending(bounded) is None  # there is nothing to add
+    task = replace(refused.task, start_modal_displacements=[0.2])
+    bent = MotionProblem(refused.model, task, refused.problem.parameters)
+    assert find_largest_bending(refused.arm, bent.start[None, :2]).share > 0.3
+    assert bound_bending(bent) is None
 
 
 def test_searches_end_where_the_model_does() -> None:
