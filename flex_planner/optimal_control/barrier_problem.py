@@ -16,9 +16,9 @@ _INSIDE = 0.9
 _LEAST_LEFT, _LARGEST_JUMP = 0.2, 0.4
 
 
-class MotionBarrier:
+class BarrierOfMotion:
     """
-    The conditions of `barrier_conditions` for a task: a `BarrierProblem` of z = (q, q', psi).
+    What a motion with a barrier has of the motion itself: its ends and its via points.
 
     Parameters
     ----------
@@ -30,8 +30,39 @@ class MotionBarrier:
     def __init__(self, motion: MotionProblem) -> None:
         self.motion = motion
         self.size, self.explicit = motion.size, motion.explicit
-        self.free = motion.model.arm.n_joints
         self.junctions = motion.junctions
+
+    def longest(self, node: Array, step: Array) -> float:
+        """Return 1: the motion may go anywhere."""
+        return 1.0
+
+    def left(self, z: Array) -> tuple[Array, Array]:
+        """Return the initial conditions."""
+        return self.motion.left(z)
+
+    def right(self, z: Array) -> tuple[Array, Array]:
+        """Return the final conditions."""
+        return self.motion.right(z)
+
+    def join(self, junction: int, before: Array, after: Array) -> tuple[Array, Array]:
+        """Return what holds at a via point."""
+        return self.motion.join(junction, before, after)
+
+
+class MotionBarrier(BarrierOfMotion):
+    """
+    The conditions of `barrier_conditions` for a task: a `BarrierProblem` of z = (q, q', psi).
+
+    Parameters
+    ----------
+    motion : MotionProblem
+        Of the task.
+
+    """
+
+    def __init__(self, motion: MotionProblem) -> None:
+        super().__init__(motion)
+        self.free = motion.model.arm.n_joints
         self._p = np.where(np.isfinite(motion.p), motion.p, _ENDLESS)
 
     @property
@@ -73,22 +104,6 @@ class MotionBarrier:
         """Return the step of (torques, slacks, multipliers) that goes with one of z."""
         return self.motion.model.barrier('barrier_direction')(z, y, dz,
                                                               np.append(self._p, mu))[0]
-
-    def longest(self, node: Array, step: Array) -> float:
-        """Return 1: the motion may go anywhere."""
-        return 1.0
-
-    def left(self, z: Array) -> tuple[Array, Array]:
-        """Return the initial conditions."""
-        return self.motion.left(z)
-
-    def right(self, z: Array) -> tuple[Array, Array]:
-        """Return the final conditions."""
-        return self.motion.right(z)
-
-    def join(self, junction: int, before: Array, after: Array) -> tuple[Array, Array]:
-        """Return what holds at a via point."""
-        return self.motion.join(junction, before, after)
 
     def guess(self, solution: CollocationSolution, mu: float) -> Array:
         """Return torques inside their limits, slacks and multipliers for a motion."""

@@ -37,7 +37,7 @@ def describe_spatial_links(arm: SpatialArm, payload_mass: float) -> list[str]:
     mass = sum(link.mass for link in arm.links)
     place = f' at {_say(arm.payload_com)} m from the tip' if arm.payload_com.any() else ''
     if np.any(arm.payload_tensor):
-        place += f', principal moments {_moments(arm.payload_tensor)} kg m^2'
+        place += f', principal moments {say_moments(arm.payload_tensor)} kg m^2'
     count = len(arm.elastic_joints)
     twists = f'{count} twist{"s" if count > 1 else ""}, ' if count else ''
     lines = [f'mass: {mass:.4g} kg, payload {payload_mass:.4g} kg{place}',
@@ -79,10 +79,10 @@ def _describe_body(body: SpatialBody) -> str:
     if body.is_nothing:
         return ', without mass'
     return (f', centre of mass at {_say(body.center_of_mass)} m, principal moments '
-            f'{_moments(body.inertia)} kg m^2')
+            f'{say_moments(body.inertia)} kg m^2')
 
 
-def _moments(inertia: Matrix) -> str:
+def say_moments(inertia: Matrix) -> str:
     """Return principal moments in words."""
     return ', '.join(f'{max(moment, 0.0):.3g}'
                      for moment in np.linalg.eigvalsh(np.array(inertia)))

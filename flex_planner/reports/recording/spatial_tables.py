@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from flex_planner.arms.spatial_arm import SpatialArm
-from flex_planner.arms.spatial_body import Matrix, SpatialBody
+from flex_planner.arms.spatial_body import SpatialBody
 from flex_planner.arms.spatial_link import SpatialLink
 from flex_planner.reports.recording.report_table import (
     numbered_table,
     ReportTable,
     told_columns,
 )
+from flex_planner.reports.spatial_arm import say_moments
 import numpy as np
 
 # of the modes: first plane, second plane, twisting
@@ -60,21 +61,15 @@ def _body(body: SpatialBody) -> str:
     if body.is_nothing:
         return ''
     return (f'{body.mass:g} kg at {_vector(body.center_of_mass)} m, '
-            f'{_moments(body.inertia)} kg m²')
+            f'{say_moments(body.inertia)} kg m²')
 
 
 def _payload(arm: SpatialArm) -> str:
     """Return where the arm carries its payload, and its inertia if that is a tensor."""
     place = f'centre at {_vector(arm.payload_com)} m from the tip'
-    moments = f'principal moments {_moments(arm.payload_tensor)} kg m²'
+    moments = f'principal moments {say_moments(arm.payload_tensor)} kg m²'
     return ', '.join(text for text, is_there in (
         (place, arm.payload_com.any()), (moments, np.any(arm.payload_tensor))) if is_there)
-
-
-def _moments(inertia: Matrix) -> str:
-    """Return principal moments in words."""
-    return ', '.join(f'{max(moment, 0.0):.3g}'
-                     for moment in np.linalg.eigvalsh(np.array(inertia)))
 
 
 def _vector(values: Iterable[float]) -> str:
