@@ -48,6 +48,12 @@ def test_rigid_links_do_not_bend(rigid_arm: Arm) -> None:
 # A link that is thrown about: it bends by over 50, 25 and 4 % of its length in 0.65, 1 and 2 s
 
 
+# By IPOPT, on Radau collocation of equations of the link written apart from the planner's: J in
+# 0.8 s, free and within what the model holds, and within it the largest payload in 1 s [kg] and
+# the shortest duration [s]
+FREE, WITHIN, HEAVIEST, SHORTEST = 0.0606532, 0.0615306, 0.2452, 0.69291
+
+
 def soft_plan(duration: float, allowed: bool) -> Plan:
     link = Link(length=0.5, linear_density=0.2, flexural_rigidity=0.3, modes=1,
                 mode_family='clamped_free')
@@ -99,7 +105,8 @@ def test_motion_is_bent_to_what_the_model_holds() -> None:
     assert plan.solved, plan.message
     assert largest(free) > 0.31
     assert 0.29 < largest(plan) <= 0.3
-    assert free.cost < plan.cost < 1.2 * free.cost
+    assert free.cost == pytest.approx(FREE, rel=1e-6)
+    assert plan.cost == pytest.approx(WITHIN, rel=1e-4)
     assert CertificateLimits().violations(plan.certificate) == []
     (told,) = [one for one in plan.warnings if one.kind is WarningKind.BENDING]
     assert 'the motion of least cost would bend them by more than the 30%' in told.sentence
@@ -124,11 +131,12 @@ def test_searches_end_where_the_model_does() -> None:
     assert found.status is PlanStatus.SOLVED, found.message
     assert found.plan is not None and found.plan.solved
     assert 0.29 < largest(found.plan) <= 0.3
+    assert found.payload == pytest.approx(HEAVIEST, abs=1e-3)
     assert not plan_path(replace(task, payload_mass=found.payload + 5e-3)).solved
     fastest = find_min_duration(task)
     assert fastest.status is PlanStatus.SOLVED, fastest.message
     assert fastest.plan is not None and 0.29 < largest(fastest.plan) <= 0.3
-    assert fastest.duration < 0.8
+    assert fastest.duration == pytest.approx(SHORTEST, abs=1e-4)
 
 
 def test_limit_on_the_way_is_told_before_bending(refused: Plan) -> None:
