@@ -11,38 +11,36 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 from flex_planner.arms.kinematics import tip_position
-from flex_planner.base.errors import InvalidTaskError
 from flex_planner.base.progress import Monitor, StoppedError
-from flex_planner.base.validation import Array, number, vector
-from flex_planner.collocation import CollocationSolution, GaussRule
+from flex_planner.base.validation import Array, number
+from flex_planner.collocation import CollocationSolution
 from flex_planner.collocation.mesh import switching_times
 from flex_planner.collocation.newton import newton
 from flex_planner.dynamics.statics import residual_vibration
-from flex_planner.optimal_control.constrained_motion import ConstrainedMotion, slacks_of
-from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
-from flex_planner.optimal_control.task import MAX_DURATION
-from flex_planner.optimal_control.torque_offset import OffsetProblem
+from flex_planner.optimal_control.constrained_motion import slacks_of
+from flex_planner.optimal_control.motion_problem import MotionProblem
+from flex_planner.optimal_control.task import MAX_DURATION, MIN_DURATION
 from flex_planner.optimal_control.totals import integrate_totals
 from flex_planner.planning.certificate import Certificate, simulate_to_goal
+from flex_planner.planning.largest_rates import find_largest_rates
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_problem import STOP_STATUS
+from flex_planner.planning.rest_of_motion import Departure
 from flex_planner.planning.verdict import find_refusal
 import numpy as np
+from numpy.typing import ArrayLike
 
 REPLANNED = 'planned again in motion'
 TIP_TOLERANCE = 1e-3
 MIN_BUDGET, MAX_BUDGET = 1e-3, 60.0
-# points of an interval, and how many intervals are tried
-_STAGES, _INTERVALS = 8, (12, 24, 40)
+# how many intervals are tried
+INTERVALS = (12, 24, 40)
 _NEWTON_TOLERANCE, _MOST_ITERATIONS = 1e-4, 15
 _RTOL = 1e-6
-# of what is left: times that are tried where the arrival may be later
+# of the time to the arrival: what is tried where it may be later
 _LATER = 1.0, 1.5, 2.25
-# below which nothing is planned any more [s]
-_LEAST_LEFT = 1e-3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -59,12 +57,15 @@ class Replan:
         When it begins, on the clock of the running plan [s].
     torque_step : numpy.ndarray, shape (n,)
         By how much torques jump there; NaN without a solution [N m].
+    delay : float
+        By how much later than asked the arm arrives [s].
 
     """
 
     plan: Plan
     at: float
     torque_step: Array
+    delay: float = 0.0
 
     @property
     def solved(self) -> bool:
@@ -72,8 +73,10 @@ class Replan:
         return self.plan.solved
 
 
-def replan(plan: Plan, at: float, *, state: Array | None = None, goal: Array | None = None,
-           keep_time: bool = False, budget: float = 0.05, tip_tolerance: float = TIP_TOLERANCE,
+def replan(plan: Plan, at: float, *, state: ArrayLike | None = None,
+           goal: ArrayLike | None = None, duration: float | None = None, keep_time: bool = False,
+           torque: ArrayLike | None = None, torque_rate_weight: ArrayLike | None = None,
+           budget: float = 0.05, tip_tolerance: float = TIP_TOLERANCE,
            monitor: Monitor | None = None) -> Replan:
     """
     Plan again while a plan is carried out.
@@ -82,16 +85,24 @@ def replan(plan: Plan, at: float, *, state: Array | None = None, goal: Array | N
     ----------
     plan : Plan
         That runs; solved, to a goal where the arm comes to rest, without via points, limits
-        on the way that bend it, a free duration, torque rates, or robustness. It stays as it is.
+        on the way that bend it, a free duration, bounds of torque rates, or robustness. It stays
+        as it is.
     at : float
         When the new plan begins, at least 1 ms before the arrival of the running one [s].
-    state : numpy.ndarray, shape (2 n_t,), optional
+    state : array_like, shape (2 n_t,), optional
         x = (q, q') of the arm then, bending included; by default what the running plan has.
-    goal : numpy.ndarray, shape (n,), optional
+    goal : array_like, shape (n,), optional
         Joint angles to come to rest at; those of the running plan by default [rad].
+    duration : float, optional
+        From `at` to the arrival, 1e-9 to 1000 [s]; by default that of the running plan stays.
     keep_time : bool
-        Whether the arm must arrive when the running plan would; otherwise 1.5 and 2.25 times what
-        is left are tried, too, if that is too little.
+        Whether the arm must arrive then; otherwise 1.5 and 2.25 times the duration are tried, too,
+        if that is too little.
+    torque : array_like, shape (n,), optional
+        That acts at `at`; by default what the running plan has [N m].
+    torque_rate_weight : array_like, a number or shape (n,), optional
+        Price of the rates of the torques, see `Task`: they have no jumps then, and begin with the
+        one that acts. By default that of the running plan; empty: torques may jump.
     budget : float
         Time that it may take, 0.001 to 60 [s].
     tip_tolerance : float
@@ -105,7 +116,8 @@ def replan(plan: Plan, at: float, *, state: Array | None = None, goal: Array | N
     Replan
         Where it failed, ``plan.status`` and ``plan.message`` say how: ``NOT_CONVERGED`` or
         ``CERTIFICATE_FAILED`` for want of time until the arrival, ``TIMEOUT`` for want of budget,
-        ``LIMIT_VIOLATED`` and ``BENT_TOO_FAR`` for limits of the arm.
+        ``LIMIT_VIOLATED`` and ``BENT_TOO_FAR`` for limits of the arm, or of its motors where
+        torques have no jumps.
 
     Raises
     ------
@@ -117,69 +129,55 @@ def replan(plan: Plan, at: float, *, state: Array | None = None, goal: Array | N
         If a motor is too weak to hold the arm at the goal.
 
     """
-    _check(plan)
-    end, watch = plan.task.duration, monitor or Monitor(
-        time_limit=number('budget', budget, at_least=MIN_BUDGET, at_most=MAX_BUDGET, unit='s'))
-    at = number('at', at, at_least=0, at_most=end - _LEAST_LEFT, unit='s')
+    departure = Departure.of(plan, at, state, torque, torque_rate_weight)
+    watch = monitor or budgeted(budget)
     number('tip_tolerance', tip_tolerance, above=0, unit='m')
-    begin = _begin(plan, at, state)
+    asked = departure.left if duration is None else number(
+        'duration', duration, at_least=MIN_DURATION, at_most=MAX_DURATION, unit='s')
     best: Plan | None = None
     for factor in _LATER[:1] if keep_time else _LATER:
-        duration = factor * (end - at)
-        if duration > MAX_DURATION:
+        if factor * asked > MAX_DURATION:
             break
-        best = _plan_rest(_problem(plan, begin, goal, duration), plan, at, watch, tip_tolerance)
+        problem = departure.problem(goal, factor * asked)
+        best = plan_rest(departure, problem, watch, tip_tolerance)
         if best.solved or best.status in STOP_STATUS.values():
             break
     assert best is not None
-    return Replan(plan=best, at=at, torque_step=_torque_step(plan, at, best))
+    return Replan(plan=best, at=departure.at, torque_step=torque_step(departure, best),
+                  delay=best.task.duration - asked)
 
 
-def _check(plan: Plan) -> None:
-    """Refuse a plan whose rest is not a motion like any other."""
-    problem, task = plan.problem, plan.task
-    reasons = {'is not solved': not plan.solved,
-               'does not end at rest': not task.ends_at_rest,
-               'has via points': bool(task.via_points),
-               'has a free duration': bool(task.time_weight),
-               'has limits on the way': bool(task.path_constraints)
-               or isinstance(problem, ConstrainedMotion),
-               'has prices or limits of torque rates': bool(
-                   task.torque_rate_weight.size or task.max_torque_rate.size),
-               'forgives errors of the model': isinstance(problem, OffsetProblem)}
-    for reason, holds in reasons.items():
-        if holds:
-            raise InvalidTaskError(f'the running plan {reason}, and such a plan is not planned '
-                                   'again in motion: let it end, or plan with plan_path')
+def budgeted(budget: float) -> Monitor:
+    """Return a monitor that stops work after a time [s]."""
+    return Monitor(time_limit=number('budget', budget, at_least=MIN_BUDGET, at_most=MAX_BUDGET,
+                                     unit='s'))
 
 
-def _begin(plan: Plan, at: float, state: Array | None) -> Array:
-    """Return the state that the new plan begins in, shape (2 n_t,)."""
-    assert plan.solution is not None
-    size = 2 * plan.arm.n_coordinates
-    if state is None:
-        return plan.solution(np.array([at]))[0, :size]
-    return vector('state', state, size)
+def plan_rest(departure: Departure, problem: MotionProblem, monitor: Monitor,
+              tip_tolerance: float = TIP_TOLERANCE, until: float | None = None) -> Plan:
+    """
+    Return the plan of a motion from a departure, on the first mesh that leads to its goal.
 
+    Parameters
+    ----------
+    departure : Departure
+        Where it leaves the plan that runs.
+    problem : MotionProblem
+        Of `Departure.problem`.
+    monitor : Monitor
+        May stop it, which is a status of the plan.
+    tip_tolerance : float
+        As of `replan` [m].
+    until : float, optional
+        On the clock of the plan that runs: up to where that is the guess; to its end by
+        default [s].
 
-def _problem(plan: Plan, begin: Array, goal: Array | None, duration: float) -> MotionProblem:
-    """Return the motion from a state to joint angles."""
-    n, n_t = plan.arm.n_joints, plan.arm.n_coordinates
-    angles = plan.problem.goal[:n] if goal is None else goal
-    none: Any = ()
-    task = replace(plan.task, start_positions=begin[:n], start_velocities=begin[n_t:],
-                   start_modal_displacements=begin[n:n_t], start_point=none, goal_point=none,
-                   goal_positions=angles, duration=duration)
-    return MotionProblem(plan.model, task, task_parameters(task))
-
-
-def _plan_rest(problem: MotionProblem, running: Plan, at: float, monitor: Monitor,
-               tip_tolerance: float) -> Plan:
-    """Return the plan of what is left, on the first mesh that leads to the goal."""
+    """
     plan = Plan(task=problem.task, status=PlanStatus.NOT_CONVERGED, strategy=REPLANNED,
                 message='', problem=problem, solution=None)
     try:
-        for solution, message in _solve(problem, running, at, monitor):
+        guess = departure.guess(problem, INTERVALS[0], until)
+        for solution, message in _solve(problem, guess, monitor):
             plan = replace(plan, message=message) if solution is None else _look_at(
                 plan, solution, monitor, tip_tolerance)
             if plan.status not in (PlanStatus.NOT_CONVERGED, PlanStatus.CERTIFICATE_FAILED):
@@ -189,11 +187,18 @@ def _plan_rest(problem: MotionProblem, running: Plan, at: float, monitor: Monito
     return replace(plan, iterations=monitor.iteration, planning_time=monitor.elapsed)
 
 
-def _solve(problem: MotionProblem, running: Plan, at: float, monitor: Monitor,
+def torque_step(departure: Departure, again: Plan) -> Array:
+    """Return by how much torques jump when a plan begins, NaN without one, shape (n,) [N m]."""
+    if again.solution is None:
+        return np.full(departure.torque.size, np.nan)
+    step: Array = again.sample(0.0).torques[0] - departure.torque
+    return step
+
+
+def _solve(problem: MotionProblem, guess: CollocationSolution, monitor: Monitor,
            ) -> Iterator[tuple[CollocationSolution | None, str]]:
     """Yield solutions on finer and finer meshes, None with a message where there is none."""
-    guess = _remainder(running, at, _INTERVALS[0], problem.task.duration)
-    for intervals in _INTERVALS:
+    for intervals in INTERVALS:
         monitor.check()
         mesh = np.linspace(0, problem.task.duration, intervals + 1, dtype=np.float64)
         guess = guess.on_mesh(mesh) if guess.intervals != intervals else guess
@@ -205,17 +210,6 @@ def _solve(problem: MotionProblem, running: Plan, at: float, monitor: Monitor,
             f'{outcome.message}: a nearer goal or more time until the arrival may do'))
         if outcome.converged:
             guess = outcome.solution
-
-
-def _remainder(running: Plan, at: float, intervals: int, duration: float) -> CollocationSolution:
-    """Return what is left of a plan, stretched to a duration, on an even mesh."""
-    assert running.solution is not None
-    known, rule = running.solution, GaussRule.of(_STAGES)
-    left = running.task.duration - at
-    mesh = np.linspace(0, left, intervals + 1, dtype=np.float64)
-    times = (mesh[:-1, None] + left / intervals * rule.nodes).ravel() + at
-    stages = known.rate(times).reshape(intervals, _STAGES, -1)
-    return CollocationSolution(mesh, known(mesh + at), stages, rule).stretched(duration / left)
 
 
 def _look_at(plan: Plan, solution: CollocationSolution, monitor: Monitor,
@@ -234,6 +228,7 @@ def _look_at(plan: Plan, solution: CollocationSolution, monitor: Monitor,
     plan = replace(plan, solution=solution, cost=totals.cost, effort=totals.effort,
                    energy=totals.energy, saturation=totals.saturation,
                    switching_times=switching_times(problem, solution),
+                   torque_rates=find_largest_rates(problem, solution),
                    certificate=Certificate(tip_error=tip_error, boundary_error=half,
                                            residual_vibration=vibration, via_error=0.0,
                                            limit_slack=known))
@@ -256,11 +251,3 @@ def _vibration(problem: MotionProblem, miss: Array) -> float:
     rest = problem.goal[:miss.size // 2]
     return residual_vibration(problem.model, np.concatenate([rest, np.zeros_like(rest)]) + miss,
                               rest, problem.parameters)
-
-
-def _torque_step(running: Plan, at: float, again: Plan) -> Array:
-    """Return by how much torques jump from one plan to the other, shape (n,) [N m]."""
-    if again.solution is None:
-        return np.full(running.arm.n_joints, np.nan)
-    step: Array = again.sample(0.0).torques[0] - running.sample(at).torques[0]
-    return step

@@ -122,6 +122,42 @@ def test_later_arrival_is_taken_where_it_may_be(plan: Plan) -> None:
     assert free.solved and free.plan.task.duration > 0.4 * 1.4
 
 
+def test_torques_with_a_price_on_their_rates_begin_with_the_one_that_acts(plan: Plan) -> None:
+    turn, goal = 0.01, plan.problem.goal[:2] + 0.1
+    weight = plan.task.effort_weights * turn**2
+    free, calm = (replan(plan, 0.3, goal=goal, torque_rate_weight=one, budget=10.0)
+                  for one in ([], weight))
+    assert free.solved and calm.solved
+    assert np.abs(free.torque_step).max() > 1.0 > 1e-9 > np.abs(calm.torque_step).max()
+    np.testing.assert_allclose(calm.plan.sample(0.0).torques, plan.sample(0.3).torques, atol=1e-9)
+    rates = np.diff(calm.plan.uniform_samples(7001).torques, axis=0) / 1e-4
+    np.testing.assert_allclose(np.abs(rates).max(axis=0), calm.plan.torque_rates, rtol=0.05)
+    # and so does the plan after it, from another torque that acts
+    acts = calm.plan.sample(0.2).torques[0] + [0.3, -0.2]
+    again = replan(calm.plan, 0.2, goal=goal - 0.05, torque=acts, budget=10.0)
+    assert again.solved
+    np.testing.assert_allclose(again.plan.sample(0.0).torques[0], acts, atol=1e-9)
+
+
+def test_motors_keep_their_limits_where_torques_have_no_jumps(plan: Plan) -> None:
+    goal, weight = plan.problem.goal[:2] + [0.5, -0.5], plan.task.effort_weights * 0.01**2
+    found = replan(plan, 0.5, goal=goal, torque_rate_weight=weight, keep_time=True, budget=10.0)
+    assert not found.solved and found.plan.status is PlanStatus.LIMIT_VIOLATED
+    assert 'torque of joint' in found.plan.message
+    later = replan(plan, 0.5, goal=goal, torque_rate_weight=weight, budget=10.0)
+    assert later.solved and later.delay == pytest.approx(later.plan.task.duration - 0.5)
+    samples = later.plan.uniform_samples(501)
+    assert (samples.torques <= samples.upper_bounds + 1e-6).all()
+    assert (samples.torques >= samples.lower_bounds - 1e-6).all()
+
+
+def test_another_duration_may_be_asked_for(plan: Plan) -> None:
+    found = replan(plan, 0.4, duration=0.9, keep_time=True, budget=10.0)
+    assert found.solved and (found.plan.task.duration, found.delay) == (0.9, 0.0)
+    with pytest.raises(InvalidValueError, match='duration is -1.0, but must be'):
+        replan(plan, 0.4, duration=-1.0)
+
+
 def test_limits_of_the_arm_are_looked_at_and_what_the_simulation_kept_is_not_claimed(
         plan: Plan) -> None:
     n, n_t = plan.arm.n_joints, plan.arm.n_coordinates
@@ -158,9 +194,9 @@ def test_plans_that_cannot_be_planned_again_are_refused(plan: Plan) -> None:
     unsolved = replace(plan, status=PlanStatus.NOT_CONVERGED)
     via = replace(plan, task=replace(plan.task, via_points=[
         ViaPoint(time=0.5, positions=plan.problem.goal[:2] / 2)]))
-    calm = replace(plan, task=replace(plan.task, torque_rate_weight=1e-3))
+    bounded = replace(plan, task=replace(plan.task, max_torque_rate=1e3))
     for wrong, reason in ((unsolved, 'is not solved'), (via, 'has via points'),
-                          (calm, 'has prices or limits of torque rates')):
+                          (bounded, 'has bounds of torque rates')):
         with pytest.raises(InvalidTaskError, match=f'the running plan {reason}'):
             replan(wrong, 0.3)
 
