@@ -20,7 +20,6 @@ from flex_planner.identification.joint_log import JointLog
 from flex_planner.identification.loop_model import DriveLaw, LoopModel, SimulatedLog
 from flex_planner.identification.loop_sizes import LAGS
 import numpy as np
-from numpy.typing import NDArray
 
 LEAST_TORQUE_RATE = 400.0
 """Of a log whose torques are to drive a model, where the rate of the drive is not known [Hz]."""
@@ -34,6 +33,8 @@ _GUIDE, _GUIDE_ANGLE = 60.0, 0.25
 # of the angles that the guide follows: what the arm does beyond it is lost, noise before it stays
 _CUTOFF = 120.0  # [Hz]
 _GAP = 3.5  # of samples, in periods
+_WHOLE = 1e-6  # of a period, that a sample may be early
+_GUESSES = 201  # of the time at which a motion began
 
 
 class Method(Enum):
@@ -65,14 +66,16 @@ class Experiment:
         Angles, speeds, efforts at each of its samples.
     start : numpy.ndarray, shape (n,)
         First angles as the encoders say them [rad].
-    before : numpy.ndarray of int, shape (m,)
-        Sample before each time that is compared.
-    share : numpy.ndarray, shape (m,)
-        How far the next one is reached then.
+    places : numpy.ndarray, shape (m,)
+        Times that are compared, in samples; between two of them the motion is linear.
     measured : numpy.ndarray, shape (m, n)
         Angles, or torques [rad], [N m].
     noise : numpy.ndarray, shape (n,)
         Standard deviation that is expected of the error.
+    late : float
+        By how much later than the log says the motion is taken to begin [s].
+    start_error : float
+        By how much it may have begun earlier or later than that [s].
 
     """
 
@@ -81,21 +84,31 @@ class Experiment:
     law: DriveLaw
     followed: Array
     start: Array
-    before: NDArray[np.int64]
-    share: Array
+    places: Array
     measured: Array
     noise: Array
+    late: float = 0.0
+    start_error: float = 0.0
 
-    def errors(self, simulated: SimulatedLog) -> tuple[Array, Array]:
-        """Return errors over the noise, (m, n), and their derivatives, (m, n, columns)."""
+    def errors(self, simulated: SimulatedLog, late: float = 0.0) -> tuple[Array, Array]:
+        """
+        Return errors over the noise, (m, n), and their derivatives, (m, n, columns + 1).
+
+        The last derivative is by the time `late` by which the motion began later [s].
+
+        """
         if self.method is Method.INPUT_ERROR:
             values, slopes = simulated.guide, simulated.guide_slopes
         else:
             values, slopes = simulated.angles, simulated.angle_slopes
-        k, share = self.before, self.share[:, None]
+        places = np.clip(self.places - late / self.law.period, 0.0, len(values) - 1.0)
+        k = np.floor(places + _WHOLE).astype(np.int64)
+        share = np.maximum(places - k, 0.0)[:, None]
         after = np.minimum(k + 1, len(values) - 1)
         found = (1 - share) * values[k] + share * values[after]
-        slope = (1 - share[..., None]) * slopes[k] + share[..., None] * slopes[after]
+        slope = np.concatenate([
+            (1 - share[..., None]) * slopes[k] + share[..., None] * slopes[after],
+            ((values[k] - values[after]) / self.law.period)[..., None]], axis=2)
         error = found if self.method is Method.INPUT_ERROR else found - self.measured
         return error / self.noise, slope / self.noise[:, None]
 
@@ -129,27 +142,36 @@ def closed_loop(log: JointLog, drive: Drive, holding: Array) -> Experiment:
     if log.reference is None:
         raise LogError(f'{log.name} says not what the drive followed: record the trajectory, too, '
                        'or fit without the drive, by the torques')
-    period, begin = 1 / drive.rate, log.reference_start
+    period, late, error = 1 / drive.rate, _lateness(log), log.reference_start_error
+    begin = log.reference_start + late
     used = log.times >= begin
     if used.sum() < _FIRST_SAMPLES:
         raise LogError(f'{log.name} ends before its trajectory begins')
     times, angles = log.times[used] - begin, log.angles[used]
-    count = int(np.ceil(times[-1] / period)) + 2 + _LEAD
+    count = int(np.ceil((times[-1] + error) / period)) + 2 + _LEAD
     at = (np.arange(count) - _LEAD) * period
     moving = at >= -period / 1e6
     clipped = np.maximum(at, 0.0)
     positions, speeds = log.reference.motion(clipped)
     first, last = drive.hold.efforts(log.reference, clipped, period)
     efforts = np.where(moving[:, None], (first + last) / 2, holding)
-    place = times / period + _LEAD
-    before = np.floor(place + 1e-6).astype(np.int64)
     rest = log.times < begin
     start = (log.angles[rest] if rest.sum() >= _FIRST_SAMPLES else angles[:1]).mean(axis=0)
     return Experiment(
         name=log.name, method=Method.CLOSED_LOOP, law=drive.law(),
         followed=np.hstack([positions, np.where(moving[:, None], speeds, 0.0), efforts]),
-        start=start, before=before, share=np.maximum(place - before, 0.0), measured=angles,
-        noise=log.angle_noise(drive.resolution))
+        start=start, places=times / period + _LEAD, measured=angles,
+        noise=log.angle_noise(drive.resolution), late=late, start_error=error)
+
+
+def _lateness(log: JointLog) -> float:
+    """Return by how much later the motion began if the drive followed its angles exactly [s]."""
+    if not log.reference_start_error or log.reference is None:
+        return 0.0
+    guesses = np.linspace(-1, 1, _GUESSES) * log.reference_start_error
+    left = [np.sum((log.reference.motion(np.maximum(
+        log.times - log.reference_start - guess, 0.0))[0] - log.angles)**2) for guess in guesses]
+    return float(guesses[np.argmin(left)])
 
 
 def by_torques(log: JointLog, method: Method, model: LoopModel, values: Array,
@@ -203,8 +225,8 @@ def by_torques(log: JointLog, method: Method, model: LoopModel, values: Array,
         noise = np.maximum(0.1 * measured.std(axis=0), 1e-9)
     return Experiment(
         name=log.name, method=method, law=law, followed=followed,
-        start=angles[:_FIRST_SAMPLES].mean(axis=0), before=_LEAD + np.arange(count),
-        share=np.zeros(count), measured=measured, noise=noise)
+        start=angles[:_FIRST_SAMPLES].mean(axis=0), places=_LEAD + np.arange(count, dtype=float),
+        measured=measured, noise=noise)
 
 
 def _check_torques(log: JointLog, drive: Drive | None) -> None:

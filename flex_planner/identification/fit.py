@@ -43,6 +43,8 @@ class Fit:
         Of their intervals of 95 %, scaled by `rms`, or by blocks of errors if that is more.
     starts : numpy.ndarray, shape (logs, n)
         Joint angles at the start of each log [rad].
+    late : numpy.ndarray, shape (logs,)
+        By how much the motion of each log began later than it says, 0 where that is known [s].
     rms : float
         Of the errors over the noise that encoders have; about 1 where the model is the plant.
         Without meaning (1) for input errors, whose noise is not known.
@@ -61,6 +63,7 @@ class Fit:
     free: tuple[int, ...]
     half_widths: Array
     starts: Array
+    late: Array
     rms: float
     cost: float
     fit_percent: Array
@@ -69,7 +72,7 @@ class Fit:
 
 
 class _Problem:
-    """The errors of all logs as a function of the free parameters and the start angles."""
+    """The errors of all logs by free parameters, start angles, and starts that are not known."""
 
     def __init__(self, model: LoopModel, experiments: Sequence[Experiment], values: Array,
                  free: Sequence[int], monitor: Monitor) -> None:
@@ -81,16 +84,19 @@ class _Problem:
         fastest = max(model.fastest(start, values) for start in starts)
         # as many for all evaluations, so that the errors stay smooth
         self.parts = [steps_per_part(one.law.period, 1.3 * fastest) for one in experiments]
-        self.first = np.concatenate([values[self.free], *starts])
+        self.timed = [i for i, one in enumerate(experiments) if one.start_error]
+        self.first = np.concatenate([values[self.free], *starts, np.zeros(len(self.timed))])
 
     def _offsets(self, values: Array) -> Array:
         return values[self.model.sizes.physical:-1]
 
-    def split(self, unknowns: Array) -> tuple[Array, Array]:
-        """Return all parameters, and the start angles of each log."""
-        values = self.values.copy()
+    def split(self, unknowns: Array) -> tuple[Array, Array, Array]:
+        """Return all parameters, the start angles of each log, and how late each one began."""
+        values, late, logs = self.values.copy(), np.zeros(len(self.experiments)), len(self.timed)
         values[self.free] = unknowns[:len(self.free)]
-        return values, unknowns[len(self.free):].reshape(len(self.experiments), -1)
+        late[self.timed] = unknowns[unknowns.size - logs:]
+        starts = unknowns[len(self.free):unknowns.size - logs]
+        return values, starts.reshape(len(self.experiments), -1), late
 
     def evaluate(self, unknowns: Array) -> tuple[Array, Array]:
         """Return errors and their Jacobian; the last ones are kept."""
@@ -101,26 +107,29 @@ class _Problem:
 
     def _evaluate(self, unknowns: Array) -> tuple[Array, Array]:
         self.evaluations += 1
-        values, starts = self.split(unknowns)
+        values, starts, late = self.split(unknowns)
         n, k, known = self.model.sizes.joints, len(self.free), len(values)
-        parts = [self.errors(i, values, start) for i, start in enumerate(starts)]
+        parts = [self.errors(i, values, start, float(late[i])) for i, start in enumerate(starts)]
         blocks = []
         for i, (error, slope) in enumerate(parts):
             block = np.zeros((*error.shape, unknowns.size))
             block[..., :k] = slope[..., self.free]
-            block[..., k + n * i:k + n * (i + 1)] = slope[..., known:]
+            block[..., k + n * i:k + n * (i + 1)] = slope[..., known:-1]
+            if i in self.timed:
+                block[..., k + n * len(parts) + self.timed.index(i)] = slope[..., -1]
             blocks.append(block.reshape(-1, unknowns.size))
         errors = np.concatenate([error.ravel() for error, _ in parts])
         finite = np.nan_to_num(errors, nan=_RUN_AWAY, posinf=_RUN_AWAY, neginf=-_RUN_AWAY)
         return (np.clip(finite, -_RUN_AWAY, _RUN_AWAY),
                 np.nan_to_num(np.vstack(blocks), posinf=0.0, neginf=0.0))
 
-    def errors(self, index: int, values: Array, start: Array) -> tuple[Array, Array]:
+    def errors(self, index: int, values: Array, start: Array,
+               late: float) -> tuple[Array, Array]:
         """Return the errors of a log and their derivatives."""
         self.monitor.check()
         one = self.experiments[index]
         return one.errors(self.model.simulate(start, one.followed, one.law, values,
-                                              self.parts[index]))
+                                              self.parts[index]), late)
 
     def bounds(self) -> tuple[Array, Array]:
         """Return the least and the largest values."""
@@ -134,6 +143,9 @@ class _Problem:
                 upper[place] = LAGS * period
             if parameters[index].kind is Quantity.DAMPING:
                 upper[place] = 0.99
+        for place, index in enumerate(self.timed, self.first.size - len(self.timed)):
+            upper[place] = self.experiments[index].start_error
+            lower[place] = -upper[place]
         return lower, upper
 
 
@@ -203,7 +215,7 @@ def _plain_widths(jacobian: Array) -> Array:
 def _summarize(problem: _Problem, unknowns: Array, converged: bool) -> Fit:
     """Return the fit at some unknowns."""
     errors, jacobian = problem.evaluate(unknowns)
-    values, starts = problem.split(unknowns)
+    values, starts, late = problem.split(unknowns)
     count = len(problem.free)
     freedom = max(errors.size - unknowns.size, 1)
     variance = float(errors @ errors) / freedom
@@ -219,6 +231,7 @@ def _summarize(problem: _Problem, unknowns: Array, converged: bool) -> Fit:
     parts = [part.reshape(one.measured.shape) for part, one in zip(
         np.split(errors, sizes), problem.experiments, strict=True)]
     return Fit(values=values, free=tuple(problem.free), half_widths=widths[:count], starts=starts,
+               late=late + [one.late for one in problem.experiments],
                cost=float(errors @ errors),
                rms=1.0 if _is_input(problem) else float(np.sqrt(variance)),
                fit_percent=np.array([one.fit_percent(part) for one, part in zip(

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.text import LONGEST_NAME, printable
-from flex_planner.base.validation import Array
+from flex_planner.base.validation import Array, number
 from flex_planner.control.joint_reference import JointReference
 import numpy as np
 
@@ -39,6 +39,8 @@ class JointLog:
         That the drive followed; its time 0 is at `reference_start`.
     reference_start : float
         On the clock of `times` [s].
+    reference_start_error : float
+        By how much it may be off, 0 if it is exact, to 1; a fit in closed loop finds it [s].
 
     Raises
     ------
@@ -53,6 +55,7 @@ class JointLog:
     torques: Array = field(default_factory=lambda: np.zeros((0, 0)))
     reference: JointReference | None = None
     reference_start: float = 0.0
+    reference_start_error: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, 'name', printable(self.name, LONGEST_NAME))
@@ -69,6 +72,8 @@ class JointLog:
         if self.angles.shape[0] != count or len(self.torques) not in (0, count):
             raise InvalidValueError(f'angles and torques of {self.name}',
                                     (len(self.angles), len(self.torques)), f'{count} rows each')
+        number(f'reference_start_error of {self.name}', self.reference_start_error, at_least=0,
+               at_most=1, unit='s')
         if not (np.diff(self.times) > 0).all():
             raise InvalidValueError(f'times of {self.name}', 'a time that comes twice or too late',
                                     'strictly increasing')

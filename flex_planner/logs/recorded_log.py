@@ -15,6 +15,7 @@ import numpy as np
 
 STATES, TRAJECTORIES = 'sensor_msgs/msg/JointState', 'trajectory_msgs/msg/JointTrajectory'
 _LEAD = 0.05  # [s] before a trajectory, in which the arm is at rest
+_RECEIPT = 0.1  # [s], from a recorder's receipt of a trajectory to a controller's
 
 
 def read_recorded_logs(path: Path, joints: int, *, topic: str = '',
@@ -23,8 +24,8 @@ def read_recorded_logs(path: Path, joints: int, *, topic: str = '',
     Return the motions of a recording: one for each trajectory, or all of it without any.
 
     Efforts of joint states are taken for those of the period that ends with the sample, as
-    ros2_control reads them and the simulator publishes them. A trajectory begins at its stamp, or
-    when it was received if it has none.
+    ros2_control reads them and the simulator publishes them. A trajectory begins at its stamp; if
+    it has none, somewhere about the time when it was received, which a fit in closed loop finds.
 
     Parameters
     ----------
@@ -83,6 +84,11 @@ def _stamp(header: Any, received_ns: int) -> float:
     return float(stamp or received_ns * 1e-9)
 
 
+def _is_stamped(message: Any) -> bool:
+    """Return whether a message says its time."""
+    return bool(message.header.stamp.sec or message.header.stamp.nanosec)
+
+
 def _split(name: str, samples: Sequence[tuple[float, Any]],
            followed: Sequence[tuple[float, Any]], order: Sequence[str]) -> list[JointLog]:
     """Return a log for each trajectory, up to the next one."""
@@ -102,13 +108,15 @@ def _split(name: str, samples: Sequence[tuple[float, Any]],
     ends = [*begins[1:], np.inf]
     logs = []
     for i, (begin, end) in enumerate(zip(begins, ends, strict=True)):
-        used = (times >= begin - _LEAD) & (times < end)
+        unknown = 0.0 if _is_stamped(followed[i][1]) else _RECEIPT
+        used = (times >= begin - _LEAD - unknown) & (times < end)
         if used.sum() >= FEWEST_SAMPLES:
             logs.append(JointLog(
                 name=f'{name}, trajectory {i + 1}', times=times[used], angles=angles[used],
                 torques=torques[used] if has_torques else torques,
                 reference=_reference(followed[i][1], order, angles[used][0]),
-                reference_start=begin))
+                reference_start=begin,
+                reference_start_error=unknown))
     if not logs:
         raise LogError(f'{name} has no trajectory with {FEWEST_SAMPLES} joint states')
     return logs

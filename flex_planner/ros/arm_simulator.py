@@ -33,6 +33,7 @@ from flex_planner_interfaces.msg import FeedbackGains
 from geometry_msgs.msg import PointStamped
 import numpy as np
 from rclpy.clock import Clock, ClockType
+from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
@@ -131,7 +132,7 @@ class ArmSimulator(Node):  # type: ignore[misc]
             self.get_logger().error(printable(f'trajectory refused: {refusal}'))
             return
         reference = _reference(trajectory, self._settings.joint_names)
-        self._plant.follow(reference.after(*self._plant.joint_state, self._plant.torque))
+        self._plant.follow(reference.after(*self._plant.shown_state, self._plant.torque))
         self._watch.expect(self._plant.time + reference.times[-1])
         self.get_logger().info(f'following a trajectory of {len(trajectory.points)} points')
 
@@ -142,7 +143,7 @@ class ArmSimulator(Node):  # type: ignore[misc]
         if broken:
             return '; '.join(broken[:3])
         start = _reference(trajectory, self._settings.joint_names).positions[0]
-        distance = float(np.abs(start - self._plant.state[:start.size]).max())
+        distance = float(np.abs(start - self._plant.shown_state[0]).max())
         if distance > self._settings.start_tolerance:
             return (f'it starts {distance:.3f} rad away from the arm, more than start_tolerance '
                     f'= {self._settings.start_tolerance:g} rad')
@@ -153,7 +154,7 @@ class ArmSimulator(Node):  # type: ignore[misc]
         self._advance()
         n, n_t = self._arm.n_joints, self._arm.n_coordinates
         state, sensor = self._plant.state, self._plant.sensor
-        stamp = self.get_clock().now().to_msg()
+        stamp = self._stamp()
         self._joints.publish(_state_message(
             stamp, self._settings.joint_names, sensor.positions, sensor.speeds,
             self._plant.torque))
@@ -168,7 +169,7 @@ class ArmSimulator(Node):  # type: ignore[misc]
     def _on_picture(self) -> None:
         """Show the arm as it is."""
         self._picture.show(self._plant.state[:self._arm.n_coordinates],
-                           self.get_clock().now().to_msg())
+                           self._stamp())
 
     def _on_silence(self) -> None:
         """Say what the arm waits for, should it be a clock that has not come."""
@@ -176,6 +177,13 @@ class ArmSimulator(Node):  # type: ignore[misc]
         if clock.ros_time_is_active and not clock.now().nanoseconds:
             self.get_logger().warning('the arm stands still: use_sim_time is set, but nothing has '
                                       'come on /clock')
+
+    def _stamp(self) -> Time:
+        """Return when the arm was as it is: up to a period ago, or more if the machine is slow."""
+        now = self.get_clock().now()
+        late = self._elapsed_at(now.nanoseconds) - self._plant.time
+        late = min(max(late, 0.0), _TOO_LATE)
+        return (now - Duration(seconds=min(late, now.nanoseconds * 1e-9))).to_msg()
 
     def _advance(self) -> None:
         """Bring the arm up to now, or as far as it may go at once."""
@@ -196,7 +204,11 @@ class ArmSimulator(Node):  # type: ignore[misc]
 
     def _now(self) -> float:
         """Return the time since the start, or since the arm began again [s]."""
-        jump = self._passed.look(self.get_clock().now().nanoseconds)
+        return self._elapsed_at(self.get_clock().now().nanoseconds)
+
+    def _elapsed_at(self, now_ns: int) -> float:
+        """Return that time at a time of the clock [ns]."""
+        jump = self._passed.look(now_ns)
         if jump:
             self.get_logger().warning(f'the clock has jumped by {jump:.3f} s: the arm goes on '
                                       'from where it is')

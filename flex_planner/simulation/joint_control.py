@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from flex_planner.base.validation import Array, integer, number
+from flex_planner.base.validation import Array, integer, number, vector
 from flex_planner.control.joint_controller import MAX_RATE
 import numpy as np
 
@@ -23,6 +23,11 @@ class Encoder:
         Angles are rounded to multiples of it, 0 (exact) to 1 [rad].
     differentiates : bool
         Whether speeds come from differences of the samples.
+    speed_filter : float
+        Corner frequency of the low pass of first order for such differences, 0 (none) to 100000
+        [Hz].
+    offsets : tuple of float
+        What the encoder of each joint says too much, within +-1 [rad]; empty for none.
 
     Raises
     ------
@@ -34,10 +39,20 @@ class Encoder:
     rate: float = 0.0
     resolution: float = 0.0
     differentiates: bool = False
+    speed_filter: float = 0.0
+    offsets: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         number('encoder_rate', self.rate, at_least=0, at_most=MAX_RATE, unit='Hz')
         number('encoder_resolution', self.resolution, at_least=0, at_most=1, unit='rad')
+        number('encoder_speed_filter', self.speed_filter, at_least=0, at_most=MAX_RATE, unit='Hz')
+        vector('encoder_offsets', self.offsets, len(self.offsets), at_least=-1, at_most=1,
+               unit='rad')
+
+    def shifted(self, positions: Array) -> Array:
+        """Return what exact encoders say where joints are somewhere, shape (n,) [rad]."""
+        shifted: Array = positions + (np.array(self.offsets) if self.offsets else 0.0)
+        return shifted
 
 
 class JointSensor:
@@ -49,7 +64,7 @@ class JointSensor:
     encoder : Encoder
         How.
     positions : numpy.ndarray, shape (n,)
-        At rest, at time 0 [rad].
+        Of the joints at rest, at time 0 [rad].
 
     Attributes
     ----------
@@ -71,14 +86,22 @@ class JointSensor:
         before, since = self.positions, time - self._sampled
         self.positions = self._round(positions)
         differences: Array = (self.positions - before) / since
-        self.speeds = differences if self._encoder.differentiates else speeds.copy()
+        self.speeds = (self._filter(differences, since) if self._encoder.differentiates
+                       else speeds.copy())
         self._count, self._sampled = count, time
 
+    def _filter(self, differences: Array, since: float) -> Array:
+        """Return speeds from differences over a time [s]."""
+        corner = self._encoder.speed_filter
+        keeps = np.exp(-2 * np.pi * corner * since) if corner else 0.0
+        filtered: Array = keeps * self.speeds + (1 - keeps) * differences
+        return filtered
+
     def _round(self, positions: Array) -> Array:
-        resolution = self._encoder.resolution
+        shifted, resolution = self._encoder.shifted(positions), self._encoder.resolution
         if not resolution:
-            return positions.copy()
-        rounded: Array = np.round(positions / resolution) * resolution
+            return shifted.copy()
+        rounded: Array = np.round(shifted / resolution) * resolution
         return rounded
 
 

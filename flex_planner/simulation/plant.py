@@ -8,6 +8,7 @@ meanwhile. Knows no ROS and no clock: the caller says how far to go.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -26,6 +27,8 @@ from flex_planner.simulation.joint_control import Disturbance, Encoder, JointSen
 import numpy as np
 
 RTOL, ATOL = 1e-8, 1e-10
+MAX_DELAY = 0.1
+_WHOLE = 1e-6  # of a period, that a delay may be off
 _LONGEST_STEP = 1e-3
 
 
@@ -52,13 +55,15 @@ class Control:
         Whether the motors have the limits of eq. (15).
     encoder : Encoder
         What the PD sees.
+    delay : float
+        From an update of the controller to its torque, 0 to 0.1 [s].
     disturbance : Disturbance
         Acts beside the motors.
 
     Raises
     ------
     InvalidValueError
-        If the rate breaks its bound.
+        If a value breaks its bound.
 
     """
 
@@ -68,15 +73,18 @@ class Control:
     feedforward: bool = True
     limit_torques: bool = True
     encoder: Encoder = Encoder()
+    delay: float = 0.0
     disturbance: Disturbance = Disturbance()
 
     def __post_init__(self) -> None:
         number('rate', self.rate, at_least=MIN_RATE, at_most=MAX_RATE, unit='Hz')
+        number('torque_delay', self.delay, at_least=0, at_most=MAX_DELAY, unit='s')
 
     def check(self, joints: int) -> None:
         """Raise InvalidValueError unless it fits an arm of so many joints."""
         for name in ('stiffness', 'damping'):
             vector(name, getattr(self.gains, name), joints)
+        vector('encoder_offsets', self.encoder.offsets, (0, joints))
         integer('disturbance_joint', self.disturbance.joint, at_least=0, at_most=joints)
 
 
@@ -93,7 +101,7 @@ class Plant:
     payload_mass, payload_inertia : float
         At the tip, >= 0 [kg], [kg m^2].
     positions : array_like, shape (n,)
-        Joint angles at rest to start from [rad].
+        Joint angles at rest to start from, as the encoders say them but for rounding [rad].
 
     Attributes
     ----------
@@ -102,7 +110,7 @@ class Plant:
     state : numpy.ndarray, shape (2 n_t,)
         x = (q, q').
     torque : numpy.ndarray, shape (n,)
-        Of the motors, applied last [N m].
+        Of the motors, as the controller had it last [N m]; it acts a delay later.
     sensor : JointSensor
         What the encoders say.
 
@@ -118,17 +126,21 @@ class Plant:
                          unit='kg m^2')
         parameters = PhysicalParameters.of_arm(model.arm, payload_mass=mass,
                                                payload_inertia=inertia)
-        rest, self.torque = equilibrium(model, vector('positions', positions, n, unit='rad'),
+        shown = vector('positions', positions, n, unit='rad')
+        rest, self.torque = equilibrium(model, shown - control.encoder.shifted(np.zeros(n)),
                                         parameters)
         self.state = np.concatenate([rest, np.zeros_like(rest)])
         self.sensor = JointSensor(control.encoder, rest[:n])
         self.parameters = parameters
         self._limits = TorqueLimits.of(model.arm)
-        self._integrator = HeldTorqueIntegrator(
-            model, parameters.physical, period=self.period, longest_step=_LONGEST_STEP,
-            rtol=RTOL, atol=ATOL)
+        self._parts = _period_parts(control.delay, self.period)
+        self._integrators = [HeldTorqueIntegrator(
+            model, parameters.physical, period=length, longest_step=_LONGEST_STEP,
+            rtol=RTOL, atol=ATOL) for _, length in self._parts]
+        # the torques on their way, the latest one first
+        self._commands = deque([self.torque], maxlen=self._parts[0][0] + 1)
         self._ticks = self._began = 0
-        self._reference = JointReference.hold(rest[:n], self.torque)
+        self._reference = JointReference.hold(shown, self.torque)
         self._moves = False
         self._law: LinearFeedback | None = None
         self._law_state: Array = np.zeros(0)
@@ -148,6 +160,12 @@ class Plant:
         """Return the true joint angles and speeds."""
         n, n_t = self.model.arm.n_joints, self.model.arm.n_coordinates
         return self.state[:n], self.state[n_t:n_t + n]
+
+    @property
+    def shown_state(self) -> tuple[Array, Array]:
+        """Return joint angles as exact encoders say them, and the speeds."""
+        angles, speeds = self.joint_state
+        return self.control.encoder.shifted(angles), speeds
 
     def use_law(self, law: LinearFeedback | None) -> None:
         """
@@ -192,15 +210,18 @@ class Plant:
         """Compute a torque, hold it for one period."""
         begin = self.elapsed
         self.torque = self._command(begin)
-        total = self.torque
+        self._commands.appendleft(self.torque)
+        outside: Array | float = 0.0
         if self._moves:
-            total = total + self.control.disturbance.mean(begin, begin + self.period, total.size)
-        state = self._integrator.advance(self.state, total)
-        if state is None or self._is_beyond(state):
-            raise RunawayError(f'the simulated arm has run away after {self.time:.3f} s: the '
-                               'gains are too high for the rate of the controller, or the '
-                               'torques too large')
-        self.state = state
+            outside = self.control.disturbance.mean(begin, begin + self.period, self.torque.size)
+        for (lag, _), integrator in zip(self._parts, self._integrators, strict=True):
+            acting = self._commands[min(lag, len(self._commands) - 1)]
+            state = integrator.advance(self.state, acting + outside)
+            if state is None or self._is_beyond(state):
+                raise RunawayError(f'the simulated arm has run away after {self.time:.3f} s: the '
+                                   'gains are too high for the rate of the controller, or the '
+                                   'torques too large')
+            self.state = state
         self._ticks += 1
         self.sensor.look(self.time, *self.joint_state)
 
@@ -237,3 +258,11 @@ class Plant:
             lower, upper = self._limits.bounds(self.joint_state[1])
             torque = np.minimum(np.maximum(torque, lower), upper)
         return torque
+
+
+def _period_parts(delay: float, period: float) -> list[tuple[int, float]]:
+    """Return by how many periods the torque of each part of a period is late, and its length."""
+    lag, share = divmod(delay / period, 1)
+    if min(share, 1 - share) < _WHOLE:
+        return [(round(delay / period), period)]
+    return [(int(lag) + 1, share * period), (int(lag), (1 - share) * period)]

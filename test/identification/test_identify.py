@@ -82,6 +82,15 @@ def test_parameters_are_those_of_the_arm(method: Method, resolution: float, ever
     assert found.left_out.min() > 99.9 and not found.warnings
 
 
+@pytest.mark.parametrize('late', [-0.0312, 0.0173])
+def test_start_of_a_motion_that_is_not_known_is_found(late: float) -> None:
+    logs = [replace(log, reference_start=-late, reference_start_error=0.05)
+            for log in record(every=10)]
+    found = identify(one_link(), logs, payload_mass=0.1, drive=DRIVE, more_modes=0)
+    assert found.best.late == pytest.approx([late, late], abs=5e-5)
+    assert errors(found).max() < 1e-2
+
+
 def test_rounded_angles_lead_into_the_intervals() -> None:
     found = identify(one_link(), record(resolution=LSB), payload_mass=0.1,
                      drive=replace(DRIVE, resolution=LSB), more_modes=0)

@@ -7,7 +7,12 @@ from typing import Any
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import tip_position
-from flex_planner.base.errors import InvalidSizeError, InvalidValueError, NotFiniteError
+from flex_planner.base.errors import (
+    FlexPlannerError,
+    InvalidSizeError,
+    InvalidValueError,
+    NotFiniteError,
+)
 from flex_planner.base.validation import Array
 from flex_planner.control.feedback_motion import Course, FeedbackArm
 from flex_planner.control.joint_controller import EffortHold, Gains
@@ -15,6 +20,7 @@ from flex_planner.control.joint_reference import JointReference
 from flex_planner.control.linear_feedback import pd_feedback
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.integration import simulate
+from flex_planner.identification.drive import Drive
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.torque_limits import TorqueLimits
 from flex_planner.planning.plan import Plan
@@ -24,6 +30,7 @@ from flex_planner.simulation.joint_control import Disturbance, Encoder
 from flex_planner.simulation.plant import Control, Plant, RunawayError
 import numpy as np
 import pytest
+from recorded_motions import record_motion
 
 GAINS = Gains.of(2, 100.0, 10.0)
 FREE = Gains.of(2, 0.0, 0.0)
@@ -272,7 +279,7 @@ def test_torque_of_a_trajectory_is_held_as_the_controller_does(
 def test_every_period_of_a_plan_takes_a_single_step(
         plan: Plan, reference: JointReference, monkeypatch: pytest.MonkeyPatch) -> None:
     plant = plant_at_start(plan, encoder=Encoder(resolution=1e-4, differentiates=True))
-    integrator, lengths = plant._integrator, []
+    (integrator,), lengths = plant._integrators, []
     step = integrator._step
 
     def counted(state: Array, torque: Array, length: float) -> tuple[Array, Array, Array]:
@@ -350,3 +357,30 @@ def test_law_for_another_rate_is_refused(plan: Plan) -> None:
         plant.use_law(pd_feedback(GAINS, 500.0))
     with pytest.raises(InvalidValueError, match='joints of the law is 3, but must be'):
         plant.use_law(pd_feedback(Gains.of(3, 1.0, 1.0), 1000.0))
+
+
+@pytest.mark.parametrize('delay', [0.0, 0.4e-3, 2e-3, 2.7e-3])
+def test_arm_under_a_late_drive_moves_as_another_integrator_has_it(
+        ei50_arm: Arm, reference: JointReference, delay: float) -> None:
+    drive = Drive(gains=Gains.of(2, 40.0, 4.0), speed_filter=50.0)
+    offset = np.array([0.01, -0.02])
+    log = record_motion(ei50_arm, 1.2, drive, reference, 0.4, offset=offset, delay=delay,
+                        resolution=0.0, lead=0.0)
+    encoder = Encoder(differentiates=True, speed_filter=50.0, offsets=tuple(offset))
+    plant = Plant(ArmDynamics.of(ei50_arm), Control(
+        gains=drive.gains, limit_torques=False, encoder=encoder, delay=delay),
+        payload_mass=1.2, positions=reference.positions[0])
+    plant.follow(reference)
+    seen = [plant.sensor.positions]
+    plant.advance(0.399, lambda plant: seen.append(plant.sensor.positions))
+    assert np.ptp(log.angles, axis=0).min() > 0.03
+    np.testing.assert_allclose(seen, log.angles, atol=1e-7)
+
+
+@pytest.mark.parametrize(('changes', 'message'), [
+    ({'delay': -1e-3}, 'torque_delay is -0.001, but must be'),
+    ({'encoder': Encoder(offsets=(0.1,))}, 'encoder_offsets')])
+def test_delay_and_offsets_that_cannot_be_are_named(ei50_plant: ArmDynamics, message: str,
+                                                    changes: dict[str, Any]) -> None:
+    with pytest.raises(FlexPlannerError, match=message):
+        Plant(ei50_plant, Control(gains=GAINS, **changes), payload_mass=1.0, positions=POSTURE)

@@ -15,7 +15,7 @@ from flex_planner.ros.settings.fields import parameter_field
 from flex_planner.ros.settings.planner import MAX_GAIN
 from flex_planner.simulation.joint_control import Disturbance, Encoder
 from flex_planner.simulation.mismatch import AS_GIVEN, Mismatch
-from flex_planner.simulation.plant import Control
+from flex_planner.simulation.plant import Control, MAX_DELAY
 import numpy as np
 
 _FAR = 1e6
@@ -36,7 +36,7 @@ class SimulatorSettings:
     joint_names: list[str] = parameter_field(
         ['joint1'], 'Names of the joints, from the base outwards.', read_only=True)
     initial_positions: list[float] = parameter_field(
-        [0.0], 'Joint angles at the start [rad].', read_only=True)
+        [0.0], 'Joint angles at the start, as the encoders say them [rad].', read_only=True)
     payload_mass: float = parameter_field(
         1.0, 'Mass at the tip of the simulated arm, whatever was planned for [kg].', lowest=0.0,
         highest=_FAR, read_only=True)
@@ -80,6 +80,14 @@ class SimulatorSettings:
     encoder_differences: bool = parameter_field(
         False, 'Whether joint speeds are differences of measured angles; if not, exact.',
         read_only=True)
+    encoder_speed_filter: float = parameter_field(
+        0.0, 'Corner frequency of the low pass for such differences [Hz]; 0: none.', lowest=0.0,
+        highest=MAX_RATE, read_only=True)
+    encoder_offsets: list[float] = parameter_field(
+        [0.0], 'What the encoder of each joint says too much [rad].', read_only=True)
+    torque_delay: float = parameter_field(
+        0.0, 'Time from an update of the controller to its torque [s].', lowest=0.0,
+        highest=MAX_DELAY, read_only=True)
     disturbance_joint: int = parameter_field(
         0, 'Joint that a pulse of torque from outside acts on, from 1 at the base; 0: none.',
         lowest=0, highest=8, read_only=True)
@@ -125,7 +133,8 @@ class SimulatorSettings:
                        base_frame=name_frames(arm)[0],
                        initial_positions=[_within_limits(joint) for joint in arm.joints],
                        stiffness=gains.stiffness.tolist(),
-                       damping=gains.damping.tolist(), added_friction=[0.0] * n)
+                       damping=gains.damping.tolist(), added_friction=[0.0] * n,
+                       encoder_offsets=[0.0] * n)
 
     @property
     def mismatch(self) -> Mismatch:
@@ -142,7 +151,10 @@ class SimulatorSettings:
             feedforward=self.feedforward,
             limit_torques=self.limit_torques,
             encoder=Encoder(rate=self.encoder_rate, resolution=self.encoder_resolution,
-                            differentiates=self.encoder_differences),
+                            differentiates=self.encoder_differences,
+                            speed_filter=self.encoder_speed_filter,
+                            offsets=tuple(self.encoder_offsets)),
+            delay=self.torque_delay,
             disturbance=Disturbance(
                 joint=self.disturbance_joint, torque=self.disturbance_torque,
                 start=self.disturbance_start, duration=self.disturbance_duration))
