@@ -125,8 +125,9 @@ def test_casadi_is_imported_only_to_derive_and_to_compile() -> None:
     users = {name.removeprefix('flex_planner.') for name in PATHS if 'casadi' in imports(name)}
     assert users == {
         'dynamics.body_power', 'dynamics.build_chain', 'dynamics.chain',
-        'dynamics.dynamics_functions', 'dynamics.function_source', 'dynamics.joint_power',
-        'dynamics.moving_frame', 'dynamics.torque_bounds', 'identification.loop_functions',
+        'dynamics.controller_steps', 'dynamics.dynamics_functions', 'dynamics.function_source',
+        'dynamics.joint_power', 'dynamics.moving_frame', 'dynamics.torque_bounds',
+        'identification.loop_functions',
         'optimal_control.direct.programme', 'optimal_control.free_rates',
         'optimal_control.barrier_conditions', 'optimal_control.offset_conditions',
         'optimal_control.path_constraints.obstacles',

@@ -14,6 +14,7 @@ import threading
 from typing import Any, TypeVar
 
 from flex_planner.arms.arm import Arm
+from flex_planner.base.compiled_library import content_key
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.cache_key import cache_key, describe_fields
 from flex_planner.dynamics.compiled_functions import BatchFunction, load_functions
@@ -170,7 +171,7 @@ class ArmDynamics:
         """
         first = np.zeros((len(reference), state.size + self.arm.n_joints))
         first[0, :state.size] = state
-        after, fifth, third = self._load('controlled_step').evaluate_chain(
+        after, fifth, third = self._load_step('controlled_step').evaluate_chain(
             first, reference, timing, controller, physical)
         return after[:, :state.size], after[:, state.size:], fifth, third
 
@@ -208,7 +209,7 @@ class ArmDynamics:
         """
         first = np.zeros((len(reference), state.size))
         first[0] = state
-        after, fifth, third = self._load('feedback_step').evaluate_chain(
+        after, fifth, third = self._load_step('feedback_step').evaluate_chain(
             first, reference, timing, law, motors, physical)
         return after, fifth, third
 
@@ -264,8 +265,23 @@ class ArmDynamics:
             self._loaded |= load_functions(cache_key(self.arm, 'dynamics'), self._build)
         return self._loaded[name]
 
+    def _load_step(self, name: str) -> BatchFunction:
+        """Return a step under a controller; it is derived when first wanted."""
+        if name not in self._loaded:
+            key = content_key(cache_key(self.arm, 'dynamics'), name)
+            self._loaded |= load_functions(key, lambda: _build_step(self.arm, name))
+        return self._loaded[name]
+
     def _build(self) -> Mapping[str, tuple[Any, int]]:
         """Derive the functions; CasADi is imported only here."""
         from flex_planner.dynamics.dynamics_functions import build_dynamics_functions
 
         return build_dynamics_functions(self.arm)
+
+
+def _build_step(arm: Arm, name: str) -> Mapping[str, tuple[Any, int]]:
+    """Derive a step under a controller; CasADi is imported only here."""
+    from flex_planner.dynamics.controller_steps import build_controlled_step, build_feedback_step
+
+    builders = {'controlled_step': build_controlled_step, 'feedback_step': build_feedback_step}
+    return builders[name](arm)

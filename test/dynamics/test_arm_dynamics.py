@@ -96,6 +96,28 @@ def test_unpickling_loads_nothing_until_a_function_is_needed(
     assert loads == [cache_key(rigid_arm, 'dynamics')]  # once for all of them
 
 
+def test_steps_under_controllers_are_derived_when_they_are_wanted(
+        rigid_arm: Arm, monkeypatch: pytest.MonkeyPatch) -> None:
+    loads, physical = list[set[str]](), PhysicalParameters.of_arm(rigid_arm).physical
+
+    def watched(key: str, build: Any) -> Any:
+        found = compiled_functions.load_functions(key, build)
+        loads.append(set(found))
+        return found
+
+    monkeypatch.setattr(arm_dynamics, 'load_functions', watched)
+    dynamics = ArmDynamics(rigid_arm)
+    after, feedback, _, _ = dynamics.controlled_steps(
+        STATES[0], np.array([[0.1, 0.2, 0.3, 0.4, *TORQUES[0], *TORQUES[0]]]),
+        np.array([[1e-3, 1.0]]), np.full(10, 10.0), physical)
+    # no error to feed back: a step under the efforts alone
+    alone = dynamics.runge_kutta_steps(physical)(STATES[0], np.tile(TORQUES, 12), 1e-3)[0]
+    np.testing.assert_allclose(after, alone, rtol=1e-14)
+    assert not feedback.any()
+    assert [load & {'controlled_step', 'feedback_step'} for load in loads] == [
+        set(), {'controlled_step'}]
+
+
 @both
 def test_equal_arm_has_the_same_functions_and_another_arm_others(rigid_arm: Arm,
                                                                  kind: type[Any]) -> None:
