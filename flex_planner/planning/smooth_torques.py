@@ -18,7 +18,7 @@ from flex_planner.optimal_control.task import Task
 from flex_planner.optimal_control.torque_conditions import TorqueState
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_problem import plan_problem, STOP_STATUS
-from flex_planner.planning.strategies.initial_guesses import cold_start
+from flex_planner.planning.strategies.initial_guesses import cold_start, direct_collocation
 from flex_planner.planning.strategies.strategy import Attempt, Strategy
 import numpy as np
 
@@ -67,7 +67,8 @@ def plan_without_jumps(problem: MotionProblem, plain: Plan, solver: Solver) -> P
     if plain.status in STOP_STATUS.values():
         return replace(plain, task=problem.task, problem=problem, solution=None)
     strategies = [Strategy('cold start', cold_start, quick=True),
-                  Strategy('homotopy in rates of torques', lower_rates)]
+                  Strategy('homotopy in rates of torques', lower_rates),
+                  Strategy('direct collocation', direct_collocation, cost=5.0)]
     if plain.solution is not None:
         strategies.insert(0, _smooth(plain))
     plan = plan_problem(problem, solver, strategies)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from flex_planner.collocation import CollocationSolution, GaussRule
 from flex_planner.optimal_control.direct.result import DirectResult
 from flex_planner.optimal_control.motion_problem import MotionProblem
-import numpy as np
 
 
 def to_solution(found: DirectResult, motion: MotionProblem) -> CollocationSolution:
@@ -22,7 +21,5 @@ def to_solution(found: DirectResult, motion: MotionProblem) -> CollocationSoluti
     """
     intervals = found.times.size - 1
     degree = found.point_times.size // intervals
-    points = np.hstack([found.point_states, found.point_costates])
-    rates = motion.rate(found.point_times, points).reshape(intervals, degree, -1)
-    nodes = np.hstack([found.states, found.costates])
-    return CollocationSolution(found.times, nodes, rates, GaussRule.of(degree))
+    rates = motion.rate(found.point_times, found.points).reshape(intervals, degree, -1)
+    return CollocationSolution(found.times, found.nodes, rates, GaussRule.of(degree))

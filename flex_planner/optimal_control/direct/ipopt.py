@@ -21,6 +21,7 @@ from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.direct.ipopt_crew import solve_each
 from flex_planner.optimal_control.direct.ipopt_start import Answer, pack_recipe, Start
 from flex_planner.optimal_control.direct.mesh import Mesh, SCHEMES
+from flex_planner.optimal_control.direct.point_layout import TorqueRates
 from flex_planner.optimal_control.direct.result import DirectResult, DirectStatus
 from flex_planner.optimal_control.direct.unknowns import Free, Guess, Path, Unknowns
 from flex_planner.optimal_control.parameters import Parameters
@@ -107,6 +108,8 @@ class DirectProblem:
         Mesh and tolerances.
     breaks : numpy.ndarray, shape (intervals + 1,), optional
         Ends of the intervals from 0 to 1; equal intervals if not given.
+    rates : TorqueRates, optional
+        Of torques that are states; torques may jump if it is not given.
 
     Attributes
     ----------
@@ -116,11 +119,11 @@ class DirectProblem:
     """
 
     def __init__(self, model: ArmModel, settings: DirectSettings | None = None,
-                 breaks: Array | None = None) -> None:
+                 breaks: Array | None = None, rates: TorqueRates | None = None) -> None:
         self.model, self.settings = model, settings or DirectSettings()
         self._mesh = Mesh.of(self.settings.scheme, self.settings.degree, self.settings.intervals,
                              breaks)
-        self._unknowns = Unknowns(model, self._mesh)
+        self._unknowns, self._rates = Unknowns(model, self._mesh, rates), rates
         self._recipes: dict[bool, bytes] = {}
         self.build_seconds = 0.0
 
@@ -144,8 +147,8 @@ class DirectProblem:
         duration : float
             t_f, > 0 [s].
         guess : callable, optional
-            Times (k,) to z (k, 4 n_t), such as a `CollocationSolution` or a `DirectResult`; a
-            straight line if not given.
+            Times (k,) to z (k, m) of a `MotionProblem`, such as a `CollocationSolution` or a
+            `DirectResult`; a straight line if not given.
         path : callable, optional
             Instead of a guess: times (k,) to q, q', q'' (k, n_t) each.
         warm : DirectResult, optional
@@ -163,6 +166,8 @@ class DirectProblem:
         ------
         InvalidValueError
             If a state or the duration is none.
+        ValueError
+            If the payload is free under gravity, where the torques at both ends change with it.
 
         """
         case = self._case(parameters, start, goal, duration, free, price, most_payload)
@@ -193,12 +198,22 @@ class DirectProblem:
         n_x = 2 * self.model.arm.n_coordinates
         ends = vector('start', start, n_x), vector('goal', goal, n_x)
         number('duration', duration, above=0, unit='s')
+        if self._rates is not None and free is Free.PAYLOAD and self.model.arm.gravity.any():
+            raise ValueError('the payload is free, but must be given under gravity where torques '
+                             'have rates')
         prices = [1.0, price * (free is Free.PAYLOAD), price * (free is Free.DURATION)]
         lower, upper = self._unknowns.bounds(parameters, duration, free, most_payload)
         least, most = self._unknowns.rows(parameters)
         return _Case(parameters=parameters, ends=ends, prices=prices, inputs={
             'lbx': lower, 'ubx': upper, 'lbg': least, 'ubg': most,
-            'p': np.concatenate([parameters.stack(), *ends, prices])})
+            'p': np.concatenate([parameters.stack(), *self._given(ends), prices])})
+
+    def _given(self, ends: tuple[Array, Array]) -> tuple[Array, ...]:
+        """Return what the programme is to know of rates of torques, and all states at the ends."""
+        if self._rates is None:
+            return ends
+        rates, (start, goal) = self._rates, ends
+        return rates.weights, start, rates.start, goal, rates.goal
 
     def _solve_each(self, case: _Case, iterates: Sequence[dict[str, Array]], warm: bool,
                     monitor: Monitor) -> Iterator[DirectResult]:
@@ -235,26 +250,42 @@ class DirectProblem:
             options = {**_ALWAYS, 'max_iter': self.settings.max_iterations,
                        'tol': self.settings.tolerance, **(_WARM if warm else {}),
                        **(_EXPLORING if self.settings.exploring else {})}
-            self._recipes[warm] = pack_recipe(self.model.arm, self._mesh.transcription(), options)
+            self._recipes[warm] = pack_recipe(
+                self.model.arm, self._mesh.transcription(), options,
+                with_rates=self._rates is not None)
         return self._recipes[warm]
 
     def _result(self, answer: Answer, case: _Case, status: DirectStatus | None) -> DirectResult:
         """Return IPOPT's answer in the terms of the problem."""
-        n_t, mesh = self.model.arm.n_coordinates, self._mesh
+        n_t, mesh, layout = self.model.arm.n_coordinates, self._mesh, self._unknowns.layout
         y, states, used, duration = self._unknowns.split(answer.x, case.parameters)
-        rows = answer.lam_g[:mesh.P.shape[0] * 2 * n_t].reshape(-1, 2 * n_t)
-        costates, point_costates = mesh.costates(rows)
-        speeds = y[:, n_t:n_t + self.model.arm.n_joints]
+        rows = answer.lam_g[:mesh.P.shape[0] * layout.states].reshape(-1, layout.states)
+        costates, point_costates = (self._of_torques(psi, used) for psi in mesh.costates(rows))
+        half, speeds = 2 * n_t, slice(n_t, n_t + self.model.arm.n_joints)
+        rates = {} if self._rates is None else {
+            'node_torques': states[:, half:] - used.torque_slope * states[:, speeds],
+            'torque_costates': costates[:, half:],
+            'point_torque_costates': point_costates[:, half:],
+            'torque_rates': self._unknowns.torque_rates(y, used)}
         ended = DirectStatus.CONVERGED if answer.converged else DirectStatus.FAILED
         return DirectResult(
             status=status or ended, message=answer.message,
             cost=answer.objective + case.prices[1] * answer.x[-2] - case.prices[2] * answer.x[-1],
             payload=used.payload_mass, duration=duration, times=duration * mesh.breaks,
-            states=states, costates=costates, point_times=duration * mesh.points,
-            point_states=y[:, :2 * n_t], point_costates=point_costates,
-            torques=y[:, 3 * n_t:] - used.torque_slope * speeds, iterations=answer.iterations,
-            seconds=answer.seconds,
+            states=states[:, :half], costates=costates[:, :half],
+            point_times=duration * mesh.points, point_states=y[:, :half],
+            point_costates=point_costates[:, :half],
+            torques=y[:, layout.drives] - used.torque_slope * y[:, speeds],
+            iterations=answer.iterations, seconds=answer.seconds, **rates,
             iterate={'x0': answer.x, 'lam_x0': answer.lam_x, 'lam_g0': answer.lam_g})
+
+    def _of_torques(self, costates: Array, parameters: Parameters) -> Array:
+        """Return costates of (q, q', w) as those of (q, q', tau), where w is a state."""
+        n_t, n = self.model.arm.n_coordinates, self.model.arm.n_joints
+        found = costates.copy()
+        if self._rates is not None:
+            found[:, n_t:n_t + n] += parameters.torque_slope * costates[:, 2 * n_t:]
+        return found
 
 
 def solve_direct(model: ArmModel, parameters: Parameters, start: Array, goal: Array,

@@ -79,9 +79,10 @@ class Answer:
                    converged=False, message=message, iterations=iterations, seconds=seconds)
 
 
-def pack_recipe(arm: Arm, mesh: Transcription, options: dict[str, Any]) -> bytes:
+def pack_recipe(arm: Arm, mesh: Transcription, options: dict[str, Any], *,
+                with_rates: bool = False) -> bytes:
     """Return what a programme and its solver are derived from; equal bytes mean equal ones."""
-    return pickle.dumps((arm, mesh, options))
+    return pickle.dumps((arm, mesh, options, with_rates))
 
 
 class _Known(local):
@@ -138,8 +139,8 @@ def _derive(recipe: bytes) -> tuple[Any, Any]:
 
     known = _KNOWN.solvers
     if recipe not in known:
-        arm, mesh, options = pickle.loads(recipe)
-        programme = Programme.of(arm, mesh)
+        arm, mesh, options, with_rates = pickle.loads(recipe)
+        programme = Programme.of(arm, mesh, with_rates=with_rates)
         watch = programme.watch()
         known[recipe] = programme.ipopt(options, watch), watch
     known.move_to_end(recipe)

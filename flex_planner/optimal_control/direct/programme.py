@@ -3,8 +3,9 @@ The optimal control problem as a nonlinear programme: discretised first, optimis
 
 Every collocation point has the unknowns y = (q, q', q'', w) with w = u + K_2 q', so that eq. (15)
 is -K_1 <= w <= K_1 and eq. (3) one nonlinear row per coordinate. A cap of the torque is a linear
-row, where a motor has one. The rows that tie the points together are linear; their multipliers
-give the costates. CasADi is imported only to derive it.
+row, where a motor has one. Where torques have rates w is a state, and w' another unknown; the
+rate of a torque is w' - K_2 q'', a linear row. The rows that tie the points together are linear;
+their multipliers give the costates. CasADi is imported only to derive it.
 
 """
 
@@ -16,6 +17,7 @@ from typing import Any
 from flex_planner.arms.arm import Arm
 from flex_planner.base.progress import Monitor, StopReason
 from flex_planner.optimal_control.direct.mesh import Columns, Transcription
+from flex_planner.optimal_control.direct.point_layout import PointLayout
 from flex_planner.optimal_control.parameters import (
     ParameterSymbols,
     payload_index,
@@ -43,18 +45,22 @@ class _Point:
     bend: Any
 
     @classmethod
-    def of(cls, arm: Arm) -> _Point:
-        """Derive them."""
+    def of(cls, arm: Arm, layout: PointLayout) -> _Point:
+        """Derive them; where torques have rates S follows the other parameters."""
         import casadi as ca
         from flex_planner.dynamics.build_chain import build_chain
         from flex_planner.optimal_control.running_cost import running_cost
 
         chain, n, n_t = build_chain(arm), arm.n_joints, arm.n_coordinates
         a, w, s, mu = (ca.SX.sym(*each) for each in (('a', n_t), ('w', n), ('s',), ('mu', n_t)))
+        turning, weights = (ca.SX.sym(name, n * layout.with_rates) for name in ('dw', 'S'))
         q, v, symbols = chain.coordinates, chain.rates, ParameterSymbols.of(chain)
-        y, p = ca.vertcat(q, v, a, w), ca.vertcat(*symbols.stack())
-        u = w - symbols['torque_slope'] * v[:n]
+        y = (ca.vertcat(q, v, w, a, turning) if layout.with_rates else ca.vertcat(q, v, a, w))
+        p, slope = ca.vertcat(*symbols.stack(), weights), symbols['torque_slope']
+        u = w - slope * v[:n]
         L = running_cost(symbols, q, v, u)
+        if layout.with_rates:
+            L += ca.dot(weights, (turning - slope * a[:n])**2) / 2
         force = chain.inverse_dynamics(a) - ca.vertcat(u, ca.SX(n_t - n, 1))
         hessian = ca.triu(ca.hessian(s * L + ca.dot(mu, force), y)[0])
         share = ca.densify(ca.jacobian(force, chain.payload_mass))
@@ -74,8 +80,8 @@ class Programme:
     Unknowns are y at the points, then x at the nodes that are no points, then the payload m_p and
     the duration t_f, which bounds fix or free. Parameters are p, in which the payload does not
     count, x at both ends, and three prices: the cost is ``prices[0] J - prices[1] m_p +
-    prices[2] t_f``. Rows are equations, those of the mesh, then eq. (3); last come the torques of
-    motors that have a cap.
+    prices[2] t_f``. Rows are equations, those of the mesh, then eq. (3); then come the torques of
+    motors that have a cap, and the rates of torques, where they have any.
 
     """
 
@@ -83,25 +89,26 @@ class Programme:
     derivatives: dict[str, Any]
 
     @classmethod
-    def of(cls, arm: Arm, mesh: Transcription) -> Programme:
+    def of(cls, arm: Arm, mesh: Transcription, *, with_rates: bool = False) -> Programme:
         """Derive it."""
         import casadi as ca
 
-        point, K, n_x = _Point.of(arm), mesh.weights.size, 2 * arm.n_coordinates
+        layout = PointLayout(arm.n_coordinates, arm.n_joints, with_rates)
+        point, K, n_x = _Point.of(arm, layout), mesh.weights.size, layout.states
         size, outer = point.cost.numel_in(0), (mesh.P.shape[1] - K) * n_x
         X, p = ca.MX.sym('X', K * size + outer + 2), ca.MX.sym('p', point.cost.numel_in(1))
         ends, prices = ca.MX.sym('ends', 2 * n_x), ca.MX.sym('prices', 3)
         motion, duration, at = X[:-2], X[-1], payload_index()
         used = ca.vertcat(p[:at], X[-2], p[at + 1:])
         points = ca.reshape(X[:K * size], size, K), ca.repmat(used, 1, K)
-        weights, (constant, growing) = ca.DM(mesh.weights).T, _linear_rows(mesh, n_x, size)
+        weights, (constant, growing) = ca.DM(mesh.weights).T, _linear_rows(mesh, layout)
         given = ca.vertcat(ca.MX(constant.size1() - 2 * n_x, 1), ends)
         moved = growing @ motion
         L, L_slope = point.cost.map(K)(*points)
         force, force_slope = point.force.map(K)(*points)
         share, mean = point.share.map(K)(*points), ca.dot(weights, L)
         f = prices[0] * duration * mean - prices[1] * X[-2] + prices[2] * duration
-        torques = _capped_torques(arm, size, used)
+        torques = _limited_rows(arm, layout, used)
         g = ca.vertcat(constant @ motion - duration * moved - given, ca.vec(force),
                        ca.vec(torques @ points[0]))
         s, multipliers = ca.MX.sym('s'), ca.MX.sym('lambda', g.numel())
@@ -174,26 +181,32 @@ class Programme:
         return Watch()
 
 
-def _capped_torques(arm: Arm, size: int, parameters: Any) -> Any:
-    """Return rows that make the torques u = w - K_2 q' of motors with a cap from y."""
+def _limited_rows(arm: Arm, layout: PointLayout, parameters: Any) -> Any:
+    """Return rows that make of y torques w - K_2 q' with a cap, and all rates w' - K_2 q''."""
     import casadi as ca
 
-    n, n_t = arm.n_joints, arm.n_coordinates
-    chosen = [i for i, has in enumerate(TorqueLimits.of(arm).capped) if has]
-    driven, turning = ca.DM(len(chosen), size), ca.DM(len(chosen), size)
-    for row, i in enumerate(chosen):
-        driven[row, 3 * n_t + i] = turning[row, n_t + i] = 1
-    return driven - ca.diag(parameters[torque_slope_slice(n)][chosen]) @ turning
+    capped = [i for i, has in enumerate(TorqueLimits.of(arm).capped) if has]
+    rows = [(i, layout.drives.start, layout.coordinates) for i in capped]
+    if layout.with_rates:
+        rows += [(i, layout.drive_rates.start, layout.accelerations.start)
+                 for i in range(layout.joints)]
+    driven, turning = ca.DM(len(rows), layout.size), ca.DM(len(rows), layout.size)
+    for row, (i, drives, speeds) in enumerate(rows):
+        driven[row, drives + i] = turning[row, speeds + i] = 1
+    slopes = parameters[torque_slope_slice(layout.joints)][[i for i, _, _ in rows]]
+    return driven - ca.diag(slopes) @ turning
 
 
-def _linear_rows(mesh: Transcription, n_x: int, size: int) -> tuple[Any, Any]:
-    """Return A and B of the mesh's rows (A - t_f B) (y, nodes); x' = (q', q'') follows x in y."""
+def _linear_rows(mesh: Transcription, layout: PointLayout) -> tuple[Any, Any]:
+    """Return A and B of the mesh's rows (A - t_f B) (y, nodes)."""
     import casadi as ca
 
-    P, Q = _sparse(mesh.P), _sparse(mesh.Q)
+    P, Q, n_x = _sparse(mesh.P), _sparse(mesh.Q), layout.states
     value, K = ca.DM.eye(n_x), Q.size2()
-    in_point = ca.horzcat(value, ca.DM(n_x, size - n_x))
-    rate = ca.horzcat(ca.DM(n_x, n_x // 2), value, ca.DM(n_x, size - n_x - n_x // 2))
+    in_point = ca.horzcat(value, ca.DM(n_x, layout.size - n_x))
+    rate = ca.DM(n_x, layout.size)
+    for row, column in enumerate(layout.derivatives.tolist()):
+        rate[row, column] = 1
     constant = ca.horzcat(ca.kron(P[:, :K], in_point), ca.kron(P[:, K:], value))
     growing = ca.kron(Q, rate)
     others = constant.size2() - growing.size2()

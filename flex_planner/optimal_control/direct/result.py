@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 
 from flex_planner.base.validation import Array
@@ -45,6 +45,10 @@ class DirectResult:
         Time of the solve, without the derivation of the programme.
     iterate : dict of str to numpy.ndarray
         Unknowns and multipliers of IPOPT, for a warm start.
+    node_torques, torque_costates : numpy.ndarray, shape (N + 1, n)
+        tau and psi_tau at the nodes where torques have rates, no columns where not.
+    point_torque_costates, torque_rates : numpy.ndarray, shape (k, n)
+        psi_tau and the rates of the torques at the collocation points [N m/s].
 
     """
 
@@ -63,6 +67,24 @@ class DirectResult:
     iterations: int
     seconds: float
     iterate: dict[str, Array]
+    node_torques: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    torque_costates: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    point_torque_costates: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    torque_rates: Array = field(default_factory=lambda: np.zeros((0, 0)))
+
+    @property
+    def nodes(self) -> Array:
+        """Return the unknowns of `MotionProblem` at the nodes of the mesh."""
+        z = np.hstack([self.states, self.costates])
+        return np.hstack([z, self.node_torques, self.torque_costates]) if (
+            self.node_torques.size) else z
+
+    @property
+    def points(self) -> Array:
+        """Return them at the collocation points."""
+        z = np.hstack([self.point_states, self.point_costates])
+        return np.hstack([z, self.torques, self.point_torque_costates]) if (
+            self.node_torques.size) else z
 
     @property
     def converged(self) -> bool:
@@ -70,6 +92,5 @@ class DirectResult:
         return self.status is DirectStatus.CONVERGED
 
     def __call__(self, times: Array) -> Array:
-        """Return z, linear between the nodes, at times (k,), shape (k, 4 n_t)."""
-        z = np.hstack([self.states, self.costates])
-        return np.stack([np.interp(times, self.times, column) for column in z.T], axis=1)
+        """Return z, linear between the nodes, at times (k,), shape (k, m)."""
+        return np.stack([np.interp(times, self.times, column) for column in self.nodes.T], axis=1)

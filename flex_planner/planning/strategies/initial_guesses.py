@@ -21,6 +21,7 @@ from flex_planner.collocation import (
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.direct.conversion import to_solution
 from flex_planner.optimal_control.direct.ipopt import DirectProblem, DirectSettings
+from flex_planner.optimal_control.direct.point_layout import TorqueRates
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.totals import integrate_totals
 from flex_planner.planning.strategies.homotopies import lower_speed_price
@@ -159,17 +160,20 @@ def direct_collocation(problem: MotionProblem, solver: Solver) -> Attempt | None
     Start from a coarse transcription solved by IPOPT, whose multipliers are the costates.
 
     Its scheme is a Gauss rule too, so that it gives a solution of the coarse equations. A flexible
-    arm starts from the rigid motion that is bent by its forces, if there is one.
+    arm starts from the rigid motion that is bent by its forces, if there is one and its torques
+    may jump.
 
     """
     if np.isfinite(problem.goal_weights).any() or problem.junctions.size:
         return None  # the transcription knows hard goals only, and no via points
+    if problem.layout.torques and not (problem.task.starts_at_rest and problem.task.ends_at_rest):
+        return None  # nor torques that are free at an end
     intervals = min(max(_DIRECT_INTERVALS, problem.fewest_intervals(_DIRECT_STAGES)),
                     solver.settings.max_intervals)
     direct = DirectProblem(problem.model, DirectSettings(
         scheme='gauss', degree=_DIRECT_STAGES, intervals=intervals, tolerance=1e-6,
-        max_iterations=_DIRECT_ITERATIONS))
-    rigid = _solve_rigid(problem, solver)
+        max_iterations=_DIRECT_ITERATIONS), rates=TorqueRates.of(problem))
+    rigid = None if problem.layout.torques else _solve_rigid(problem, solver)
     guess = lift(problem, rigid.solution, solver) if rigid and rigid.converged else None
     found = direct.solve(problem.parameters, problem.start, problem.goal,
                          problem.task.duration, guess=guess, monitor=solver.monitor)

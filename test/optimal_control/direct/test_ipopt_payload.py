@@ -179,9 +179,11 @@ def test_impossible_motion_fails_with_a_free_payload(motion: MotionProblem) -> N
 # Derivatives
 
 
-def derivatives(arm: Arm, scheme: str) -> dict[str, tuple[Array, Array]]:
+def derivatives(arm: Arm, scheme: str,
+                with_rates: bool = False) -> dict[str, tuple[Array, Array]]:
     """Return the programme's derivatives and CasADi's own of its expressions, at some point."""
-    programme = Programme.of(arm, Mesh.of(scheme, 2, 3).transcription())
+    programme = Programme.of(arm, Mesh.of(scheme, 2, 3).transcription(),
+                             with_rates=with_rates)
     x, p, f, g = (programme.expressions[name] for name in ('x', 'p', 'f', 'g'))
     s, multipliers = ca.MX.sym('s'), ca.MX.sym('lambda', g.numel())
     lagrangian = ca.triu(ca.hessian(s * f + ca.dot(multipliers, g), x)[0])
@@ -204,8 +206,9 @@ def test_derivatives_are_those_of_the_expressions(single_mode_arm: Arm, scheme: 
         np.testing.assert_allclose(ours, own, atol=1e-12 * np.abs(own).max(), err_msg=name)
 
 
-def test_derivatives_of_an_arm_that_has_everything(workshop_arm: Arm) -> None:
-    for name, (ours, own) in derivatives(workshop_arm, 'gauss').items():
+@pytest.mark.parametrize('with_rates', [False, True])
+def test_derivatives_of_an_arm_that_has_everything(workshop_arm: Arm, with_rates: bool) -> None:
+    for name, (ours, own) in derivatives(workshop_arm, 'gauss', with_rates).items():
         np.testing.assert_allclose(ours, own, atol=1e-11 * np.abs(own).max(), err_msg=name)
 
 
