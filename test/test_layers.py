@@ -20,11 +20,12 @@ FLOORS = {
     'optimal_control': 3,
     'control': 4,
     'planning': 5,
-    'capacity': 6, 'identification': 6, 'simulation': 6,
-    'logs': 7, 'plotting': 7, 'reports': 7,
-    'maps': 8, 'paper': 8,
-    'ros': 9,
-    'cli': 10,
+    'capacity': 6, 'simulation': 6,
+    'identification': 7,
+    'logs': 8, 'plotting': 8, 'reports': 8,
+    'maps': 9, 'paper': 9,
+    'ros': 10,
+    'cli': 11,
 }
 CORE = ('base', 'arms', 'collocation', 'dynamics', 'optimal_control', 'control', 'planning',
         'capacity', 'identification', 'simulation')

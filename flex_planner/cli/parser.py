@@ -17,6 +17,7 @@ from flex_planner.cli.commands import (
     paper,
     plan,
     recordings,
+    robustness,
 )
 from flex_planner.cli.commands import map as maps
 from flex_planner.cli.options import join_lists
@@ -36,6 +37,7 @@ def build_parser() -> argparse.ArgumentParser:
     arm.add_command(commands)
     plan.add_commands(commands)
     compare.add_command(commands)
+    robustness.add_command(commands)
     gains.add_command(commands)
     identify.add_command(commands)
     excite.add_command(commands)

@@ -10,6 +10,7 @@ from flex_planner.capacity.results import MaxPayload
 from flex_planner.cli.request import Request
 from flex_planner.optimal_control.path_constraints import write_constraint
 from flex_planner.optimal_control.task import Task
+from flex_planner.planning.feedback.gains import FeedbackGains
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.sampling import SampledPlan
 from flex_planner.ros.messages.classes import (
@@ -75,9 +76,11 @@ class RequestRecorder:
             start_hold=sampling.start_hold)
         self._recorder = OutcomeRecorder(task.arm, _NODE)
 
-    def record_plan(self, plan: Plan, reference: SampledPlan | None) -> Path:
-        """Record a plan and return the folder; `reference` only if it is solved."""
-        return self._record(report_from_plan(plan), plan, reference, plan.planning_time, None)
+    def record_plan(self, plan: Plan, reference: SampledPlan | None,
+                    gains: FeedbackGains | None = None) -> Path:
+        """Record a plan, and gains along it; return the folder. `reference` only if solved."""
+        return self._record(report_from_plan(plan), plan, reference, plan.planning_time, None,
+                            gains)
 
     def record_search(self, found: MaxPayload, accuracy: float, step: float,
                       reference: SampledPlan | None) -> Path:
@@ -87,7 +90,8 @@ class RequestRecorder:
                             found.planning_time, search_message(found, options))
 
     def _record(self, report: PlanReport, plan: Plan | None, reference: SampledPlan | None,
-                seconds: float, search: PayloadSearch | None) -> Path:
+                seconds: float, search: PayloadSearch | None,
+                gains: FeedbackGains | None = None) -> Path:
         """Write a recording; the request is said to have come when planning began."""
         trajectory, took = FlexibleTrajectory(), int(seconds * 1e9)
         if plan is not None and reference is not None:
@@ -95,7 +99,8 @@ class RequestRecorder:
         report.planning_time = duration_message(took)
         state = RequestState(settings=self._settings, stamp_ns=time.time_ns() - took)
         return self._recorder.write(self._message, state, Outcome(
-            report=report, trajectory=trajectory, plan=plan, reference=reference, search=search))
+            report=report, trajectory=trajectory, plan=plan, reference=reference, search=search,
+            gains=gains))
 
 
 def task_message(request: Request) -> MotionTask:

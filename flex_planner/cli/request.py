@@ -32,6 +32,7 @@ from flex_planner.cli.options import (
 from flex_planner.cli.payload_options import add_payload_shape, take_payload_shape
 from flex_planner.cli.via_options import add_via_points, via_points
 from flex_planner.control.joint_controller import JointController
+from flex_planner.logs.identified_uncertainty import find_uncertainty
 from flex_planner.optimal_control.ends_at_points import ends_at_points
 from flex_planner.optimal_control.goal_in_pose import posture_in_pose
 from flex_planner.optimal_control.path_constraints import FORMS, read_constraint
@@ -41,6 +42,7 @@ from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.point_times import MAX_SAMPLES
 from flex_planner.planning.robust.objective import Robustness
 from flex_planner.planning.sampling import SamplingSettings
+from flex_planner.planning.uncertainty import ASSUMED, Uncertainty
 from flex_planner.reports.motion import list_failures
 import numpy as np
 
@@ -69,6 +71,8 @@ class Request:
         What the motion must keep besides.
     sampled : SamplingSettings
         For which joint controller the trajectory is.
+    uncertainty : Uncertainty
+        Of the arm: identified, if a file beside that of the arm says so.
 
     """
 
@@ -77,6 +81,7 @@ class Request:
     time_limit: float
     objectives: Objectives | None = None
     sampled: SamplingSettings = SamplingSettings()
+    uncertainty: Uncertainty = ASSUMED
 
     @classmethod
     def of(cls, options: argparse.Namespace) -> Request:
@@ -105,7 +110,8 @@ class Request:
             sampled = sampling_settings(options, arm)
             objectives = _objectives(options, task, sampled.controller)
         return cls(task=task, elbow=options.elbow, time_limit=limit,
-                   objectives=objectives, sampled=sampled)
+                   objectives=objectives, sampled=sampled,
+                   uncertainty=find_uncertainty(options.arm, arm))
 
     @property
     def sampling(self) -> SamplingSettings:

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from itertools import groupby
 
+from flex_planner.arms.arm import Arm
+from flex_planner.arms.joint_units import TURNING, units_of
 from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
@@ -16,6 +20,7 @@ from flex_planner.dynamics.physical_parameters import PhysicalParameters
 from flex_planner.optimal_control.path_constraints import PathSlacks
 from flex_planner.planning.executed_limits import ExecutedSlack, find_executed_slack
 from flex_planner.planning.plan import Plan
+from flex_planner.planning.uncertainty import ASSUMED_ERROR
 import numpy as np
 
 # of the joint angles at the start, to see what becomes of it [rad]
@@ -81,11 +86,13 @@ class RobustnessReport:
     more_modes : float
         With two more modes for every link that has any, at most 8; 0 for rigid links [m].
     stiffness_differs, payload_differs : float
-        With 10 % less and 10 % more of E I, or of mass and inertia of the payload: the larger of
-        the two; the nominal one where there are neither modes nor a payload [m].
+        With less and with more of E I, or of mass and inertia of the payload: the larger of the
+        two; the nominal one where there are neither modes nor a payload [m].
     more_modes_growth : float
         How fast deviations grow under the PD with more modes, as
         `ExecutionCertificate.feedback_growth` [1/s].
+    stiffness_difference, payload_difference : float
+        By which share, see `Uncertainty`.
 
     """
 
@@ -94,6 +101,8 @@ class RobustnessReport:
     stiffness_differs: float
     payload_differs: float
     more_modes_growth: float
+    stiffness_difference: float = ASSUMED_ERROR
+    payload_difference: float = ASSUMED_ERROR
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,30 +123,47 @@ class ExecutionLimits:
     tip_error: float = 5e-3
     residual_vibration: float = 5e-3
 
-    def violations(self, certificate: ExecutionCertificate, reach: float) -> list[str]:
-        """Return a sentence for each limit that is not met."""
+    def violations(self, certificate: ExecutionCertificate, reach: float,
+                   arm: Arm | None = None) -> list[str]:
+        """Return a sentence for each limit that is not met; gains have the units of the arm."""
         pairs = ((entry.name.replace('_', ' '), getattr(certificate, entry.name),
                   getattr(self, entry.name) * reach) for entry in fields(self))
         found = [f'executed {name} is {value:.3g} m, but must be <= {limit:.3g} m'
                  for name, value, limit in pairs if not value <= limit]
         if found and certificate.feedback_growth > UNSTABLE_GROWTH:
-            found.append(unstable_feedback(certificate.controller, certificate.feedback_growth))
+            found.append(unstable_feedback(certificate.controller, certificate.feedback_growth,
+                                           arm))
         return found
 
 
-def unstable_feedback(controller: JointController, growth: float) -> str:
+def unstable_feedback(controller: JointController, growth: float,
+                      arm: Arm | None = None) -> str:
     """Return a sentence on a PD that is unstable."""
-    return (f'the PD of the joints ({describe_controller(controller)}) is unstable: deviations '
-            f'double within {np.log(2) / growth * 1e3:.2g} ms')
+    return (f'the PD of the joints ({describe_controller(controller, arm)}) is unstable: '
+            f'deviations double within {np.log(2) / growth * 1e3:.2g} ms')
 
 
-def describe_controller(controller: JointController) -> str:
-    """Return a controller in words."""
-    gains = controller.gains
-    stiffness, damping = (', '.join(f'{value:g}' for value in values)
-                          for values in (gains.stiffness, gains.damping))
-    return (f'{stiffness} N m/rad and {damping} N m s/rad at {controller.rate:g} Hz, effort_hold '
+def describe_controller(controller: JointController, arm: Arm | None = None) -> str:
+    """Return a controller in words; without an arm all joints turn."""
+    stiffness, damping = say_gains(controller.gains, arm)
+    return (f'{stiffness} and {damping} at {controller.rate:g} Hz, effort_hold '
             f'{controller.hold.value}')
+
+
+def say_gains(gains: Gains, arm: Arm | None = None, form: str = 'g') -> tuple[str, str]:
+    """Return both gains of all joints with their units, those of joints that slide in N/m."""
+    units = ([units_of(joint) for joint in arm.joints] if arm is not None
+             else [TURNING] * len(gains.stiffness))
+    return (_with_units(gains.stiffness, [unit.stiffness for unit in units], form),
+            _with_units(gains.damping, [unit.damping for unit in units], form))
+
+
+def _with_units(values: Array, units: Sequence[str], form: str) -> str:
+    """Return numbers with a unit after each run of those that share it."""
+    runs = [(unit, list(run)) for unit, run in groupby(
+        zip(values, units, strict=True), lambda pair: pair[1])]
+    return ', '.join(f'{", ".join(f"{value:{form}}" for value, _ in run)} {unit}'
+                     for unit, run in runs)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -3,7 +3,7 @@ What is left of a published motion on arms that are not quite the one that was p
 
 Each of them carries the same trajectory out under the same joint controller: with two more modes
 per link, which torque jumps excite as much as those of the model; with links softer and stiffer,
-and payloads lighter and heavier, by a tenth.
+and payloads lighter and heavier, by as much as they may be off.
 
 """
 
@@ -33,10 +33,10 @@ from flex_planner.planning.robust.differing_arms import (
     with_more_modes,
 )
 from flex_planner.planning.sampling import SampledPlan
+from flex_planner.planning.uncertainty import ASSUMED, Uncertainty
 from flex_planner.planning.warnings import PlanWarning, WarningKind
 import numpy as np
 
-DIFFERENCE = 0.1
 # of the nominal vibration, and as a share of the reach: a vibration above both is told of
 _FAR_ABOVE, _NOTABLE = 10.0, 1e-4
 # growth of an error of the joints, above which efforts alone are said to be unstable
@@ -45,7 +45,8 @@ _POSTURES = 5
 
 
 def assess_robustness(plan: Plan, sampled: SampledPlan,
-                      monitor: Monitor | None = None) -> RobustnessReport:
+                      monitor: Monitor | None = None, *,
+                      uncertainty: Uncertainty = ASSUMED) -> RobustnessReport:
     """
     Return what is left of a sampled plan on arms that are not quite that of the plan.
 
@@ -60,6 +61,8 @@ def assess_robustness(plan: Plan, sampled: SampledPlan,
         Its samples.
     monitor : Monitor, optional
         May stop it.
+    uncertainty : Uncertainty
+        Of stiffness and payload, a tenth by default.
 
     Raises
     ------
@@ -70,6 +73,8 @@ def assess_robustness(plan: Plan, sampled: SampledPlan,
     execution = Execution.of(plan, sampled.execution.controller, sampled.start_hold)
     given = plan.problem.parameters
     payload = given.payload_mass or given.payload_inertia
+    stiffness_error = uncertainty.stiffness
+    payload_error = uncertainty.payload_error(float(given.payload_mass))
 
     def worst(*changed: PhysicalParameters) -> float:
         return max(_vibration(execution, execution.dynamics, parameters, sampled, monitor)
@@ -84,8 +89,11 @@ def assess_robustness(plan: Plan, sampled: SampledPlan,
         growth = feedback_growth(other.arm, positions)
     return RobustnessReport(
         nominal=nominal, more_modes=more, more_modes_growth=growth,
-        stiffness_differs=worst(*_scaled(given, rigidity=True)) if plan.arm.n_passive else nominal,
-        payload_differs=worst(*_scaled(given, rigidity=False)) if payload else nominal)
+        stiffness_difference=stiffness_error, payload_difference=payload_error,
+        stiffness_differs=worst(*(differing_parameters(given, error, 0.0) for error in (
+            -stiffness_error, stiffness_error))) if plan.arm.n_passive else nominal,
+        payload_differs=worst(*(differing_parameters(given, 0.0, error) for error in (
+            -payload_error, payload_error))) if payload else nominal)
 
 
 def prepare_robustness(arm: Arm) -> None:
@@ -95,7 +103,7 @@ def prepare_robustness(arm: Arm) -> None:
 
 
 def robustness_warnings(certificate: ExecutionCertificate, robustness: RobustnessReport,
-                        reach: float) -> list[PlanWarning]:
+                        reach: float, arm: Arm | None = None) -> list[PlanWarning]:
     """
     Return what a user should know before an arm carries a motion out.
 
@@ -107,6 +115,8 @@ def robustness_warnings(certificate: ExecutionCertificate, robustness: Robustnes
         Of it.
     reach : float
         Of the arm [m].
+    arm : Arm, optional
+        For the units of its joints; by default all turn.
 
     """
     found = [*_execution_warnings(certificate, reach), *_passed_limit(certificate)]
@@ -117,16 +127,18 @@ def robustness_warnings(certificate: ExecutionCertificate, robustness: Robustnes
             f'{certificate.open_loop_amplification:.2g} times its size until the arrival')))
     if robustness.more_modes_growth > UNSTABLE_GROWTH >= certificate.feedback_growth:
         found.append(PlanWarning(kind=WarningKind.FEEDBACK_UNSTABLE, sentence=(
-            f'with {MORE_MODES} more modes per link the PD of the '
-            f'joints is unstable ({describe_controller(certificate.controller)}): choose lower '
-            'gains or a faster controller')))
+            f'with {MORE_MODES} more modes per link the PD of the joints is unstable '
+            f'({describe_controller(certificate.controller, arm)}): choose lower gains or a '
+            'faster controller')))
     changes = {
         WarningKind.SENSITIVE_TO_MODES: (robustness.more_modes,
                                          f'links have {MORE_MODES} more modes'),
         WarningKind.SENSITIVE_TO_STIFFNESS: (robustness.stiffness_differs,
-                                             f'stiffness differs by {DIFFERENCE:.0%}'),
+                                             'stiffness differs by '
+                                             f'{share(robustness.stiffness_difference)}'),
         WarningKind.SENSITIVE_TO_PAYLOAD: (robustness.payload_differs,
-                                           f'the payload differs by {DIFFERENCE:.0%}')}
+                                           'the payload differs by '
+                                           f'{share(robustness.payload_difference)}')}
     most = max(_FAR_ABOVE * robustness.nominal, _NOTABLE * reach)
     return found + [
         PlanWarning(kind=kind, value=vibration, sentence=(
@@ -159,17 +171,14 @@ def _passed_limit(certificate: ExecutionCertificate) -> list[PlanWarning]:
                         sentence=sentence)]
 
 
+def share(value: float) -> str:
+    """Return a share as a percentage of two digits."""
+    return f'{100 * value:.2g}%'
+
+
 def _millimetres(length: float) -> str:
     """Return a length in words."""
     return f'{length * 1e3:.2g} mm' if np.isfinite(length) else 'without bound'
-
-
-def _scaled(given: PhysicalParameters, *, rigidity: bool) -> list[PhysicalParameters]:
-    """Return the parameters with less and with more of the stiffness, or of the payload."""
-    errors = -DIFFERENCE, DIFFERENCE
-    if rigidity:
-        return [differing_parameters(given, error, 0.0) for error in errors]
-    return [differing_parameters(given, 0.0, error) for error in errors]
 
 
 def _vibration(nominal: Execution, dynamics: ArmDynamics, parameters: PhysicalParameters,

@@ -9,14 +9,14 @@ from flex_planner.planning.execution import (
     RobustnessReport,
 )
 from flex_planner.planning.robust.differing_arms import MORE_MODES
-from flex_planner.planning.robustness import DIFFERENCE
+from flex_planner.planning.robustness import share
 from flex_planner.reports.motion import Row
 import numpy as np
 
 
-def execution_rows(certificate: ExecutionCertificate) -> list[Row]:
-    """Return the certificate of a trajectory."""
-    controller = describe_controller(certificate.controller)
+def execution_rows(certificate: ExecutionCertificate, arm: Arm | None = None) -> list[Row]:
+    """Return the certificate of a trajectory; units of gains are those of the arm."""
+    controller = describe_controller(certificate.controller, arm)
     rows = [
         ('published trajectory', f'carried out with {controller}'),
         ('  executed tip error', millimetres(certificate.tip_error)),
@@ -47,8 +47,10 @@ def robustness_rows(robustness: RobustnessReport, arm: Arm) -> list[Row]:
 def vibrations(robustness: RobustnessReport) -> list[Row]:
     """Return what differs, and the residual vibration then."""
     return [(f'{MORE_MODES} more modes per link', millimetres(robustness.more_modes)),
-            (f'stiffness +-{DIFFERENCE:.0%}', millimetres(robustness.stiffness_differs)),
-            (f'payload +-{DIFFERENCE:.0%}', millimetres(robustness.payload_differs)),
+            (f'stiffness +-{share(robustness.stiffness_difference)}',
+             millimetres(robustness.stiffness_differs)),
+            (f'payload +-{share(robustness.payload_difference)}',
+             millimetres(robustness.payload_differs)),
             ('nothing differs', millimetres(robustness.nominal))]
 
 

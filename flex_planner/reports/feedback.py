@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from flex_planner.base.validation import Array
 from flex_planner.control.state_feedback import StateFeedback
-from flex_planner.planning.execution import UNSTABLE_GROWTH
+from flex_planner.planning.execution import say_gains, UNSTABLE_GROWTH
 from flex_planner.planning.feedback.differing_arm import Response
 from flex_planner.planning.feedback.gains import FeedbackGains, Record
 from flex_planner.planning.plan import Plan
@@ -22,8 +21,9 @@ def feedback_rows(gains: FeedbackGains) -> list[Row]:
     """Return what was found, and the gains that a simple controller takes."""
     rows = [('feedback', gains.message)]
     if gains.joints is not None:
-        rows += [('  p of the joints', f'{_list(gains.joints.stiffness)} N m/rad'),
-                 ('  d of the joints', f'{_list(gains.joints.damping)} N m s/rad, on speeds '
+        stiffness, damping = say_gains(gains.joints, form='.3g')
+        rows += [('  p of the joints', stiffness),
+                 ('  d of the joints', f'{damping}, on speeds '
                   f'filtered at {gains.cutoff:g} Hz'),
                  ('  encoders', f'{_MILLI * gains.resolution:.3g} mrad')]
     return rows
@@ -84,8 +84,3 @@ def _say(response: Response) -> str:
     if response.growth > UNSTABLE_GROWTH or not np.isfinite(response.residual):
         return 'unstable'
     return f'{_MILLI * response.residual:.3g}'
-
-
-def _list(values: Array) -> str:
-    """Return numbers with three digits."""
-    return ', '.join(f'{value:.3g}' for value in values)

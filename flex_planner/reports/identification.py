@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from flex_planner.identification.identification import Estimate, Identification
+from flex_planner.identification.plan_residuals import PlanResiduals
 from flex_planner.reports.motion import columns, Row
 import numpy as np
 
@@ -29,6 +30,21 @@ def identification_rows(found: Identification) -> list[Row]:
     return rows + [('warning', str(one)) for one in found.warnings]
 
 
+def plan_residual_rows(residuals: PlanResiduals) -> list[Row]:
+    """Return what a recorded plan left behind and what the next one will."""
+    rows = [('residual of the plan', f'{_millimetres(residuals.before)}: motion of the tip in the '
+             'second after the arrival, of the recorded trajectory on the arm that was found')]
+    if residuals.message:
+        return [*rows, ('  planned again', f'not found: {residuals.message}')]
+    return [*rows, ('  planned again', f'{_millimetres(residuals.after)}, with the arm that was '
+                    'found, least effort between the same ends, and the zero of the encoders '
+                    'corrected')]
+
+
+def _millimetres(length: float) -> str:
+    return f'{1e3 * length:.3g} mm' if np.isfinite(length) else 'without bound'
+
+
 def estimate_table(found: Identification) -> str:
     """Return all parameters, a line each."""
     return columns(('parameter', 'value', '95 %', 'spread', 'assumed', 'unit', ''),
@@ -46,7 +62,8 @@ def _uncertainty(value: float) -> str:
     return '-' if np.isnan(value) else f'+-{value:.2g}'
 
 
-def plain_identification(found: Identification) -> dict[str, Any]:
+def plain_identification(found: Identification,
+                         residuals: PlanResiduals | None = None) -> dict[str, Any]:
     """Return the result as YAML can write it; what is withheld or not known is null."""
     return {
         'method': found.method.name.lower(), 'logs': list(found.logs),
@@ -55,6 +72,9 @@ def plain_identification(found: Identification) -> dict[str, Any]:
         'fit_percent': found.best.fit_percent.tolist(),
         'left_out_percent': [[_plain(one) for one in row] for row in found.left_out],
         'parameters': [_entry(one) for one in found.estimates],
+        'plan_residual': residuals and {
+            'log': residuals.name, 'before': _plain(residuals.before),
+            'after': _plain(residuals.after)},
         'warnings': [{'code': one.code.value, 'text': one.text} for one in found.warnings]}
 
 

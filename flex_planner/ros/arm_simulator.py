@@ -45,6 +45,9 @@ _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _LONGEST_WORK = 0.05  # [s]
 _TOO_LATE = 0.5  # [s]
 _WARNING_PERIOD = 5.0  # [s]
+_DEPTH = 100  # states at once where the arm catches up
+_EARLY = 0.5  # period of the controller
+_ROUNDING = 1e-9  # [s]
 
 
 class ArmSimulator(Node):  # type: ignore[misc]
@@ -85,21 +88,23 @@ class ArmSimulator(Node):  # type: ignore[misc]
         self._arm = self._settings.mismatch.apply(arm)
         self._law: LinearFeedback | None = None
         self._plant, self._passed = self._new_plant(), ElapsedTime()
+        self._due = 0.0
         self._watch = ArrivalWatch(self._arm, self._settings.vibration_window)
-        self._joints = self.create_publisher(JointState, 'joint_states', 10)
-        self._modes = self.create_publisher(JointState, '~/modal_states', 10)
-        self._tip = self.create_publisher(PointStamped, '~/tip', 10)
+        self._joints = self.create_publisher(JointState, 'joint_states', _DEPTH)
+        self._modes = self.create_publisher(JointState, '~/modal_states', _DEPTH)
+        self._tip = self.create_publisher(PointStamped, '~/tip', _DEPTH)
         self._vibration = self.create_publisher(Float64, '~/residual_vibration', _LATCHED)
         self._bending = self.create_publisher(Float64, '~/residual_bending', _LATCHED)
         self._picture = ArmPicture(self, self._arm, self._settings)
         self.create_subscription(JointTrajectory, 'joint_trajectory', self._on_trajectory, 1)
         if self._settings.feedback_gains:
             self.create_subscription(FeedbackGains, 'feedback_gains', self._on_gains, _LATCHED)
-        self.create_timer(1 / self._settings.publish_rate, self._on_timer)
+        # by a clock that also goes on while a simulation is paused: the arm may have to catch up
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(1 / self._settings.publish_rate, self._on_timer, clock=steady)
         if self._settings.picture_rate:
             self.create_timer(1 / self._settings.picture_rate, self._on_picture)
-        self.create_timer(_WARNING_PERIOD, self._on_silence, clock=Clock(
-            clock_type=ClockType.STEADY_TIME))
+        self.create_timer(_WARNING_PERIOD, self._on_silence, clock=steady)
         self.get_logger().info(f'simulating {self._arm.name}')
 
     def _new_plant(self) -> Plant:
@@ -150,8 +155,11 @@ class ArmSimulator(Node):  # type: ignore[misc]
         return ''
 
     def _on_timer(self) -> None:
-        """Bring the arm up to now and publish it."""
+        """Bring the arm up to now."""
         self._advance()
+
+    def _publish_states(self) -> None:
+        """Publish the arm as it is."""
         n, n_t = self._arm.n_joints, self._arm.n_coordinates
         state, sensor = self._plant.state, self._plant.sensor
         stamp = self._stamp()
@@ -189,7 +197,7 @@ class ArmSimulator(Node):  # type: ignore[misc]
         """Bring the arm up to now, or as far as it may go at once."""
         now, plant, limit = self._now(), self._plant, time.monotonic() + _LONGEST_WORK
         try:
-            while plant.time + plant.period <= now and time.monotonic() < limit:
+            while plant.time + plant.period <= now + _ROUNDING and time.monotonic() < limit:
                 plant.advance(plant.time + plant.period, self._see)
         except RunawayError as error:
             self._begin_again(error)
@@ -216,14 +224,17 @@ class ArmSimulator(Node):  # type: ignore[misc]
 
     def _begin_again(self, reason: RunawayError) -> None:
         """Put the arm back to where it started."""
-        self._plant, self._passed = self._new_plant(), ElapsedTime()
+        self._plant, self._passed, self._due = self._new_plant(), ElapsedTime(), 0.0
         self._watch.expect(np.inf)
         self.get_logger().error(
             f'{reason}. The arm is at rest at its initial positions again, and follows nothing',
             throttle_duration_sec=_WARNING_PERIOD)
 
     def _see(self, plant: Plant) -> None:
-        """Look at the arm after a period of the controller."""
+        """Look at the arm after a period, and publish it at even times of its own."""
+        if plant.time >= self._due - _EARLY * plant.period:
+            self._publish_states()
+            self._due = max(self._due, plant.time - plant.period) + 1 / self._settings.publish_rate
         self._watch.see(plant.time, plant.state)
         residual = self._watch.result(plant.time)
         if residual is not None:

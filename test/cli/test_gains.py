@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from flex_planner.cli import main
+from flex_planner.reports.recording import RecordedRequest
+from flex_planner.reports.recording.tables import tables
 import numpy as np
 import pytest
 import yaml
@@ -26,6 +28,18 @@ def test_gains_are_printed_and_written(capsys: pytest.CaptureFixture[str],
     left = written['tip_motion_after_arrival']
     assert set(left) >= {'state', 'joints'} and {len(values) for values in left.values()} == {7}
     assert f'{1e3 * left["joints"][0]:.3g}' in output
+    # and in the report
+    recording, = (tmp_path / 'recordings').iterdir()
+    request = RecordedRequest.read(recording)
+    shown = {table.title: table for table in tables(request)}
+    facts = dict(shown['Gains of feedback'].rows)
+    assert 'N m/rad' in facts['p of the joints']
+    assert facts['observer'] == '12 states from 2 encoders'
+    # the observer follows faster than the arm would find back by itself, and without ringing up
+    assert float(facts['  its errors die away with'].split()[0]) > 0
+    box = next(table for title, table in shown.items() if title.startswith('Motion'))
+    assert len(box.rows) == 7 and box.rows[0][0] == 'as modelled'
+    assert float(box.rows[0][1]) == float(f'{1e3 * left["joints"][0]:.3g}')
 
 
 @pytest.mark.parametrize(('options', 'message'), [

@@ -11,6 +11,7 @@ from flex_planner.arms.planar_only import require_planar
 from flex_planner.base.paths import file_stem
 from flex_planner.base.progress import Monitor
 from flex_planner.base.yaml_text import format_yaml
+from flex_planner.cli.commands.robustness import add_errors, given_uncertainty
 from flex_planner.cli.controller_options import add_controller
 from flex_planner.cli.options import add_folder, Commands, number_argument
 from flex_planner.cli.outputs import check_folder
@@ -26,7 +27,8 @@ from flex_planner.planning.feedback.find_gains import (
 from flex_planner.planning.feedback.gains import FeedbackGains
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_path
-from flex_planner.planning.robustness import prepare_robustness
+from flex_planner.planning.robustness import assess_robustness, prepare_robustness
+from flex_planner.planning.sampling import sample_plan
 from flex_planner.reports.feedback import feedback_rows, feedback_table, feedback_values
 from flex_planner.reports.motion import plan_rows, Row, table
 
@@ -44,10 +46,7 @@ def add_command(commands: Commands) -> None:
     add = parser.add_argument
     add('--encoder-resolution', type=number_argument, default=RESOLUTION, metavar='RAD',
         help='of the encoders of the joints [rad] (default: %(default).2g, 16 bits)')
-    add('--stiffness-error', type=number_argument, default=0.1, metavar='SHARE',
-        help='by which share the stiffness of links may be off, 0 to 0.5 (default: %(default)g)')
-    add('--payload-error', type=number_argument, default=0.1, metavar='SHARE',
-        help='by which share the payload may be off, 0 to 0.5 (default: %(default)g)')
+    add_errors(parser)
     add_folder(parser)
     parser.set_defaults(run=_gains)
 
@@ -58,10 +57,11 @@ def _gains(options: argparse.Namespace) -> int:
     check_folder(options.output)
 
     require_planar(request.task.arm, 'gains of feedback')
+    errors = given_uncertainty(options, request.uncertainty)
     with translate_errors():
         settings = GainSettings(encoder_resolution=options.encoder_resolution,
-                                stiffness_error=options.stiffness_error,
-                                payload_error=options.payload_error)
+                                stiffness_error=errors.stiffness,
+                                payload_error=errors.payload_error(request.task.payload_mass))
 
     def work(model: ArmModel, monitor: Monitor) -> tuple[Plan, FeedbackGains | None]:
         with translate_errors():
@@ -83,13 +83,21 @@ def _gains(options: argparse.Namespace) -> int:
     if not gains.found:
         print(f'flex-planner: {gains.message}', file=sys.stderr)
         return 1
-    print_files(_write(options, plan, gains))
+    print_files(_write(options, request, plan, gains))
     return 0
 
 
-def _write(options: argparse.Namespace, plan: Plan, gains: FeedbackGains) -> Iterator[Row]:
-    """Write the gains; yield the file as it is written."""
+def _write(options: argparse.Namespace, request: Request, plan: Plan,
+           gains: FeedbackGains) -> Iterator[Row]:
+    """Write the gains, and a recording for a report; yield the files as they are written."""
     options.output.mkdir(parents=True, exist_ok=True)
     path = options.output / f'{file_stem(options.arm)}_gains.yaml'
     path.write_text(format_yaml(feedback_values(gains, plan)), encoding='utf-8')
     yield 'gains', str(path)
+    from flex_planner.cli.recorder import RequestRecorder
+
+    reference = sample_plan(plan, request.sampling)
+    reference = replace(reference, robustness=assess_robustness(
+        plan, reference, uncertainty=request.uncertainty))
+    yield 'recording', str(RequestRecorder(request, options.output / 'recordings').record_plan(
+        plan, reference, gains))

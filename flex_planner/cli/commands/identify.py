@@ -28,9 +28,11 @@ from flex_planner.identification.experiments import Method
 from flex_planner.identification.identification import Identification
 from flex_planner.identification.identify import ALL, identify
 from flex_planner.identification.joint_log import JointLog
+from flex_planner.identification.plan_residuals import find_plan_residuals, PlanResiduals
 from flex_planner.identification.plant_parameters import Quantity
 from flex_planner.logs.csv_log import read_csv_log
 from flex_planner.logs.drive_file import load_drive
+from flex_planner.logs.identified_uncertainty import identification_file
 from flex_planner.logs.recorded_log import read_recorded_logs
 from flex_planner.optimal_control.task import MAX_PAYLOAD
 from flex_planner.reports.arm_file import format_arm_file
@@ -38,6 +40,7 @@ from flex_planner.reports.identification import (
     estimate_table,
     identification_rows,
     plain_identification,
+    plan_residual_rows,
 )
 from flex_planner.reports.motion import table
 
@@ -91,15 +94,16 @@ def _run(options: argparse.Namespace) -> int:
     free = ALL if options.free is None else Quantity.named(
         name.strip() for name in options.free.split(','))
     logs = _read_logs(options, arm)
-    found = _identify(options, arm, logs, drive, mass, free)
+    found, residuals = _identify(options, arm, logs, drive, mass, free)
     note = (f'Identified on {date.today()} from {", ".join(found.logs)}, which it fits to '
             f'{found.best.fit_percent.min():.4g} %, with a payload of {found.payload_mass:.4g} '
             'kg.')
-    print(table(identification_rows(found)))
+    print(table([*identification_rows(found),
+                 *(plan_residual_rows(residuals) if residuals else [])]))
     print(f'\n{estimate_table(found)}\n')
-    details = options.output.with_name(f'{options.output.stem}_identification.yaml')
+    details = identification_file(options.output)
     write_text(options.output, format_arm_file(found.identified_arm(note)))
-    write_text(details, format_yaml(plain_identification(found)))
+    write_text(details, format_yaml(plain_identification(found, residuals)))
     print(table([('arm file', say_file(options.output)), ('details', say_file(details))]))
     return 0
 
@@ -124,8 +128,9 @@ def _read_logs(options: argparse.Namespace, arm: Arm) -> list[JointLog]:
 
 
 def _identify(options: argparse.Namespace, arm: Arm, logs: list[JointLog], drive: Drive | None,
-              mass: float, free: frozenset[Quantity]) -> Identification:
-    """Return the result, showing where the work is; Ctrl-C ends it."""
+              mass: float, free: frozenset[Quantity],
+              ) -> tuple[Identification, PlanResiduals | None]:
+    """Return the result and what plans leave, showing where the work is; Ctrl-C ends it."""
     display = Display(sys.stderr)
     try:
         display.begin(f'fitting {arm.name} to {len(logs)} motions')
@@ -137,8 +142,13 @@ def _identify(options: argparse.Namespace, arm: Arm, logs: list[JointLog], drive
             found = identify(arm, logs, payload_mass=mass, drive=drive, free=free,
                              method=_METHODS.get(options.method), more_modes=options.more_modes,
                              monitor=Monitor(canceled=stopping))
+            residuals = None
+            if drive is not None and not canceled():
+                display.begin('planning again with the arm that was found')
+                residuals = find_plan_residuals(found, logs[0], drive,
+                                                Monitor(canceled=stopping))
     finally:
         display.close()
     if canceled():
         raise CanceledError(f'{SIGNALS.word}; nothing was written')
-    return found
+    return found, residuals

@@ -146,13 +146,13 @@ def _sample(request: Request, plan: Plan) -> tuple[Plan, SampledPlan | None, lis
     reference = sample_plan(plan, request.sampling)
     plan = judge_execution(plan, reference)
     rows = [*motion_rows(plan, peaks(plan, reference.samples)),
-            *execution_rows(reference.execution)]
+            *execution_rows(reference.execution, plan.arm)]
     if plan.solved:
-        robustness = assess_robustness(plan, reference)
+        robustness = assess_robustness(plan, reference, uncertainty=request.uncertainty)
         reference = replace(reference, robustness=robustness)
         rows += robustness_rows(robustness, plan.arm)
         rows += [('warning', warning.sentence) for warning in robustness_warnings(
-            reference.execution, robustness, plan.arm.reach)]
+            reference.execution, robustness, plan.arm.reach, plan.arm)]
     return plan, reference, rows
 
 

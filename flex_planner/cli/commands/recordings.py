@@ -35,7 +35,8 @@ from flex_planner.reports.recording import (
 )
 
 _MOST_SECONDS, _FOLDER = 3600.0, Path('output')
-_NAME = re.compile(r'.+_(\d{8}T\d{6}_\d{9})_(\d{4,})')  # of what nodes and commands record
+# of what nodes and commands record of requests
+_NAME = re.compile(r'(?!motion_).+_(\d{8}T\d{6}_\d{9})_(\d{4,})')
 _NEWEST = ', or a folder of recordings, of which it takes the newest'
 
 

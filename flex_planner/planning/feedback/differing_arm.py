@@ -48,7 +48,7 @@ class Difference:
 
     def __str__(self) -> str:
         """Return it in words."""
-        parts = [f'{name} {share:+.0%}' for name, share in (
+        parts = [f'{name} {100 * share:+.2g}%' for name, share in (
             ('stiffness', self.stiffness), ('payload', self.payload)) if share]
         parts += ['two more modes'] if self.more_modes else []
         return ', '.join(parts) or 'as modelled'
@@ -70,6 +70,8 @@ class Response:
         Of the tip on arrival; infinite if the arm has run away [m].
     peak_torque : float
         Largest share of the torque at standstill that a motor gave.
+    bending : float
+        Largest bending if the joints were locked on arrival; NaN where nobody asked for it [m].
 
     """
 
@@ -77,6 +79,7 @@ class Response:
     residual: float = np.inf
     tip_error: float = np.inf
     peak_torque: float = np.inf
+    bending: float = np.nan
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -133,7 +136,8 @@ class DifferingArm:
         values = np.linalg.eigvals(law.closed_loop(self.linear.free, self.linear.forced))
         return float(np.log(np.abs(values).max()) / law.period)
 
-    def respond(self, law: LinearFeedback, monitor: Monitor | None = None) -> Response:
+    def respond(self, law: LinearFeedback, monitor: Monitor | None = None, *,
+                bending: bool = False) -> Response:
         """
         Return what becomes of the plan under a law, and in the second after it, by simulation.
 
@@ -151,7 +155,8 @@ class DifferingArm:
         tips = tip_position(arm.dynamics.arm, after[:, :arm.dynamics.arm.n_coordinates])
         return Response(growth=growth, residual=peak_to_peak(tips),
                         tip_error=execution.tip_error(after[0]),
-                        peak_torque=float((np.abs(motion.torques) / arm.limits.standstill).max()))
+                        peak_torque=float((np.abs(motion.torques) / arm.limits.standstill).max()),
+                        bending=execution.vibration(after[0]) if bending else np.nan)
 
     def predict_residual(self, law: LinearFeedback, monitor: Monitor | None = None) -> float:
         """Return `Response.residual` as linear equations about the goal have it, in less time."""

@@ -38,7 +38,7 @@ _PACKAGE = 'flex_planner_interfaces'
 _TYPES = f'{_PACKAGE}/msg/'
 _NANOSECOND = 1e-9
 _LIMIT_FIELDS = ('names', 'margins', 'units', 'shares', 'times')
-_WANTED = ('MotionTask', 'PlanReport', 'PayloadSearch', 'FlexibleTrajectory')
+_WANTED = ('MotionTask', 'PlanReport', 'PayloadSearch', 'FlexibleTrajectory', 'FeedbackGains')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -170,6 +170,8 @@ class RecordedRequest:
         The messages MotionTask and PlanReport.
     search : object or None
         The message PayloadSearch, where a maximum payload was asked for.
+    gains : object or None
+        The message FeedbackGains, where gains were looked for.
     joint_names : tuple of str
         As the arm's controller knows them.
     motion : RecordedMotion or None
@@ -188,6 +190,7 @@ class RecordedRequest:
     joint_names: tuple[str, ...]
     motion: RecordedMotion | None
     left_out: tuple[ForeignChannel, ...] = ()
+    gains: Any | None = None
 
     @classmethod
     def read(cls, path: Path | str) -> RecordedRequest:
@@ -216,7 +219,8 @@ class RecordedRequest:
                 path=expand_path(path), arm=arm, settings=settings,
                 task=found.messages['MotionTask'],
                 report=found.messages['PlanReport'], search=found.messages.get('PayloadSearch'),
-                motion=motion, joint_names=_joint_names(settings, arm), left_out=found.left_out)
+                motion=motion, joint_names=_joint_names(settings, arm), left_out=found.left_out,
+                gains=found.messages.get('FeedbackGains'))
             request._check()
             return request
         except (FlexPlannerError, AttributeError, LookupError, OverflowError, TypeError,

@@ -8,6 +8,7 @@ from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.planning.executed_limits import ExecutedSlack
 from flex_planner.planning.execution import ExecutionCertificate, RobustnessReport
 from flex_planner.planning.published_motion import start_ramp
+from flex_planner.planning.uncertainty import ASSUMED_ERROR
 from flex_planner.reports.recording.contents import RecordedMotion, RecordedRequest
 import numpy as np
 
@@ -64,7 +65,10 @@ def recorded_robustness(request: RecordedRequest) -> RobustnessReport | None:
         more_modes=float(report.vibration_if_more_modes),
         stiffness_differs=float(report.vibration_if_stiffness_differs),
         payload_differs=float(report.vibration_if_payload_differs),
-        more_modes_growth=float(report.feedback_growth_if_more_modes))
+        more_modes_growth=float(report.feedback_growth_if_more_modes),
+        # older recordings do not say it
+        stiffness_difference=float(getattr(report, 'stiffness_difference', ASSUMED_ERROR)),
+        payload_difference=float(getattr(report, 'payload_difference', ASSUMED_ERROR)))
 
 
 def _is_told(request: RecordedRequest) -> bool:

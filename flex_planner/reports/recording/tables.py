@@ -16,6 +16,7 @@ from flex_planner.reports.execution import execution_rows, vibrations
 from flex_planner.reports.recording.arm_tables import arm_tables
 from flex_planner.reports.recording.contents import RecordedRequest
 from flex_planner.reports.recording.execution import recorded_execution, recorded_robustness
+from flex_planner.reports.recording.feedback import gain_tables
 from flex_planner.reports.recording.findings import MotionCheck
 from flex_planner.reports.recording.forgiveness import forgiveness_tables
 from flex_planner.reports.recording.frequencies import NaturalFrequencies
@@ -47,7 +48,7 @@ def tables(request: RecordedRequest, check: MotionCheck | None = None,
     found = [_task(request), _outcome(request), *_kinds(request), *_warnings(request.report)]
     if request.solved:
         found += [_certificate(request), *_execution(request)]
-    found += [*limit_tables(request), *forgiveness_tables(request)]
+    found += [*limit_tables(request), *forgiveness_tables(request), *gain_tables(request)]
     if check is not None:
         found.append(check_table(check))
     if request.motion is not None:
@@ -217,7 +218,7 @@ def _execution(request: RecordedRequest) -> list[ReportTable]:
     if certificate is None:
         return []
     found = [ReportTable(title='Published trajectory, carried out', rows=tuple(
-        execution_rows(certificate)))]
+        execution_rows(certificate, request.arm)))]
     if robustness is not None and request.arm.n_modes:
         found.append(ReportTable(title='Residual vibration with feedback if ...', rows=tuple(
             vibrations(robustness))))

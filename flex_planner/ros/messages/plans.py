@@ -81,7 +81,8 @@ ROBUSTNESS_FIELDS = {
     'vibration_if_more_modes': 'more_modes',
     'vibration_if_stiffness_differs': 'stiffness_differs',
     'vibration_if_payload_differs': 'payload_differs',
-    'feedback_growth_if_more_modes': 'more_modes_growth'}
+    'feedback_growth_if_more_modes': 'more_modes_growth',
+    'stiffness_difference': 'stiffness_difference', 'payload_difference': 'payload_difference'}
 _MAX_PLANNING_TIME = 3600.0
 
 
@@ -240,7 +241,7 @@ def add_reference(report: PlanReport, plan: Plan, reference: SampledPlan) -> Non
     add_execution(report, reference)
     if reference.robustness is not None:
         add_warnings(report, [*plan.warnings, *robustness_warnings(
-            reference.execution, reference.robustness, plan.arm.reach)])
+            reference.execution, reference.robustness, plan.arm.reach, plan.arm)])
 
 
 def add_execution(report: PlanReport, reference: SampledPlan) -> None:

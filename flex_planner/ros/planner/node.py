@@ -16,6 +16,7 @@ from flex_planner.ros.messages.classes import WHY_NOT_ROS
 from flex_planner.ros.messages.feedback import feedback_message
 from flex_planner.ros.messages.markers import motion_markers
 from flex_planner.ros.messages.plans import duration_seconds, planning_time_limit
+from flex_planner.ros.motion_recorder import MotionRecorder
 from flex_planner.ros.planner.arm_state import ArmState
 from flex_planner.ros.planner.controller import Controller
 from flex_planner.ros.planner.diagnostics import Diagnostics, Record
@@ -108,8 +109,9 @@ class PlannerNode(Node):  # type: ignore[misc]
         self._arm_state = ArmState(self, self._settings)
         action_name = self._settings.execute_action
         self._controller = Controller(self, action_name) if action_name else None
-        self._planner = RequestPlanner(
-            ArmModel(arm), OutcomeRecorder(arm, self.resolve_topic_name), starts, self._arm_state)
+        recorder = OutcomeRecorder(arm, self.resolve_topic_name)
+        self._motions = MotionRecorder(self, self._settings, recorder.write_motion)
+        self._planner = RequestPlanner(ArmModel(arm), recorder, starts, self._arm_state)
         prepare_robustness(arm)
         self._queue = RequestQueue(self._settings.queue_length, self._settings.max_waiting_time)
         self._joints = self.create_publisher(JointTrajectory, '~/joint_trajectory', LATCHED)
@@ -201,6 +203,7 @@ class PlannerNode(Node):  # type: ignore[misc]
         if outcome.gains is not None:  # first: a controller has them when it begins
             self._gains.publish(feedback_message(outcome.gains, plan, settings.joint_names,
                                                  settings.base_frame))
+        self._motions.begin(outcome.trajectory.joint_trajectory, settings)
         self._joints.publish(outcome.trajectory.joint_trajectory)
         self._flexible.publish(outcome.trajectory)
         self._markers.publish(markers)
@@ -224,6 +227,7 @@ class PlannerNode(Node):  # type: ignore[misc]
     def destroy_node(self) -> Any:
         """Stop the streamer and the worker, then the node."""
         self._streamer.close()
+        self._motions.close()
         if not self._queue.close(_STOP_TIMEOUT):
             self._planner.abandon()
         # or the node would go on within them: others would hear of it until its lease is over, and

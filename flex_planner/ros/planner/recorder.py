@@ -28,7 +28,9 @@ from flex_planner.recording import (
     Topic,
 )
 from flex_planner.ros.messages.classes import MotionTask, PlanReport, TYPES
+from flex_planner.ros.messages.feedback import feedback_message
 from flex_planner.ros.messages.plans import reference_state
+from flex_planner.ros.motion_recorder import in_order, RecordedMotion
 from flex_planner.ros.planner.outcome import Outcome
 from flex_planner.ros.planner.request_state import RequestState
 from flex_planner.ros.settings.fields import as_mapping
@@ -36,7 +38,9 @@ from flex_planner.ros.settings.planner import PlannerSettings
 
 # the groups sort by the time of the request
 NAME: Final = re.compile(
-    r'(?:plan_path|find_max_payload|execution)_(\d{8}T\d{6}_\d{9})_(\d{4,})')
+    r'(?:plan_path|find_max_payload|execution|motion)_(\d{8}T\d{6}_\d{9})_(\d{4,})')
+
+JOINT_STATE: Final = 'sensor_msgs/msg/JointState'
 
 _LOG = logging.getLogger(__name__)
 
@@ -73,8 +77,8 @@ class OutcomeRecorder:
                              'trajectory_msgs/msg/JointTrajectory', LATCHED)
         self._flexible = Topic(name('flexible_trajectory'),
                                f'{interfaces}FlexibleTrajectory', LATCHED)
-        self._states = Topic(name('reference_states'), 'sensor_msgs/msg/JointState',
-                             DEFAULT)
+        self._gains = Topic(name('feedback_gains'), f'{interfaces}FeedbackGains', LATCHED)
+        self._states = Topic(name('reference_states'), JOINT_STATE, DEFAULT)
 
     def write(self, task: MotionTask, state: RequestState, outcome: Outcome) -> Path:
         """
@@ -114,6 +118,10 @@ class OutcomeRecorder:
             if outcome.plan is not None and outcome.reference is not None:
                 recording.write(self._joints, outcome.trajectory.joint_trajectory, ready)
                 recording.write(self._flexible, outcome.trajectory, ready)
+                if outcome.gains is not None:
+                    recording.write(self._gains, feedback_message(
+                        outcome.gains, outcome.plan, settings.joint_names, settings.base_frame),
+                        ready)
                 self._write_states(recording, state, outcome.plan, outcome.reference, ready)
         _remove_old(settings, path)
         return path
@@ -138,6 +146,40 @@ class OutcomeRecorder:
             recording.write(self._task, task, now)
             recording.write(self._report, report, now)
         _remove_old(settings, path)
+
+    def write_motion(self, motion: RecordedMotion, states_topic: str) -> Path:
+        """
+        Write a recording of what the arm said of a motion, and return its folder.
+
+        Parameters
+        ----------
+        motion : RecordedMotion
+            The motion.
+        states_topic : str
+            Full name of the topic of the joint states.
+
+        Raises
+        ------
+        RecordingError
+            If it cannot be written; nothing is left behind then.
+
+        """
+        settings, began = motion.settings, motion.began_ns
+        path = settings.output_folder() / self._name(time.time_ns(), 'motion')
+        topic = Topic(states_topic, JOINT_STATE, DEFAULT)
+        definition = TYPES.definition(JOINT_STATE)
+        with Recording.create(path.parent, path.name, TYPES,
+                              custom_data={'flex_planner': VERSION}) as recording:
+            recording.attach('scenario.yaml', self._scenario(settings).encode(),
+                             media_type='application/yaml', time_ns=began)
+            before, after = in_order(motion.states, began)
+            for received, data in before:
+                recording.copy(topic, definition, data, received)
+            recording.write(self._joints, motion.trajectory, began)
+            for received, data in after:
+                recording.copy(topic, definition, data, received)
+        _remove_old(settings, path)
+        return path
 
     def _write_states(self, recording: Recording, state: RequestState, plan: Plan,
                       reference: SampledPlan, ready: int) -> None:

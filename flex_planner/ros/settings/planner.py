@@ -144,6 +144,11 @@ class PlannerSettings:
     recording_folder: str = parameter_field(
         '', 'Folder of the recordings; empty for $ROS_HOME/flex_planner.', read_only=True)
     record: bool = parameter_field(True, 'Whether to record every request with its outcome.')
+    record_motions: bool = parameter_field(
+        False, 'Whether to record the joint states of every motion that is published, too: logs '
+        'for flex-planner identify.', read_only=True)
+    motion_settling: float = parameter_field(
+        1.0, 'How long such a recording goes on after the motion [s].', lowest=0.0, highest=60.0)
     max_recording_size: int = parameter_field(
         0, 'Size at which a recording continues in another file, at least 65536 [bytes]; 0: '
         'recordings are never split.', lowest=0, highest=MAX_RECORDING_SIZE)

@@ -1,0 +1,134 @@
+"""What a plan leaves behind on arms that differ from its model, under a joint controller."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from flex_planner.arms.planar_only import require_planar
+from flex_planner.base.errors import InvalidTaskError, NoEquilibriumError
+from flex_planner.base.progress import Monitor
+from flex_planner.control.joint_controller import JointController
+from flex_planner.control.linear_feedback import LinearFeedback, pd_feedback
+from flex_planner.planning.execution import Execution, UNSTABLE_GROWTH
+from flex_planner.planning.feedback.differing_arm import (
+    course_of,
+    Difference,
+    DifferingArm,
+    Response,
+)
+from flex_planner.planning.feedback.find_gains import RESOLUTION
+from flex_planner.planning.plan import Plan
+from flex_planner.planning.uncertainty import ASSUMED, Uncertainty
+import numpy as np
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Residuals:
+    """
+    What is left of a motion on several arms.
+
+    Attributes
+    ----------
+    controller : JointController
+        That the figures hold for.
+    uncertainty : Uncertainty
+        That the arms stand for.
+    differences : tuple of Difference
+        Of the arms: none, errors of stiffness and of the payload one by one and together, two
+        more modes per link, and these with the softest and heaviest arm.
+    responses : tuple of Response
+        Of each of them.
+
+    """
+
+    controller: JointController
+    uncertainty: Uncertainty
+    differences: tuple[Difference, ...]
+    responses: tuple[Response, ...]
+
+    @property
+    def stable(self) -> bool:
+        """Return whether no arm shakes at the goal or runs away."""
+        return all(one.growth <= UNSTABLE_GROWTH and np.isfinite(one.residual)
+                   for one in self.responses)
+
+    @property
+    def worst(self) -> float:
+        """Return the largest motion of the tip after the arrival; infinite if not stable [m]."""
+        return max(one.residual for one in self.responses) if self.stable else float(np.inf)
+
+
+def list_differences(plan: Plan, uncertainty: Uncertainty) -> tuple[Difference, ...]:
+    """Return what is looked at, see `Residuals`; what the arm or the task lacks is left out."""
+    given = plan.problem.parameters
+    stiffness = uncertainty.stiffness if plan.arm.n_passive else 0.0
+    payload = (uncertainty.payload_error(float(given.payload_mass))
+               if given.payload_mass or given.payload_inertia else 0.0)
+    errors = [(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1), (1, -1), (1, 1), (-1, -1), (-1, 1)]
+    found = [Difference(stiffness=a * stiffness, payload=b * payload) for a, b in errors]
+    if plan.arm.n_passive:
+        found += [Difference(more_modes=True), replace(found[-1], more_modes=True)]
+    return tuple(dict.fromkeys(found))
+
+
+def find_residuals(plan: Plan, controller: JointController, *,
+                   uncertainty: Uncertainty = ASSUMED, resolution: float = RESOLUTION,
+                   law: LinearFeedback | None = None,
+                   monitor: Monitor | None = None) -> Residuals:
+    """
+    Return what a plan leaves behind on arms that differ from its model.
+
+    Each arm carries the whole plan out in simulation, and is watched for a second after the
+    arrival, with encoders that round, and motors within their limits.
+
+    Parameters
+    ----------
+    plan : Plan
+        Solved, of a planar arm, ending at rest.
+    controller : JointController
+        Its gains, rate, and how it holds efforts.
+    uncertainty : Uncertainty
+        Of the arm.
+    resolution : float
+        Of the encoders [rad].
+    law : LinearFeedback, optional
+        In place of the PD of the controller's gains.
+    monitor : Monitor, optional
+        May stop it.
+
+    Raises
+    ------
+    InvalidTaskError
+        If the plan is not solved, or does not end at rest.
+    PlanarOnlyError
+        If the arm is a spatial one.
+    StoppedError
+        If the monitor stopped it.
+
+    """
+    require_planar(plan.arm, 'residuals on other arms')
+    if not plan.solved or not plan.task.ends_at_rest:
+        raise InvalidTaskError('residuals on other arms are those of a plan that is solved and '
+                               f'ends at rest: {plan.message}')
+    differences = list_differences(plan, uncertainty)
+    used = law or pd_feedback(controller.gains, controller.rate)
+    return Residuals(
+        controller=controller, uncertainty=uncertainty, differences=differences,
+        responses=tuple(_respond(plan, controller, used, differences, resolution, monitor)))
+
+
+def _respond(plan: Plan, controller: JointController, law: LinearFeedback,
+             differences: Sequence[Difference], resolution: float,
+             monitor: Monitor | None) -> list[Response]:
+    """Return what becomes of the plan on every arm; nothing of one that buckles."""
+    nominal, course = Execution.of(plan, controller), course_of(plan, controller)
+    found = []
+    for difference in differences:
+        try:
+            arm = DifferingArm.of(nominal, plan, course, difference, resolution)
+        except NoEquilibriumError:
+            found.append(Response(growth=np.inf))
+            continue
+        found.append(arm.respond(law, monitor, bending=True))
+    return found

@@ -1,0 +1,66 @@
+"""What a plan leaves behind on arms that differ is what the search for gains saw of the PD."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from factories import PlanFactory
+from flex_planner.base.errors import InvalidTaskError, InvalidValueError
+from flex_planner.control.joint_controller import Gains, JointController
+from flex_planner.planning.feedback.differing_arm import Difference
+from flex_planner.planning.feedback.find_gains import find_feedback_gains, GainSettings
+from flex_planner.planning.plan import Plan, PlanStatus
+from flex_planner.planning.residuals import find_residuals, Residuals
+from flex_planner.planning.sampling import sample_plan, SamplingSettings
+from flex_planner.planning.uncertainty import Uncertainty
+import pytest
+
+PD = JointController(gains=Gains.of(2, 100.0, 10.0))
+
+
+@pytest.fixture(scope='module')
+def plan(plan_of: PlanFactory) -> Plan:
+    return plan_of('ei5')
+
+
+@pytest.fixture(scope='module')
+def found(plan: Plan) -> Residuals:
+    return find_residuals(plan, PD)
+
+
+def test_figures_are_those_that_gains_were_tried_with(plan: Plan, found: Residuals) -> None:
+    given = find_feedback_gains(plan, GainSettings(controller=PD))
+    assert given.given is not None
+    known = dict(zip(found.differences, found.responses, strict=True))
+    assert len(known) == 11 and found.stable
+    for difference, response in zip(given.differences, given.given.responses, strict=True):
+        assert known[difference].residual == response.residual
+    assert found.worst == max(one.residual for one in found.responses)
+    # of another simulation, without encoders that round
+    nominal = sample_plan(plan, SamplingSettings(controller=PD)).execution
+    assert known[Difference(stiffness=-0.1)].bending > 50 * nominal.residual_vibration
+
+
+def test_smaller_errors_leave_less(plan: Plan, found: Residuals) -> None:
+    known = find_residuals(plan, PD, uncertainty=Uncertainty(stiffness=0.01, payload=0.01))
+    assert known.worst < 0.2 * found.worst
+
+
+def test_payload_that_was_not_identified_may_be_off_by_a_tenth() -> None:
+    known = Uncertainty(stiffness=0.01, payload=0.02, payload_mass=1.1)
+    assert known.payload_error(1.1) == known.payload_error(1.11) == 0.02
+    assert known.payload_error(1.0) == 0.1
+    assert Uncertainty(payload=0.3).payload_error(7.0) == 0.3
+
+
+def test_controller_that_shakes_an_arm_is_told(plan: Plan) -> None:
+    firm = JointController(gains=Gains.of(2, 100.0, 10.0), rate=100.0)
+    found = find_residuals(plan, firm)
+    assert not found.stable and found.worst == float('inf')
+
+
+def test_what_cannot_be_is_refused(plan: Plan) -> None:
+    with pytest.raises(InvalidValueError, match='stiffness_error is 0.7'):
+        Uncertainty(stiffness=0.7)
+    with pytest.raises(InvalidTaskError, match='solved'):
+        find_residuals(replace(plan, status=PlanStatus.NOT_FOUND), PD)
