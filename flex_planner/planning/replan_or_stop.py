@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 from flex_planner.base.progress import Monitor
@@ -15,6 +15,8 @@ from numpy.typing import ArrayLike
 
 # of a delay that is rounding [s]
 _SAME_TIME = 1e-9
+# of the time that there is, for the goal, where a stop may be needed
+_FIRST_SHARE = 0.6
 
 
 class Course(Enum):
@@ -67,7 +69,7 @@ def replan_or_stop(plan: Plan, at: float, *, state: ArrayLike | None = None,
     Parameters
     ----------
     plan, at, state, goal, duration, keep_time, torque_rate_weight, budget, monitor
-        As of `replan`; without a monitor the stop has the budget once more.
+        As of `replan`; the stop has what is left of the budget, at least 40 %.
     stops : bool
         Whether to stop where the goal is not reached; otherwise the plan goes on.
 
@@ -77,8 +79,11 @@ def replan_or_stop(plan: Plan, at: float, *, state: ArrayLike | None = None,
         As by `replan`.
 
     """
+    watch = monitor or budgeted(budget)
+    share = _FIRST_SHARE if stops else 1.0
+    first = replace(watch, time_limit=watch.elapsed + share * (watch.time_limit - watch.elapsed))
     again = replan(plan, at, state=state, goal=goal, duration=duration, keep_time=keep_time,
-                   torque_rate_weight=torque_rate_weight, monitor=monitor or budgeted(budget))
+                   torque_rate_weight=torque_rate_weight, monitor=first)
     if again.solved:
         late = again.delay > _SAME_TIME
         return Continuation(
@@ -91,7 +96,7 @@ def replan_or_stop(plan: Plan, at: float, *, state: ArrayLike | None = None,
     if not stops:
         return failed
     stop = stop_on_path(plan, at, state=state, torque_rate_weight=torque_rate_weight,
-                        monitor=monitor or budgeted(budget))
+                        monitor=watch)
     if not stop.solved:
         return failed
     return Continuation(course=Course.STOPS, plan=stop.plan, torque_step=stop.torque_step,

@@ -234,8 +234,8 @@ def _close_enough(plan: Plan, settings: SamplingSettings, execution: Execution,
     vibration = execution.vibration(exact)
     for refinement in range(_REFINEMENTS + 1):
         tolerance = settings.torque_tolerance * _FACTOR**refinement
-        sampled = _sampled(motion, execution.controller,
-                           *point_times(motion, settings.longest_step, tolerance, watch))
+        sampled = take_samples(motion, execution.controller, *point_times(
+            motion, settings.longest_step, tolerance, watch))
         arrived = replace(execution, goal=execution.tip(exact))
         state = arrived.arrive(sampled.reference, watch)
         more = abs(arrived.vibration(state) - vibration)
@@ -245,9 +245,23 @@ def _close_enough(plan: Plan, settings: SamplingSettings, execution: Execution,
     return sampled
 
 
-def _sampled(motion: PublishedMotion, controller: JointController, times: Array,
-             error: float) -> SampledPlan:
-    """Return the samples at given times, from 0 to the end of the motion."""
+def take_samples(motion: PublishedMotion, controller: JointController, times: Array,
+                 error: float) -> SampledPlan:
+    """
+    Return samples of a motion that nobody has looked at yet.
+
+    Parameters
+    ----------
+    motion : PublishedMotion
+        Of n joints.
+    controller : JointController
+        That gets them.
+    times : numpy.ndarray, shape (k,)
+        From 0 to the end of the motion [s].
+    error : float
+        Of linear interpolation of the efforts between them [N m].
+
+    """
     plan, times_ns = motion.plan, np.round(times * 1e9).astype(np.int64)
     inside = np.minimum(times_ns * 1e-9, motion.end)
     hold_ns = round(motion.hold_delay * 1e9)

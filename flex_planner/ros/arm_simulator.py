@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 import time
 
 from builtin_interfaces.msg import Time
@@ -17,6 +18,7 @@ from flex_planner.ros.arm_picture import ArmPicture
 from flex_planner.ros.messages.feedback import law_from_message
 from flex_planner.ros.messages.plans import duration_seconds
 from flex_planner.ros.messages.points import point_message
+from flex_planner.ros.messages.times import time_ns
 from flex_planner.ros.messages.trajectory_rules import range_violations, trajectory_violations
 from flex_planner.ros.runtime.elapsed import ElapsedTime
 from flex_planner.ros.runtime.parameters import (
@@ -136,23 +138,36 @@ class ArmSimulator(Node):  # type: ignore[misc]
         if refusal:
             self.get_logger().error(printable(f'trajectory refused: {refusal}'))
             return
-        reference = _reference(trajectory, self._settings.joint_names)
-        self._plant.follow(reference.after(*self._plant.shown_state, self._plant.torque))
-        self._watch.expect(self._plant.time + reference.times[-1])
+        reference, passed = _reference(trajectory, self._settings.joint_names), self._passed_of(
+            trajectory)
+        if passed < 0:  # led there from where the arm is, as a controller does
+            reference = replace(reference, times=reference.times - passed)
+        self._plant.follow(reference.after(*self._plant.shown_state, self._plant.torque),
+                           max(passed, 0.0))
+        self._watch.expect(self._plant.time + reference.times[-1] - max(passed, 0.0))
         self.get_logger().info(f'following a trajectory of {len(trajectory.points)} points')
 
     def _refusal(self, trajectory: JointTrajectory) -> str:
         """Return the reason why a trajectory cannot be followed, empty if it can."""
-        broken = (trajectory_violations(trajectory, self._settings.joint_names)
+        broken = (trajectory_violations(trajectory, self._settings.joint_names, stamped=True)
                   or range_violations(trajectory))
         if broken:
             return '; '.join(broken[:3])
-        start = _reference(trajectory, self._settings.joint_names).positions[0]
+        passed = self._passed_of(trajectory)
+        reference = _reference(trajectory, self._settings.joint_names)
+        if passed > reference.times[-1]:
+            return f'it ended {passed - reference.times[-1]:.3f} s ago by its stamp'
+        start, _ = reference.motion(max(passed, float(reference.times[0])))
         distance = float(np.abs(start - self._plant.shown_state[0]).max())
         if distance > self._settings.start_tolerance:
             return (f'it starts {distance:.3f} rad away from the arm, more than start_tolerance '
                     f'= {self._settings.start_tolerance:g} rad')
         return ''
+
+    def _passed_of(self, trajectory: JointTrajectory) -> float:
+        """Return for how long a trajectory lasts by its stamp, below 0 if it begins later [s]."""
+        stamp = time_ns(trajectory.header.stamp)
+        return (self.get_clock().now().nanoseconds - stamp) * 1e-9 if stamp else 0.0
 
     def _on_timer(self) -> None:
         """Bring the arm up to now."""

@@ -10,12 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+import struct
 import threading
 from typing import Any
 
 from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.text import printable
 from flex_planner.ros.messages.plans import duration_seconds
+from flex_planner.ros.messages.times import time_ns
 from flex_planner.ros.runtime.polled_topic import PolledTopic
 from flex_planner.ros.settings.planner import PlannerSettings
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
@@ -26,6 +28,7 @@ from sensor_msgs.msg import JointState
 _PERIOD = 0.05  # [s]
 _BEFORE_NS = 500_000_000
 _MOST = 200_000  # joint states of a recording, as a log for an identification may have
+_LATEST_NS = 5_000_000_000  # by which an arm may be late, as a simulated one is on a busy machine
 _LEAVING = 0.5  # [s], for the last recording when the node ends
 
 
@@ -52,6 +55,17 @@ class RecordedMotion:
     began_ns: int
     end_ns: int
     states: list[tuple[int, bytes]] = field(default_factory=list)
+
+    def is_over(self, now_ns: int) -> bool:
+        """Return whether nothing more is to be recorded."""
+        # a clock that was set back never comes to the end
+        if not self.began_ns <= now_ns < self.end_ns + _LATEST_NS or len(self.states) >= _MOST:
+            return True
+        return now_ns >= self.end_ns and not self._is_late()
+
+    def _is_late(self) -> bool:
+        """Return whether the last state is one of the motion by its stamp, and not of its end."""
+        return bool(self.states) and self.began_ns <= _stamp_ns(self.states[-1][1]) < self.end_ns
 
 
 class MotionRecorder:
@@ -93,10 +107,11 @@ class MotionRecorder:
         with self._lock:
             self._end()
             now = self._now()
+            begin = time_ns(trajectory.header.stamp) or now
             passes = duration_seconds(trajectory.points[-1].time_from_start)
             self._motion = RecordedMotion(
                 settings, trajectory, now,
-                now + int((passes + settings.motion_settling) * 1e9), list(self._recent))
+                begin + int((passes + settings.motion_settling) * 1e9), list(self._recent))
 
     def listen(self) -> None:
         """Take the messages that have come."""
@@ -109,8 +124,7 @@ class MotionRecorder:
             if motion is None:
                 return
             motion.states += taken
-            # a clock that was set back never comes to the end
-            if not motion.began_ns <= now < motion.end_ns or len(motion.states) >= _MOST:
+            if motion.is_over(now):
                 self._end()
 
     def close(self) -> None:
@@ -148,6 +162,13 @@ class MotionRecorder:
 
     def _now(self) -> int:
         return int(self._node.get_clock().now().nanoseconds)
+
+
+def _stamp_ns(data: bytes) -> int:
+    """Return the stamp of a message in CDR that begins with a header [ns]."""
+    order = '<' if data[1] & 1 else '>'
+    seconds, rest = struct.unpack_from(f'{order}iI', data, 4)
+    return int(seconds) * 10**9 + int(rest)
 
 
 def in_order(states: Sequence[tuple[int, bytes]], began_ns: int) -> tuple[

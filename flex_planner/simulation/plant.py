@@ -139,7 +139,7 @@ class Plant:
             rtol=RTOL, atol=ATOL) for _, length in self._parts]
         # the torques on their way, the latest one first
         self._commands = deque([self.torque], maxlen=self._parts[0][0] + 1)
-        self._ticks = self._began = 0
+        self._ticks, self._began = 0, 0.0
         self._reference = JointReference.hold(shown, self.torque)
         self._moves = False
         self._law: LinearFeedback | None = None
@@ -185,10 +185,23 @@ class Plant:
         self._law = law
         self._law_state = np.zeros(0 if law is None else law.order)
 
-    def follow(self, reference: JointReference) -> None:
-        """Follow a reference from now on."""
-        self._law_state = np.zeros_like(self._law_state)
-        self._reference, self._began, self._moves = reference, self._ticks, True
+    def follow(self, reference: JointReference, passed: float = 0.0) -> None:
+        """
+        Follow a reference from now on.
+
+        Parameters
+        ----------
+        reference : JointReference
+            From time 0.
+        passed : float
+            Of it by now, where it goes on with what the arm follows already: a law keeps what it
+            knows of the arm then; 0 for a new motion [s].
+
+        """
+        if not passed:
+            self._law_state = np.zeros_like(self._law_state)
+        self._reference, self._moves = reference, True
+        self._began = self._ticks - passed / self.period
 
     def advance(self, until: float, observe: Callable[[Plant], None] | None = None) -> None:
         """

@@ -16,6 +16,7 @@ from flex_planner.ros.planner.recorder import OutcomeRecorder
 from flex_planner.ros.settings.planner import PlannerSettings
 import numpy as np
 import pytest
+from rclpy.serialization import serialize_message
 from ros_support import Client
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -95,3 +96,16 @@ def test_failure_to_write_is_logged_and_no_more(capfd: pytest.CaptureFixture[str
         arena.recorder.begin(trajectory(0.1), arena.settings)
         arena.recorder.close()
         assert 'the motion is not recorded: the disk is full' in capfd.readouterr().err
+
+
+def test_recording_waits_for_an_arm_that_is_late() -> None:
+    def motion(seconds: float) -> RecordedMotion:
+        state = JointState()
+        state.header.stamp.sec, state.header.stamp.nanosec = divmod(round(seconds * 1e9), 10**9)
+        return RecordedMotion(settings=None, trajectory=None, began_ns=10**10,  # type: ignore
+                              end_ns=11 * 10**9, states=[(0, serialize_message(state))])
+
+    late, there, stampless = motion(10.9), motion(11.0), motion(0.0)
+    assert [one.is_over(round(11.1e9)) for one in (late, there, stampless)] == [False, True, True]
+    assert not there.is_over(round(10.9e9))  # by its own clock it is not over
+    assert late.is_over(round(16.1e9))

@@ -17,6 +17,8 @@ from typing import NamedTuple
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from factories import PlanFactory
 from flex_planner.planning.sampling import sample_plan, SampledPlan, SamplingSettings
+from flex_planner.ros.messages.plans import joint_trajectory
+from flex_planner.ros.planner.running_plan import Track
 from flex_planner.ros.planner.streamer import Streamer
 from flex_planner.ros.reference_states import ReferenceStates, Stream, StreamedPlan
 from flex_planner.ros.settings.planner import PlannerSettings
@@ -343,13 +345,18 @@ def streamer_of(monkeypatch: pytest.MonkeyPatch, node: FakeNode,
     return Streamer(node)  # type: ignore[arg-type]
 
 
+def track_of(reference: SampledPlan) -> Track:
+    """Return what is published of a plan."""
+    return Track.of(reference, joint_trajectory(reference, ['joint1', 'joint2']), 0)
+
+
 @pytest.mark.parametrize('dead', [FakeProcess(BrokenPipe()), FakeProcess(io.BytesIO(), 1)])
 def test_plan_is_not_lost_where_the_process_is_gone_or_dies_just_then(
         monkeypatch: pytest.MonkeyPatch, plan_of: PlanFactory, dead: FakeProcess) -> None:
     sent, node, plan = io.BytesIO(), FakeNode(), plan_of('ei50')
     reference = sample_plan(plan, SamplingSettings())
     streamer = streamer_of(monkeypatch, node, dead, FakeProcess(sent))
-    streamer.start(plan, reference, PlannerSettings.for_arm(plan.arm))
+    streamer.start(plan, track_of(reference), PlannerSettings.for_arm(plan.arm))
     assert pickle.loads(sent.getvalue()).times_ns.tolist() == reference.times_ns.tolist()
     assert node.said == [AGAIN]
 
@@ -359,7 +366,7 @@ def test_process_that_dies_again_does_not_spoil_the_plan(monkeypatch: pytest.Mon
     node, plan = FakeNode(), plan_of('ei50')
     dead = [FakeProcess(BrokenPipe()) for _ in range(2)]
     streamer = streamer_of(monkeypatch, node, *dead)
-    streamer.start(plan, sample_plan(plan, SamplingSettings()),
+    streamer.start(plan, track_of(sample_plan(plan, SamplingSettings())),
                    PlannerSettings.for_arm(plan.arm))
     assert node.said == [AGAIN, 'the plan is not streamed: Broken pipe']
 

@@ -15,7 +15,7 @@ PACKAGE: Final = 'flex_planner_interfaces'
 TYPES: Final = MessageTypes.load([definition_folder(PACKAGE)])
 
 try:
-    from builtin_interfaces.msg import Duration
+    from builtin_interfaces.msg import Duration, Time
     from flex_planner_interfaces.msg import (
         FeedbackGains,
         FlexiblePoint,
@@ -39,6 +39,7 @@ except ImportError as _error:
     WHY_NOT_ROS = str(_error)
     _find: Any = StandIns(TYPES).find
     Duration = _find('builtin_interfaces/msg/Duration')
+    Time = _find('builtin_interfaces/msg/Time')
     FeedbackGains = _find(f'{PACKAGE}/msg/FeedbackGains')
     FlexiblePoint = _find(f'{PACKAGE}/msg/FlexiblePoint')
     FlexibleTrajectory = _find(f'{PACKAGE}/msg/FlexibleTrajectory')
@@ -63,5 +64,6 @@ __all__ = [
     'PlanReport',
     'Point',
     'TYPES',
+    'Time',
     'WHY_NOT_ROS',
 ]

@@ -4,27 +4,16 @@ from __future__ import annotations
 
 import copy
 
-from flex_planner.base.errors import FlexPlannerError, InvalidTaskError, InvalidValueError
+from flex_planner.base.errors import InvalidTaskError, InvalidValueError
 from flex_planner.base.validation import Array
 from flex_planner.ros.messages.classes import MotionTask
+from flex_planner.ros.messages.request_error import RequestError
 
 _ARRAYS = ('start_positions', 'start_velocities', 'start_modal_displacements')
 
 
-class ArmStateError(FlexPlannerError):
-    """
-    The arm is not where a plan starts, or nobody knows where it is.
-
-    Attributes
-    ----------
-    code : int
-        Of PlanReport.
-
-    """
-
-    def __init__(self, code: int, sentence: str) -> None:
-        super().__init__(sentence)
-        self.code = code
+class ArmStateError(RequestError):
+    """The arm is not where a plan starts, or nobody knows where it is."""
 
 
 def starts_at_arm(message: MotionTask) -> bool:

@@ -39,8 +39,8 @@ from flex_planner.ros.messages.classes import (
     MotionTask,
     PlanReport,
 )
-from flex_planner.ros.messages.measured_starts import ArmStateError
 from flex_planner.ros.messages.points import point_coordinates, point_message
+from flex_planner.ros.messages.request_error import RequestError
 from flex_planner.ros.messages.robustness import add_robustness, robustness_from_message
 from flex_planner.ros.messages.spaces import SPACES
 from flex_planner.ros.messages.via_points import via_points_from_message
@@ -162,7 +162,7 @@ def _ends(message: MotionTask, arm: Arm, settings: PlannerSettings) -> dict[str,
 
 def error_code(error: Exception) -> int:
     """Return the code of PlanReport for an exception."""
-    if isinstance(error, ArmStateError):
+    if isinstance(error, RequestError):
         return error.code
     return next((code for kind, code in ERROR_CODES if isinstance(error, kind)),
                 int(PlanReport.UNKNOWN))

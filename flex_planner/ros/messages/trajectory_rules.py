@@ -21,7 +21,8 @@ _STILL = float(np.finfo(np.float32).eps)
 _LARGEST = (MAX_JOINT_ANGLE, 'rad'), (MAX_VELOCITY, 'rad/s'), (1e7, 'rad/s^2'), (1e7, 'N m')
 
 
-def trajectory_violations(trajectory: Any, joint_names: Sequence[str]) -> list[str]:
+def trajectory_violations(trajectory: Any, joint_names: Sequence[str], *,
+                          stamped: bool = False) -> list[str]:
     """
     Return a sentence for each rule that a joint trajectory breaks; none if it is accepted.
 
@@ -31,13 +32,16 @@ def trajectory_violations(trajectory: Any, joint_names: Sequence[str]) -> list[s
         Or anything with its fields.
     joint_names : sequence of str
         Joints of the controller; their order does not matter.
+    stamped : bool
+        Whether the motion may begin at a given time; otherwise it begins on arrival.
 
     """
     found = []
     if sorted(trajectory.joint_names) != sorted(joint_names):
         found.append(f'joint_names is {shown_value(list(trajectory.joint_names))}, but must be a '
                      f'permutation of {shown_value(list(joint_names))}')
-    if trajectory.header.stamp.sec or trajectory.header.stamp.nanosec:
+    stamp = trajectory.header.stamp
+    if not stamped and (stamp.sec or stamp.nanosec):
         found.append('header.stamp must be 0, which starts the motion on arrival')
     if not trajectory.points:
         return [*found, 'points must not be empty']

@@ -6,11 +6,13 @@ from collections.abc import Callable
 from contextlib import suppress
 import threading
 import time
+from typing import Any
 
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.validation import Array
 from flex_planner.optimal_control.task import Task
 from flex_planner.ros.messages.measured_starts import ArmStateError
+from flex_planner.ros.messages.measured_states import AngleTrack
 from flex_planner.ros.planner.measured_joints import JointReading, MeasuredJoints
 from flex_planner.ros.settings.planner import PlannerSettings
 from flex_planner_interfaces.msg import PlanReport
@@ -36,6 +38,36 @@ class _Polled(MutuallyExclusiveCallbackGroup):  # type: ignore[misc]
         return False
 
 
+class Latest:
+    """
+    The latest message of a topic, which the executor has nothing to do with.
+
+    Parameters
+    ----------
+    node : Node
+        That listens.
+    kind : type
+        Of the messages.
+    topic : str
+        Its name.
+
+    """
+
+    def __init__(self, node: Node, kind: Any, topic: str) -> None:
+        self._kind, self._message, self._lock = kind, None, threading.Lock()
+        self._subscription = node.create_subscription(
+            kind, topic, lambda message: None,
+            QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT),
+            callback_group=_Polled())
+
+    def take(self) -> Any:
+        """Return it, None if there was none; from any thread."""
+        with self._lock, self._subscription.handle:
+            while (taken := self._subscription.handle.take_message(self._kind, False)) is not None:
+                self._message = taken[0]
+            return self._message
+
+
 class ArmState:
     """
     Listens to the joint states of the arm and compares plans with them.
@@ -46,6 +78,11 @@ class ArmState:
         The planner; its clock tells how old a state is.
     settings : PlannerSettings
         With the topic and the names of the joints.
+
+    Attributes
+    ----------
+    angles : AngleTrack
+        Of the last moments.
 
     Raises
     ------
@@ -58,6 +95,7 @@ class ArmState:
         self._node, self._lock, self._warned = node, threading.Lock(), False
         topic, self._subscription = settings.joint_states_topic, None
         self._joints = MeasuredJoints(settings.joint_names, topic)
+        self.angles = AngleTrack(settings.joint_names)
         if not topic:
             return
         try:
@@ -158,6 +196,7 @@ class ArmState:
 
     def _hear(self, message: JointState) -> None:
         self._joints.hear(message, self._now())
+        self.angles.hear(message)
 
     def _read(self, settings: PlannerSettings) -> JointReading:
         self.listen()

@@ -55,7 +55,7 @@ class Controller:
         self._link = ActionLink(
             name, client, FollowJointTrajectory.Goal,
             lambda: int(node.get_clock().now().nanoseconds), self._describe_absence)
-        self._executions: list[Execution] = []
+        self._executions: dict[Execution, str] = {}
         node.create_timer(_PERIOD, self._advance, group, Clock(clock_type=ClockType.STEADY_TIME))
 
     @property
@@ -64,7 +64,8 @@ class Controller:
         return bool(self._executions)
 
     def start(self, trajectory: JointTrajectory, timeout: float, executor: Executor,
-              on_accepted: Callable[[], None]) -> Execution:
+              on_accepted: Callable[[], None], *, replaces: str = '',
+              plan_id: str = '') -> Execution:
         """
         Let the controller carry out a plan.
 
@@ -78,10 +79,23 @@ class Controller:
             Runs what awaits the end.
         on_accepted : callable
             Called once the controller has accepted the plan.
+        replaces, plan_id : str
+            Identifier of the plan that it replaces in motion, if any, and its own.
 
         """
-        execution = Execution(self._link, trajectory, timeout, executor, on_accepted)
-        self._executions.append(execution)
+        old = [one for one, name in self._executions.items() if replaces and name == replaces]
+
+        def accept() -> None:
+            for one in old:
+                one.end_replaced()
+            on_accepted()
+
+        execution = Execution(self._link, trajectory, timeout, executor, accept)
+        self._executions[execution] = plan_id
+        for one in old:
+            one.replaced = True
+        execution.future.add_done_callback(lambda _: _keep(old, execution))
+        execution.advance()
         return execution
 
     def close(self) -> None:
@@ -108,7 +122,13 @@ class Controller:
         for execution in list(self._executions):
             execution.advance()
             if execution.future.done():
-                self._executions.remove(execution)
+                del self._executions[execution]
+
+
+def _keep(old: list[Execution], new: Execution) -> None:
+    """Let plans go on that a new one should have replaced, which was not accepted."""
+    for one in old:
+        one.replaced = one.replaced and new.future.result().accepted
 
 
 def _check_topic(node: Node, action: str) -> None:

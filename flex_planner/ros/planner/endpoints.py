@@ -167,7 +167,8 @@ def _feedback(action: Any, state: RequestState) -> Any:
     return action.Feedback(
         phase=progress.phase, iteration=int(progress.iteration),
         residual=float(progress.residual), payload=float(progress.payload),
-        elapsed=duration_message(state.elapsed_ns), intervals=int(progress.intervals))
+        elapsed=duration_message(state.elapsed_ns), intervals=int(progress.intervals),
+        plan_id=state.plan_id)
 
 
 def _key(goal: ServerGoalHandle) -> bytes:

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 from action_msgs.msg import GoalStatus
 from flex_planner.base.text import printable
 from flex_planner.ros.messages.plans import duration_message, duration_seconds
+from flex_planner.ros.messages.times import time_ns
 from flex_planner_interfaces.msg import PlanReport
 from rclpy.action import ActionClient
 from rclpy.action.client import ClientGoalHandle
@@ -52,8 +53,9 @@ class ExecutionEnd:
     duration_ns: int = 0
 
     def enter(self, report: PlanReport) -> None:
-        """Enter this into the report of a plan."""
-        report.error_code, report.error_msg = self.code, printable(self.sentence)
+        """Enter this into the report of a plan, which may be that of a stop."""
+        if self.code != PlanReport.NONE:
+            report.error_code, report.error_msg = self.code, printable(self.sentence)
         report.execution_accepted = self.accepted
         report.execution_error_code = self.error_code
         report.execution_error_string = printable(self.error_string)
@@ -94,6 +96,8 @@ class Execution:
     ----------
     future : Future
         Of the `ExecutionEnd`.
+    replaced : bool
+        Whether another plan is to take its place, for which the controller ends it.
 
     """
 
@@ -107,7 +111,7 @@ class Execution:
         self._answer: Future = Future()
         self._handle: ClientGoalHandle | None = None
         self._accepted_ns, self._server_seen = 0, time.monotonic()
-        self._canceled = False
+        self._canceled = self.replaced = False
 
     def advance(self) -> None:
         """Do what is due."""
@@ -118,6 +122,11 @@ class Execution:
         except Exception as error:
             self._tell_to_cancel()
             self._end(PlanReport.UNKNOWN, f'{type(error).__name__}: {error}')
+
+    def end_replaced(self) -> None:
+        """End, as another plan has taken the place of this one at the controller."""
+        if not self.future.done():
+            self._end(PlanReport.EXECUTION_REPLACED, 'another plan replaced this one in motion')
 
     def cancel(self) -> None:
         """Tell the controller to cancel the motion."""
@@ -173,7 +182,8 @@ class Execution:
         now, name = time.monotonic(), self._controller.name
         if self._controller.client.server_is_ready():
             self._server_seen = now
-        passed = (self._controller.now_ns() - self._accepted_ns) * 1e-9
+        begin_ns = max(self._accepted_ns, time_ns(self._trajectory.header.stamp))
+        passed = (self._controller.now_ns() - begin_ns) * 1e-9
         limit = duration_seconds(self._trajectory.points[-1].time_from_start) + self._timeout
         if self._answer.done():
             self._take_result(self._answer.result())
@@ -203,6 +213,8 @@ class Execution:
             own(PlanReport.NONE, '')
         elif status == GoalStatus.STATUS_CANCELED and self._canceled:
             own(PlanReport.CANCELED, 'canceled; the controller has ended the motion')
+        elif self.replaced:
+            self.end_replaced()
         elif status == GoalStatus.STATUS_CANCELED:
             own(PlanReport.EXECUTION_CANCELED, 'somebody else canceled the motion at '
                 f'{self._controller.name}')

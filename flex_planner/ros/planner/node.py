@@ -7,27 +7,28 @@ from dataclasses import replace
 import sys
 from typing import Any
 
+from flex_planner.arms.arm import Arm
 from flex_planner.base.errors import FlexPlannerError, InvalidValueError
 from flex_planner.base.processes import helper_processes
 from flex_planner.base.text import printable
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.planning.robustness import prepare_robustness
 from flex_planner.ros.messages.classes import WHY_NOT_ROS
-from flex_planner.ros.messages.feedback import feedback_message
-from flex_planner.ros.messages.markers import motion_markers
 from flex_planner.ros.messages.plans import duration_seconds, planning_time_limit
 from flex_planner.ros.motion_recorder import MotionRecorder
-from flex_planner.ros.planner.arm_state import ArmState
+from flex_planner.ros.planner.arm_bending import ArmBending
+from flex_planner.ros.planner.arm_state import ArmState, Latest
 from flex_planner.ros.planner.controller import Controller
 from flex_planner.ros.planner.diagnostics import Diagnostics, Record
 from flex_planner.ros.planner.endpoints import Endpoint, fill_plan, fill_search, RequestHandlers
 from flex_planner.ros.planner.execution import ExecutionEnd
 from flex_planner.ros.planner.map_starts import Starts
 from flex_planner.ros.planner.outcome import canceled_outcome, Outcome, unknown_failure
+from flex_planner.ros.planner.plan_topics import PlanTopics
 from flex_planner.ros.planner.recorder import OutcomeRecorder
+from flex_planner.ros.planner.replanner import Replanner
 from flex_planner.ros.planner.request_planner import RequestPlanner
 from flex_planner.ros.planner.request_queue import PendingRequest, RequestQueue, Work
-from flex_planner.ros.planner.streamer import Streamer
 from flex_planner.ros.runtime.parameters import (
     apply_changes,
     ARM_PARAMETERS,
@@ -39,17 +40,13 @@ from flex_planner.ros.runtime.parameters import (
 from flex_planner.ros.runtime.running import run_node
 from flex_planner.ros.settings.planner import PlannerSettings
 from flex_planner_interfaces import action
-from flex_planner_interfaces.msg import FeedbackGains, FlexibleTrajectory, MotionTask
+from flex_planner_interfaces.msg import MotionTask, PlanReport
 from flex_planner_interfaces.srv import FindMaxPayload, PlanPath
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from trajectory_msgs.msg import JointTrajectory
-from visualization_msgs.msg import MarkerArray
+from sensor_msgs.msg import JointState
 
-LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
-                     durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _STOP_TIMEOUT = 0.5
 _SWITCH_INTERVAL = 5e-4  # [s], the solver hands over to callbacks that soon where it can
 
@@ -67,6 +64,8 @@ class PlannerNode(Node):  # type: ignore[misc]
     -----------------
     joint_states : sensor_msgs/msg/JointState
         Where the arm is; the name is that of the parameter joint_states_topic.
+    ~/state_estimate : sensor_msgs/msg/JointState
+        Joints and modal coordinates of the moving arm, for plans that replace others.
 
     Action called
     -------------
@@ -98,7 +97,9 @@ class PlannerNode(Node):  # type: ignore[misc]
         arm = declare_arm(self)
         self._settings = declare(self, PlannerSettings.for_arm(arm))
         self._settings.check_joints(arm.n_joints)
-        self._streamer = Streamer(self)
+        recorder = OutcomeRecorder(arm, self.resolve_topic_name)
+        self._motions = MotionRecorder(self, self._settings, recorder.write_motion)
+        self._topics = PlanTopics(self, self._motions.begin)
         self.add_on_set_parameters_callback(self._judge_parameters)
         self.add_post_set_parameters_callback(self._apply_parameters)
         self.get_logger().info(f'preparing the dynamics of {arm.name}')
@@ -109,21 +110,16 @@ class PlannerNode(Node):  # type: ignore[misc]
         self._arm_state = ArmState(self, self._settings)
         action_name = self._settings.execute_action
         self._controller = Controller(self, action_name) if action_name else None
-        recorder = OutcomeRecorder(arm, self.resolve_topic_name)
-        self._motions = MotionRecorder(self, self._settings, recorder.write_motion)
-        self._planner = RequestPlanner(ArmModel(arm), recorder, starts, self._arm_state)
+        self._planner = RequestPlanner(
+            ArmModel(arm), recorder, starts, self._arm_state,
+            Replanner(self._topics.running, self._now_ns, self._listen_for_bending(arm)))
         prepare_robustness(arm)
         self._queue = RequestQueue(self._settings.queue_length, self._settings.max_waiting_time)
-        self._joints = self.create_publisher(JointTrajectory, '~/joint_trajectory', LATCHED)
-        self._flexible = self.create_publisher(
-            FlexibleTrajectory, '~/flexible_trajectory', LATCHED)
-        self._gains = self.create_publisher(FeedbackGains, '~/feedback_gains', LATCHED)
-        self._markers = self.create_publisher(MarkerArray, '~/markers', LATCHED)
         self._record = Record()
-        self._diagnostics = Diagnostics(self, self._queue, self._record, self._streamer,
-                                        self._joints, arm.name, self._controller)
+        self._diagnostics = Diagnostics(self, self._queue, self._record, self._topics.streamer,
+                                        self._topics.joints, arm.name, self._controller)
         self._endpoints = self._create_endpoints()
-        self._streamer.wait_until_ready()
+        self._topics.streamer.wait_until_ready()
         self.get_logger().info(f'ready to plan for {arm.name}')
 
     def _create_endpoints(self) -> list[Endpoint]:
@@ -182,32 +178,29 @@ class PlannerNode(Node):  # type: ignore[misc]
         if not outcome.publishable:
             return outcome
         if self._controller is None:
-            self._publish(outcome, state.settings)
+            self._topics.publish(outcome, state.settings)
             return outcome
         state.report(replace(state.progress, phase='carrying out the plan'))
+        track = self._topics.track(outcome)
         pending.execution = self._controller.start(
-            outcome.trajectory.joint_trajectory, state.settings.execute_timeout, self.executor,
-            lambda: self._publish(outcome, state.settings))
+            self._topics.trajectory(outcome, track), state.settings.execute_timeout, self.executor,
+            lambda: self._topics.publish(outcome, state.settings, track),
+            replaces=outcome.replaces, plan_id=outcome.report.plan_id)
         end: ExecutionEnd = await pending.execution.future
         end.enter(outcome.report)
+        if end.code != PlanReport.NONE:
+            self._topics.running.drop(outcome.report.plan_id)
         self._planner.record_execution(task, state, outcome.report)
         return outcome
 
-    def _publish(self, outcome: Outcome, settings: PlannerSettings) -> None:
-        """Publish a plan and stream it from now on."""
-        plan, reference = outcome.plan, outcome.reference
-        if plan is None or reference is None:
-            return
-        markers = motion_markers(plan.arm, reference, settings.base_frame,
-                                 plan.task.path_constraints, plan.via_times)
-        if outcome.gains is not None:  # first: a controller has them when it begins
-            self._gains.publish(feedback_message(outcome.gains, plan, settings.joint_names,
-                                                 settings.base_frame))
-        self._motions.begin(outcome.trajectory.joint_trajectory, settings)
-        self._joints.publish(outcome.trajectory.joint_trajectory)
-        self._flexible.publish(outcome.trajectory)
-        self._markers.publish(markers)
-        self._streamer.start(plan, reference, settings)
+    def _listen_for_bending(self, arm: Arm) -> ArmBending:
+        names, topic = [*self._settings.joint_names, *arm.passive_names], '~/state_estimate'
+        estimates = Latest(self, JointState, topic)
+        return ArmBending(self.resolve_topic_name(topic), names, self._arm_state.angles,
+                          estimates.take)
+
+    def _now_ns(self) -> int:
+        return int(self.get_clock().now().nanoseconds)
 
     def _log(self, outcome: Outcome) -> None:
         report = outcome.report
@@ -226,7 +219,7 @@ class PlannerNode(Node):  # type: ignore[misc]
 
     def destroy_node(self) -> Any:
         """Stop the streamer and the worker, then the node."""
-        self._streamer.close()
+        self._topics.streamer.close()
         self._motions.close()
         if not self._queue.close(_STOP_TIMEOUT):
             self._planner.abandon()

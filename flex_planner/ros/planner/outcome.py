@@ -10,6 +10,7 @@ from flex_planner.planning.plan import Plan
 from flex_planner.planning.sampling import SampledPlan
 from flex_planner.ros.messages.classes import FlexibleTrajectory, PayloadSearch, PlanReport
 from flex_planner.ros.messages.plans import duration_message, failure_report
+from flex_planner.ros.messages.times import time_message
 from flex_planner.ros.planner.request_state import RequestState
 
 
@@ -30,6 +31,10 @@ class Outcome:
         Of feedback along the trajectory, where they are asked for.
     search : PayloadSearch or None
         Result of a search for the maximum payload.
+    start_ns : int
+        When the motion begins, by the clock of the node; 0: when it is published [ns].
+    replaces : str
+        Identifier of the plan that it replaces; empty if it is a motion of its own.
 
     """
 
@@ -39,11 +44,13 @@ class Outcome:
     reference: SampledPlan | None = None
     gains: FeedbackGains | None = None
     search: PayloadSearch | None = None
+    start_ns: int = 0
+    replaces: str = ''
 
     @property
     def publishable(self) -> bool:
-        """Whether a controller may have the trajectory."""
-        return bool(self.report.error_code == PlanReport.NONE)
+        """Whether a controller may have the trajectory: a success, or a stop."""
+        return self.report.error_code in (PlanReport.NONE, PlanReport.STOPS)
 
 
 def failure_outcome(code: int, sentence: str) -> Outcome:
@@ -67,6 +74,17 @@ def enter_times(report: PlanReport, state: RequestState) -> None:
     """Enter how long a request took until now, and how much of that it waited."""
     report.planning_time = duration_message(state.elapsed_ns)
     report.waiting_time = duration_message(state.waited_ns)
+
+
+def name_plan(outcome: Outcome, state: RequestState) -> None:
+    """Give a plan with a trajectory its identifier, and the trajectory the time of its start."""
+    if not outcome.trajectory.points:
+        return
+    plan_id = f'plan_{state.stamp_ns}_{state.accepted_ns}'
+    outcome.report.plan_id = state.plan_id = plan_id
+    stamp = time_message(outcome.start_ns)
+    outcome.trajectory.header.stamp = stamp
+    outcome.trajectory.joint_trajectory.header.stamp = stamp
 
 
 def busy_outcome(reason: str) -> Outcome:

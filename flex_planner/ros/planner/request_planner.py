@@ -7,6 +7,7 @@ from dataclasses import replace
 import logging
 from pathlib import Path
 import shutil
+import time
 
 from flex_planner.base.errors import FlexPlannerError, InvalidTaskError
 from flex_planner.base.progress import Monitor, StoppedError, StopReason
@@ -41,18 +42,23 @@ from flex_planner.ros.messages.plans import (
     STOP_CODES,
     task_from_message,
 )
+from flex_planner.ros.messages.replacements import check_alone
 from flex_planner.ros.messages.spaces import add_space
+from flex_planner.ros.messages.times import time_ns
 from flex_planner.ros.messages.trajectory_rules import trajectory_violations
 from flex_planner.ros.planner.arm_state import ArmState
 from flex_planner.ros.planner.map_starts import Starts
 from flex_planner.ros.planner.outcome import (
     enter_times,
     failure_outcome,
+    name_plan,
     Outcome,
     unknown_failure,
 )
 from flex_planner.ros.planner.recorder import OutcomeRecorder
+from flex_planner.ros.planner.replanner import Replanner
 from flex_planner.ros.planner.request_state import RequestState
+from flex_planner.ros.planner.running_plan import RunningPlans
 from flex_planner.ros.settings.planner import PlannerSettings
 from flex_planner_interfaces.msg import (
     FlexibleTrajectory,
@@ -79,14 +85,18 @@ class RequestPlanner:
         Motions that requests near them start from.
     arm_state : ArmState, optional
         Where the arm is; without it, nobody knows and nothing is checked.
+    replanner : Replanner, optional
+        Plans again in motion; without it, no plan is carried out.
 
     """
 
     def __init__(self, model: ArmModel, recorder: OutcomeRecorder,
-                 starts: Starts | None = None, arm_state: ArmState | None = None) -> None:
+                 starts: Starts | None = None, arm_state: ArmState | None = None,
+                 replanner: Replanner | None = None) -> None:
         self._model, self._recorder = model, recorder
         self._starts = Starts('', model.arm) if starts is None else starts
         self._arm_state = arm_state
+        self._replanner = replanner or Replanner(RunningPlans(), time.time_ns)
         self._report_in_work: PlanReport | None = None
 
     def plan(self, message: MotionTask, state: RequestState) -> Outcome:
@@ -161,6 +171,7 @@ class RequestPlanner:
                   state: RequestState, search: PayloadSearch | None = None) -> Outcome:
         """Do the work of a request and record its outcome, with `search` where it failed."""
         measured: list[float] = []
+        asked = message
         try:
             if state.withdrawn:  # while it waited: only to be recorded
                 raise StoppedError(StopReason.CANCELED)
@@ -168,11 +179,14 @@ class RequestPlanner:
             if starts_at_arm(message):
                 message = self._place(message, state)
                 measured = list(message.start_positions)
-            task = task_from_message(message, self._model.arm, state.settings)
             monitor = Monitor(time_limit=planning_time_limit(message, state.settings),
                               canceled=state.is_canceled, report=state.report)
-            outcome = work(task, monitor)
-            _name_limit(outcome.report, monitor)
+            if message.replaces and search is None:
+                message, outcome = self._replanner.plan(message, state.settings, monitor)
+            else:
+                outcome = self._plan_alone(work, message, state, monitor)
+            if not outcome.replaces:
+                _name_limit(outcome.report, monitor)
         except FlexPlannerError as error:
             outcome = failure_outcome(error_code(error), str(error))
         except StoppedError as error:
@@ -183,24 +197,41 @@ class RequestPlanner:
             _LOG.exception('planning failed')
             outcome = unknown_failure(error)
         outcome = replace(outcome, search=outcome.search or search)
+        name_plan(outcome, state)
         outcome.report.measured_positions = measured
-        add_space(outcome.report, message)
+        add_space(outcome.report, asked)
         if message.publish:
             self.check_start(outcome, state)
         enter_times(outcome.report, state)
         return self._record(message, state, outcome)
 
+    def _plan_alone(self, work: Callable[[Task, Monitor], Outcome], message: MotionTask,
+                    state: RequestState, monitor: Monitor) -> Outcome:
+        """Do the work of a request that replaces no plan."""
+        if message.replaces:
+            raise InvalidTaskError('replaces names a plan, but a search for the maximum payload '
+                                   'replaces none: leave it out')
+        check_alone(message)
+        start_ns = time_ns(message.start_time)
+        self._replanner.check_start_time(start_ns)
+        task = task_from_message(message, self._model.arm, state.settings)
+        outcome = work(task, monitor)
+        if outcome.trajectory.points:
+            outcome.report.start_time = message.start_time
+        return replace(outcome, start_ns=start_ns)
+
     def check_start(self, outcome: Outcome, state: RequestState) -> None:
-        """Make an outcome a failure if the arm is not where its plan starts."""
-        if self._arm_state is None or outcome.plan is None or not outcome.publishable:
-            return
+        """Make an outcome a failure if its plan begins elsewhere than the arm, or too late."""
         report = outcome.report
+        if outcome.plan is None or not outcome.publishable:
+            return
         try:
-            measured = self._arm_state.check(outcome.plan.task, state.settings, state.motion)
-        except ArmStateError as error:
-            report.error_code, report.error_msg = error.code, str(error)
-        else:
-            report.measured_positions = measured or report.measured_positions
+            self._replanner.check(outcome)
+            if self._arm_state is not None and not outcome.replaces:
+                measured = self._arm_state.check(outcome.plan.task, state.settings, state.motion)
+                report.measured_positions = measured or report.measured_positions
+        except FlexPlannerError as error:
+            report.error_code, report.error_msg = error_code(error), printable(str(error))
 
     def record_execution(self, message: MotionTask, state: RequestState,
                          report: PlanReport) -> None:

@@ -45,6 +45,8 @@ class RequestState:
         When the worker began with it, by the monotonic clock [ns]; 0 while it waits.
     motion : str
         How the arm moved when it was accepted, empty if it did not or is not watched.
+    plan_id : str
+        Of its plan, empty while there is none.
 
     """
 
@@ -58,6 +60,7 @@ class RequestState:
     reason: str = ''
     began_ns: int = 0
     motion: str = ''
+    plan_id: str = ''
 
     @property
     def elapsed_ns(self) -> int:

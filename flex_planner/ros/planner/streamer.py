@@ -11,7 +11,7 @@ import time
 
 from flex_planner.base.processes import deaf_to_interrupts
 from flex_planner.planning.plan import Plan
-from flex_planner.planning.sampling import SampledPlan
+from flex_planner.ros.planner.running_plan import Track
 from flex_planner.ros.reference_states import StreamedPlan
 from flex_planner.ros.settings.planner import PlannerSettings
 from rclpy.node import Node
@@ -41,15 +41,18 @@ class Streamer:
         if output is None or not output.readline():
             self._node.get_logger().error('the process that streams states did not start')
 
-    def start(self, plan: Plan, reference: SampledPlan, settings: PlannerSettings) -> None:
+    def start(self, plan: Plan, track: Track, settings: PlannerSettings) -> None:
         """Stream a plan from now on, in place of the one before; that it fails is logged."""
-        samples = reference.samples
+        now_ns, monotonic_ns = self._node.get_clock().now().nanoseconds, time.monotonic_ns()
+        # until a motion begins that begins later, its start is streamed
+        wait_ns = max(track.begin_ns - now_ns, 0)
+        begin_ns = track.begin_ns - wait_ns
         streamed = StreamedPlan(
             names=[*settings.joint_names, *plan.arm.passive_names], rate=settings.reference_rate,
-            stamp_ns=self._node.get_clock().now().nanoseconds, began_ns=time.monotonic_ns(),
+            stamp_ns=begin_ns, began_ns=monotonic_ns - (now_ns - begin_ns),
             by_clock=self._node.get_clock().ros_time_is_active,
-            times_ns=reference.times_ns, coordinates=samples.coordinates,
-            rates=samples.rates, accelerations=samples.accelerations, torques=samples.torques)
+            times_ns=track.times_ns + wait_ns, coordinates=track.coordinates,
+            rates=track.rates, accelerations=track.accelerations, torques=track.torques)
         try:
             self._send(pickle.dumps(streamed))
         except OSError as error:  # the plan is good all the same, and published

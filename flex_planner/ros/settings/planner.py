@@ -141,6 +141,15 @@ class PlannerSettings:
     execute_timeout: float = parameter_field(
         5.0, 'Time that the controller has to appear, to accept a plan, to end after the end of '
         'the motion, and to cancel [s].', lowest=0.1, highest=3600.0)
+    replan_lead: float = parameter_field(
+        0.1, 'How long after the planner begins to work on it a plan begins that replaces another '
+        'one, where its request has no start_time [s].', lowest=1e-3, highest=10.0)
+    replan_torque_tolerance: float = parameter_field(
+        0.1, 'As torque_tolerance, of plans that replace another one: fewer points are ready '
+        'earlier; at least torque_tolerance is used [N m].', lowest=1e-6, highest=1e6)
+    state_estimate_timeout: float = parameter_field(
+        0.1, 'Estimates of the state, and joint states, that are older do not tell how the moving '
+        'arm is bent [s].', lowest=1e-3, highest=10.0)
     recording_folder: str = parameter_field(
         '', 'Folder of the recordings; empty for $ROS_HOME/flex_planner.', read_only=True)
     record: bool = parameter_field(True, 'Whether to record every request with its outcome.')
@@ -212,6 +221,11 @@ class PlannerSettings:
             longest_step=self.sampling_step, torque_tolerance=self.torque_tolerance,
             controller=self.controller(), controller_period=period,
             start_hold=self.start_hold)
+
+    def replan_sampling(self) -> SamplingSettings:
+        """Return those of the sampling of plans that replace another one."""
+        return replace(self.sampling(), start_hold=0.0, torque_tolerance=max(
+            self.torque_tolerance, self.replan_torque_tolerance))
 
     def with_controller(self, controller: JointController) -> PlannerSettings:
         """Return the settings for another joint controller."""

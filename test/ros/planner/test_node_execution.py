@@ -15,9 +15,11 @@ from control_msgs_support import BUILD, environment
 from diagnostic_msgs.msg import DiagnosticArray
 from flex_planner.recording import definition_folder, MessageTypes, read_recording
 from flex_planner.reports.recording.contents import RecordedRequest
+from flex_planner.ros.messages.times import time_message, time_ns
 from flex_planner.ros.runtime.processes import NodeProcess
 from flex_planner_interfaces import action
 from flex_planner_interfaces.msg import PlanReport
+from geometry_msgs.msg import Point
 import pytest
 from rcl_interfaces.srv import SetParameters
 from rclpy.action import ActionServer
@@ -256,3 +258,27 @@ def _recorded(path: str) -> int:
                if entry.topic.type_name.endswith('PlanReport')]
     assert len(reports) == 1
     return int(reports[0].error_code)
+
+
+def test_plan_that_is_replaced_in_motion_ends_at_once_and_another_goes_on(arena: Arena) -> None:
+    arena.behave('hang')
+    accepted = arena.listen(JointTrajectory, f'{CONTROLLER}/accepted', 10)
+    first = arena.plan_goal(publish=True, duration=20.0)
+    arena.wait('the plan on the topic', lambda: bool(arena.published))
+    arena.wait('its identifier', lambda: bool(first.feedback[-1][1].plan_id))
+    newest = first.feedback[-1][1].plan_id
+    lead = arena.node.get_clock().now().nanoseconds + 3 * 10**9
+    second = arena.plan_goal(publish=True, replaces=newest, duration=0.0, payload_mass=0.0,
+                             effort_weights=[], space=2, goal_point=Point(x=0.5, y=0.4),
+                             start_time=time_message(lead))
+    status, result = first.end()
+    assert status == GoalStatus.STATUS_ABORTED
+    assert result.report.error_code == PlanReport.EXECUTION_REPLACED
+    assert result.report.plan_id == newest
+    arena.wait('the new plan', lambda: len(accepted) == 2)
+    assert time_ns(accepted[0].header.stamp) == 0 < time_ns(accepted[1].header.stamp) < lead
+    assert second.cancel()
+    assert second.end()[1].report.error_code == PlanReport.CANCELED
+    report = arena.report(replaces=newest, duration=0.0, payload_mass=0.0, effort_weights=[],
+                          space=2, goal_point=Point(x=0.5, y=0.4), publish=True)
+    assert report.error_code == PlanReport.INVALID_TASK  # nothing is carried out any more

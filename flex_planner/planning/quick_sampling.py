@@ -1,0 +1,53 @@
+"""Samples of a plan that is needed at once: looked at by one simulation, not by many."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from flex_planner.base.progress import Monitor
+from flex_planner.optimal_control.constrained_motion import way_slacks_of
+from flex_planner.planning.executed_limits import find_executed_slack
+from flex_planner.planning.execution import Execution, ExecutionCertificate
+from flex_planner.planning.plan import Plan
+from flex_planner.planning.point_times import point_times
+from flex_planner.planning.published_motion import PublishedMotion
+from flex_planner.planning.sampling import SampledPlan, SamplingSettings, take_samples
+
+
+def sample_quickly(plan: Plan, settings: SamplingSettings,
+                   monitor: Monitor | None = None) -> SampledPlan:
+    """
+    Return samples of a solved plan that ends at rest, and what its controller makes of them.
+
+    They are as close as the torque tolerance says, and no closer: where the arm arrives with them
+    is found out, and not compared with infinitely many. Of the `execution` only tip error,
+    residual vibration and limits on the way are known. There is no `start_hold`.
+
+    Parameters
+    ----------
+    plan : Plan
+        With a solution.
+    settings : SamplingSettings
+        Of the samples and the controller.
+    monitor : Monitor, optional
+        May stop it.
+
+    Raises
+    ------
+    StoppedError
+        If the monitor stopped it.
+
+    """
+    watch, controller = monitor or Monitor(), settings.controller_of(plan)
+    period = settings.controller_period
+    motion = PublishedMotion.of(plan, controller,
+                                controller.period if period is None else period)
+    sampled = take_samples(motion, controller, *point_times(
+        motion, settings.longest_step, settings.torque_tolerance, watch))
+    execution = Execution.of(plan, controller)
+    carried_out = execution.carry_out(sampled.reference, watch)
+    arrived = carried_out.states[-1]
+    return replace(sampled, execution=ExecutionCertificate(
+        controller=controller, tip_error=execution.tip_error(arrived),
+        residual_vibration=execution.vibration(arrived),
+        limits=find_executed_slack(way_slacks_of(plan.problem), carried_out)))
