@@ -134,6 +134,7 @@ def test_casadi_is_imported_only_to_derive_and_to_compile() -> None:
         'optimal_control.path_constraints.obstacles',
         'optimal_control.path_constraints.path_slacks',
         'optimal_control.path_constraints.regions',
+        'optimal_control.path_constraints.spatial_points',
         'optimal_control.path_constraints.symbolic_arm',
         'optimal_control.pontryagin',
         'optimal_control.rate_jacobian', 'optimal_control.running_cost',

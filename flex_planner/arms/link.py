@@ -233,6 +233,25 @@ class Link:
         """Return the link's mode shapes and their integrals; they are computed once."""
         return _find_modes(self)
 
+    def bend_shapes(self, shares: Array) -> Array:
+        """Return how modes move points at shares (k,) of the length across, (k, 1, modes)."""
+        return self.mode_shapes().shape(shares * self.length)[:, None]
+
+    def moment_shapes(self, shares: Array) -> Array:
+        """Return the bending moments of modes there for E I = 1, shape (k, 1, modes) [1/m^2]."""
+        rigidity = np.array([self._rigidity_at(share) for share in shares])
+        moments: Array = rigidity[:, None] * self.mode_shapes().curvature(shares * self.length)
+        return moments[:, None]
+
+    def _rigidity_at(self, share: float) -> float:
+        """Return E I at a share of the length over that of the link."""
+        end = 0.0
+        for section in self.sections:
+            end += section.share
+            if share <= end:
+                return section.rigidity
+        return 1.0
+
     def with_modes(self, count: int) -> Link:
         """
         Return the same link with another number of modes.

@@ -164,6 +164,21 @@ class SpatialBeam:
         moved[:, Z, first:sum(self.modes)] = self.bend(length, 1).shape(stations)
         return moved
 
+    def moments(self, length: float, stations: Array) -> Array:
+        """
+        Return the bending moments of modes at stations (k,), shape (k, 2, m) [N].
+
+        In the first and the second plane, for a `reference_rigidity` of 1 N m^2.
+
+        """
+        found = np.zeros((stations.size, 2, self.count))
+        parts = slice(0, self.modes[0]), slice(self.modes[0], sum(self.modes))
+        for plane, part in enumerate(parts):
+            if self.modes[plane]:
+                share = self.flexural_rigidity[plane] / self.reference_rigidity
+                found[:, plane, part] = share * self.bend(length, plane).curvature(stations)
+        return found
+
     def flexible_body(self, length: float) -> FlexibleBody:
         """
         Return the integrals over a beam of a length [m] that lies along x.

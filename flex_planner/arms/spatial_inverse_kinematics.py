@@ -126,7 +126,7 @@ def check_spatial_singularity(arm: SpatialArm, positions: Array,
 
     """
     J = _moves(arm, positions) if moves is None else moves
-    rank = _usual_rank(arm)
+    rank = usual_rank(arm)
     least = float(np.linalg.svd(_relative(arm, J), compute_uv=False)[rank - 1])
     if least < _SINGULAR:
         raise SingularError(
@@ -152,7 +152,7 @@ def _check_reach(arm: SpatialArm, point: Array, slack: float = _EXACT) -> None:
 
 
 @lru_cache(maxsize=64)
-def _usual_rank(arm: SpatialArm) -> int:
+def usual_rank(arm: SpatialArm) -> int:
     """Return the rank of the Jacobian where it is largest, found at some postures."""
     random = np.random.default_rng(_SEED)
     lower, upper = _bounds(arm, np.zeros(arm.n_joints))

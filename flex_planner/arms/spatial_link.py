@@ -151,6 +151,18 @@ class SpatialLink:
         moved: Array = np.einsum('sam,...m->...sa', shapes, modal)
         return moved
 
+    def bend_shapes(self, shares: Array) -> Array:
+        """Return how modes move points at shares (k,) of the length across, (k, 2, modes)."""
+        if self.beam is None:
+            return np.zeros((shares.size, 2, 0))
+        return self.beam.displace(self.length, shares * self.length)[:, 1:]
+
+    def moment_shapes(self, shares: Array) -> Array:
+        """Return the bending moments of modes there for E I = 1, see `SpatialBeam.moments`."""
+        if self.beam is None:
+            return np.zeros((shares.size, 2, 0))
+        return self.beam.moments(self.length, shares * self.length)
+
     def rigid(self) -> SpatialLink:
         """Return the same link without modes."""
         return self if self.beam is None else replace(self, beam=self.beam.rigid())

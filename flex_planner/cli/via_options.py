@@ -19,7 +19,7 @@ _POINT, _ANGLES, _ANY = '--via', '--via-angles', 'any'
 def add_via_points(parser: argparse.ArgumentParser) -> None:
     """Add the options; both fill one list, so that their order is that of the motion."""
     add = parser.add_argument
-    add(_POINT, dest='via_points', action='append', default=[], metavar='[S:]X,Y',
+    add(_POINT, dest='via_points', action='append', default=[], metavar='[S:]X,Y[,Z]',
         type=lambda text: (_POINT, text),
         help='point that the tip passes, at the time before the colon, or else at the best time; '
         'may be given several times, in the order of the motion [s, m]')
@@ -45,7 +45,7 @@ def _via_point(option: str, text: str, arm: Arm) -> ViaPoint:
     before, colon, place = text.rpartition(':')
     time = _time(option, before, text) if colon else None
     if option == _POINT:
-        return ViaPoint(point=numbers(option, place, 2, 'm'), time=time)
+        return ViaPoint(point=numbers(option, place, arm.dimension, 'm'), time=time)
     return ViaPoint(positions=_some_angles(place, arm.n_joints), time=time)
 
 

@@ -8,15 +8,10 @@ from typing import Any, TYPE_CHECKING
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.inverse_kinematics import check_angle_limits
-from flex_planner.arms.planar_only import require_planar
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.validation import Array, listed, number, vector
 from flex_planner.optimal_control.ends_at_points import ends_at_points, MAX_COORDINATE
 from flex_planner.optimal_control.goal_in_pose import posture_in_pose
-from flex_planner.optimal_control.path_constraints.joint_constraints import (
-    JointRange,
-    JointSpeed,
-)
 from flex_planner.optimal_control.path_constraints.path_constraint import PathConstraint
 from flex_planner.optimal_control.via_points import check_via_points, free_times, ViaPoint
 import numpy as np
@@ -330,8 +325,6 @@ class Task:
             name = f'path_constraints[{i}]'
             if not isinstance(one, PathConstraint):
                 raise InvalidValueError(name, one, 'a PathConstraint, such as KeepOut')
-            if not isinstance(one, (JointRange, JointSpeed)):
-                require_planar(self.arm, 'limits of points and of links on the way')
             one.check(name, self.arm)
         object.__setattr__(self, 'path_constraints', given)
 

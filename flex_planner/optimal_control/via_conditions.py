@@ -142,9 +142,9 @@ class ViaConditions:
         C = tip_jacobian(self.arm, at)
         if n < 2:
             return np.arange(2)
-        pairs = np.array(list(combinations(range(n), 2)))
-        areas = [abs(float(np.linalg.det(C[:, pair]))) for pair in pairs]
-        best: NDArray[np.intp] = pairs[int(np.argmax(areas))]
+        groups = np.array(list(combinations(range(n), len(C))))
+        sizes = [abs(float(np.linalg.det(C[:, group]))) for group in groups]
+        best: NDArray[np.intp] = groups[int(np.argmax(sizes))]
         return best
 
 

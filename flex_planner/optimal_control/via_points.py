@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.inverse_kinematics import check_angle_limits, posture_near_point
-from flex_planner.arms.planar_only import require_planar
+from flex_planner.arms.spatial_arm import SpatialArm
+from flex_planner.arms.spatial_inverse_kinematics import usual_rank
 from flex_planner.base.errors import (
     InvalidSizeError,
     InvalidValueError,
@@ -34,7 +35,7 @@ class ViaPoint:
     ----------
     positions : array_like, shape (n,)
         Joint angles [rad], NaN for a joint that may stand anywhere; empty where `point` is given.
-    point : array_like, shape (2,)
+    point : array_like, shape (2,), or (3,) for a spatial arm
         Where the tip of the bent arm is, in the base frame [m]; empty where `positions` are given.
     time : float or None
         When it is passed, from the start of the motion [s]; None for the time that is best, which
@@ -69,7 +70,7 @@ class ViaPoint:
     @property
     def conditions(self) -> int:
         """Return how many numbers it fixes."""
-        return 2 if self.point.size else int(np.isfinite(self.positions).sum())
+        return self.point.size or int(np.isfinite(self.positions).sum())
 
 
 def _plain(name: str, values: ArrayLike) -> Array:
@@ -123,9 +124,11 @@ def check_via_points(arm: Arm, points: Sequence[ViaPoint], duration: float,
 def _check_place(arm: Arm, via: ViaPoint, name: str, most_angle: float) -> None:
     """Check that joints and tip can be there."""
     if via.point.size:
-        require_planar(arm, 'points on the way')
-        vector(f'{name}.point', via.point, 2, at_least=-MAX_COORDINATE, at_most=MAX_COORDINATE,
-               unit='m')
+        vector(f'{name}.point', via.point, arm.dimension, at_least=-MAX_COORDINATE,
+               at_most=MAX_COORDINATE, unit='m')
+        if isinstance(arm, SpatialArm) and usual_rank(arm) < arm.dimension:
+            raise InvalidValueError(f'{name}.point', via.point.tolist(), 'left out for an arm '
+                                    'whose tip moves on a surface or a curve: give positions')
         _posture(arm, via, name, None)
         return
     known = np.isfinite(via.positions)
@@ -223,7 +226,7 @@ def free_times(points: Sequence[ViaPoint]) -> bool:
 def say_via_points(points: Sequence[ViaPoint], times: Array) -> Iterator[str]:
     """Yield each via point in words, with the time at which it is passed."""
     for via, time in zip(points, times, strict=True):
-        place = (f'({via.point[0]:.6g}, {via.point[1]:.6g}) m' if via.point.size else
+        place = (f'({", ".join(f"{x:.6g}" for x in via.point)}) m' if via.point.size else
                  f'({", ".join(_say_angle(angle) for angle in via.positions)}) deg')
         yield f'{place} at {time:.6g} s{" (free)" if via.time is None else ""}'
 

@@ -31,11 +31,14 @@ from flex_planner.optimal_control.path_constraints import (
     Circle,
     Deflection,
     HalfPlane,
+    HalfSpace,
     JointRange,
     JointSpeed,
     KeepOut,
     PathSlacks,
     SelfClearance,
+    SpatialCapsule,
+    Sphere,
 )
 from flex_planner.optimal_control.smoothed_torque_state import SmoothedTorqueState
 from flex_planner.optimal_control.state_layout import StateLayout
@@ -338,7 +341,8 @@ _SAVED = (Plan, PlanStatus, Certificate, Task, Arm, Link, BeamSection, Joint, El
           ObjectiveSearch, Objectives, Objective, WeightTrial, Margin, KindOfMotion,
           ExploredMotion, PlanWarning, WarningKind, TriedStrategy, ConstraintMargin,
           ConstrainedMotion, PathSlacks, JointRange, JointSpeed, KeepOut, Circle, Capsule,
-          HalfPlane, SelfClearance, BendingMoment, Deflection, ViaPoint, ViaConditions,
+          HalfPlane, Sphere, SpatialCapsule, HalfSpace, SelfClearance, BendingMoment,
+          Deflection, ViaPoint, ViaConditions,
           StateLayout, ChosenTorque, TorqueState, SmoothedTorqueState, TorqueEnds,
           TorqueSlacks, TorqueLimits,
           OffsetProblem, TorqueOffset, Robustness, RobustSearch, RobustTrial, JointController,

@@ -46,6 +46,9 @@ def draw_comparison(comparison: Comparison) -> Picture:
     figure = Picture(14, 10)
     above, below = figure.subfigures(2, 1, height_ratios=[1.25, 1])
     distance, path_axes = above.subplots(1, 2, width_ratios=[1.3, 1])
+    if comparison.goal.size == 3:
+        path_axes.remove()
+        path_axes = above.add_subplot(1, 2, 2, projection='3d')
     torques = np.atleast_1d(below.subplots(1, n, sharey=True))
     results = comparison.results
     _draw_distance(distance, comparison)
@@ -74,22 +77,27 @@ def _draw_distance(axes: Axes, comparison: Comparison) -> None:
     axes.grid(alpha=0.3)
 
 
-def _draw_paths(axes: Axes, comparison: Comparison) -> None:
+def _draw_paths(axes: Any, comparison: Comparison) -> None:
     """Draw the path of the tip near the goal, from the arrival on."""
     near = [result for result in comparison.results if result.mode is not ExecutionMode.PD_ONLY]
     reach = 0.0
     for result in comparison.results:
         path = (_after_arrival(result)[1] - comparison.goal) * _MILLI
         axes.plot(*path.T, **_style(result))
-        axes.plot(*path[0], 'o', color=MODE_COLOURS[result.mode], markersize=5)
+        axes.plot(*path[:1].T, 'o', color=MODE_COLOURS[result.mode], markersize=5)
         if result in near:
             reach = max(reach, float(np.abs(path).max()))
-    axes.plot(0, 0, '+', color='black', markersize=14, label='goal')
-    axes.plot([], [], 'o', color=ASIDE, markersize=5, label='on arrival')
+    size = comparison.goal.size
+    axes.plot(*np.zeros((size, 1)), '+', color='black', markersize=14, label='goal')
+    axes.plot(*np.zeros((size, 0)), 'o', color=ASIDE, markersize=5, label='on arrival')
     if reach:
         limit = reach * (1 + _MARGIN)
-        axes.set(xlim=(-limit, limit), ylim=(-limit, limit))
-    axes.set_aspect('equal', adjustable='box')
+        axes.set(**{f'{name}lim': (-limit, limit) for name in 'xyz'[:size]})
+    if size == 3:
+        axes.set_box_aspect((1, 1, 1))
+        axes.set_zlabel('z [mm]')
+    else:
+        axes.set_aspect('equal', adjustable='box')
     finish(axes, 'path of the tip after arrival, from the goal', 'y [mm]', 'x [mm]')
 
 

@@ -40,7 +40,7 @@ def draw_keep_outs(axes: Axes, constraints: Sequence[PathConstraint], extent: fl
     for one in find_keep_outs(constraints):
         corners = outline_region(one.region, extent)
         axes.fill(*corners.T, facecolor=REFUSED, alpha=_FILL, edgecolor=REFUSED,
-                  label=_name(one))
+                  label=name_region(one))
 
 
 def shade_active(axes: Axes, margins: Sequence[ConstraintMargin]) -> None:
@@ -67,15 +67,15 @@ def draw_via_points(axes: Axes, times: Array, path: Array, via_times: Array) -> 
         In metres.
     times : numpy.ndarray, shape (k,)
         Of the path [s].
-    path : numpy.ndarray, shape (k, 2)
+    path : numpy.ndarray, shape (k, 2), or (k, 3) in space
         Of the tip [m].
     via_times : numpy.ndarray, shape (m,)
         When via points are passed [s].
 
     """
     if via_times.size:
-        x, y = (np.interp(via_times, times, column) for column in path.T)
-        axes.plot(x, y, 'D', color=VIA, label='via points')
+        passed = [np.interp(via_times, times, column) for column in path.T]
+        axes.plot(*passed, 'D', color=VIA, label='via points')
 
 
 def draw_speed_limits(axes: Axes, constraints: Sequence[PathConstraint]) -> None:
@@ -103,6 +103,6 @@ def _draw_bounds(axes: Axes, joint: int, bounds: Sequence[float]) -> None:
             axes.plot([], [], '--', color=ASIDE, label='limits on the way')
 
 
-def _name(one: KeepOut) -> str:
-    """Return the name of a region."""
+def name_region(one: KeepOut) -> str:
+    """Return the name of a region for a legend."""
     return plain(one.name) or 'kept free'

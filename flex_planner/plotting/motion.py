@@ -27,7 +27,7 @@ from flex_planner.plotting.limits import (
     mark_via_times,
     shade_active,
 )
-from flex_planner.plotting.spatial_motion import draw_path_in_space
+from flex_planner.plotting.spatial_motion import draw_limits_in_space, draw_path_in_space
 from matplotlib.axes import Axes
 import numpy as np
 
@@ -150,6 +150,8 @@ def draw_motion(motion: Motion | Plan, execution: Execution | None = None) -> Pi
         axes[1, 0].remove()
         axes[1, 0] = figure.add_subplot(2, 3, 4, projection='3d')
         draw_path_in_space(axes[1, 0], motion.arm, motion.coordinates, motion.tip)
+        draw_limits_in_space(axes[1, 0], motion.constraints, motion.arm.reach)
+        draw_via_points(axes[1, 0], motion.times, motion.tip, motion.via_times)
     else:
         draw_tip(axes[1, 0], motion, execution)
     draw_modes(axes[1, 1], motion)

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import link_points
-from flex_planner.base.colours import ARM, PLANNED
+from flex_planner.base.colours import ARM, PLANNED, REFUSED
 from flex_planner.base.validation import Array
+from flex_planner.optimal_control.path_constraints import PathConstraint
+from flex_planner.planning.region_outlines import find_keep_outs
+from flex_planner.planning.spatial_outlines import outline_in_space
+from flex_planner.plotting.limits import name_region
 import numpy as np
 
 _STATIONS, _POSTURES = 21, 6
@@ -41,6 +46,28 @@ def draw_path_in_space(axes: Any, arm: Arm, coordinates: Array, tip: Array) -> N
     axes.plot(*tip[-1:].T, 's', color=PLANNED, label='goal')
     show_space(axes, np.concatenate(shown))
     axes.set_title('path of the tip')
+
+
+def draw_limits_in_space(axes: Any, constraints: Sequence[PathConstraint], extent: float) -> None:
+    """
+    Draw the regions that are kept free.
+
+    Parameters
+    ----------
+    axes : mpl_toolkits.mplot3d.Axes3D
+        To draw in; what it shows stays as it is.
+    constraints : sequence of PathConstraint
+        Those that keep no region free are left out.
+    extent : float
+        Half the side of the squares that stand for half-spaces [m].
+
+    """
+    shown = axes.get_w_lims()
+    for one in find_keep_outs(constraints):
+        for line in outline_in_space(one.region, extent):
+            axes.plot(*line.T, color=REFUSED, linewidth=0.8, label=name_region(one))
+    for name, limits in zip('xyz', np.reshape(shown, (3, 2)), strict=True):
+        getattr(axes, f'set_{name}lim')(*limits)
 
 
 def show_space(axes: Any, points: Array) -> None:

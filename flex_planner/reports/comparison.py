@@ -15,14 +15,14 @@ def comparison_rows(comparison: Comparison) -> list[Row]:
     """Return both plans, the warnings of the flexible one, the simulated arm and the goal."""
     simulated = comparison.arm
     rigidity = ', '.join(f'{link.flexural_rigidity:g}' for link in simulated.links)
-    x, y = comparison.goal
+    goal = ', '.join(f'{value:.6g}' for value in comparison.goal)
     return [
         ('planned flexible', _planning(comparison.flexible)),
         *warning_rows(comparison.flexible.warnings),
         ('planned rigid', _planning(comparison.rigid)),
         ('simulated arm', f'E I = {rigidity} N m^2, {simulated.n_modes} modes, '
                           f'{comparison.payload_mass:g} kg'),
-        ('goal of the tip', f'({x:.6g}, {y:.6g}) m'),
+        ('goal of the tip', f'({goal}) m'),
         ('watched after arrival', f'{comparison.settling:g} s')]
 
 

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import tip_position
-from flex_planner.arms.planar_only import require_planar
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array, number
 from flex_planner.control.default_gains import default_gains
@@ -48,7 +47,7 @@ class Comparison:
         As simulated.
     payload_mass : float
         As simulated [kg].
-    goal : numpy.ndarray, shape (2,)
+    goal : numpy.ndarray, shape (2,), or (3,) of a spatial arm
         Goal of the tip [m].
     settling : float
         How long the arm is watched after its arrival [s].
@@ -108,14 +107,13 @@ def compare(task: Task, *, model: ArmModel | None = None, mismatch: Mismatch | N
     Raises
     ------
     InvalidValueError, InvalidTaskError
-        Naming what is wrong; spatial arms are not simulated.
+        Naming what is wrong.
     RunawayError
         If the simulated arm gets out of hand.
     StoppedError
         If the monitor stopped a simulation.
 
     """
-    require_planar(task.arm, 'simulations')
     watch = monitor or Monitor()
     simulated = (mismatch or Mismatch()).apply(task.arm)
     chosen = gains or Gains.of(task.arm.n_joints, _STIFFNESS, _DAMPING)

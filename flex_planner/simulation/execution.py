@@ -53,7 +53,7 @@ class SimulatedMotion:
         Of the simulated arm.
     torques : numpy.ndarray, shape (k, n)
         Of the motors, over the period that ends there [N m].
-    tip : numpy.ndarray, shape (k, 2)
+    tip : numpy.ndarray, shape (k, 2), or (k, 3) of a spatial arm
         [m].
 
     """
@@ -116,7 +116,7 @@ class Setting:
         Of the controller [Hz].
     payload_mass : float
         That the arm carries [kg].
-    goal : numpy.ndarray, shape (2,)
+    goal : numpy.ndarray, shape (2,), or (3,) of a spatial arm
         Of the tip [m].
     settling : float
         How long to watch the arm after its arrival [s].

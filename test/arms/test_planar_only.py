@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 from flex_planner.arms.inverse_kinematics import workspace
@@ -16,9 +15,7 @@ from flex_planner.maps.study import Study
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.holding import knows_holding
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
-from flex_planner.optimal_control.path_constraints import Circle, KeepOut
 from flex_planner.optimal_control.task import Task
-from flex_planner.optimal_control.via_points import ViaPoint
 from flex_planner.planning.proofs import (
     bound_duration,
     bound_payload,
@@ -27,7 +24,6 @@ from flex_planner.planning.proofs import (
 )
 from flex_planner.planning.proofs.short_durations import rigid_bound
 from flex_planner.planning.robust.objective import Robustness
-from flex_planner.simulation.comparison import compare
 import numpy as np
 import pytest
 from spatial_arms import yaw_pitch
@@ -44,10 +40,6 @@ def task() -> Task:
     lambda: frame_angles(ARM, np.zeros(4)),
     lambda: mass_matrix(ARM, np.zeros(2), 1.0, 0.0),
     lambda: RigidInertia.of(ARM, 1.0, 0.0),
-    lambda: compare(task()),
-    lambda: replace(task(), via_points=(ViaPoint(point=[0.5, 0.1]),)),
-    lambda: replace(task(), path_constraints=(
-        KeepOut(region=Circle(center=(1.0, 1.0), radius=0.1)),)),
     lambda: Robustness(max_residual=1e-3, stiffness_error=0.1).check(task()),
     lambda: Study(name='map', arm=ARM, quantity=Quantity.RESIDUAL_VIBRATION, axes=(),
                   motion=None),  # type: ignore[arg-type]

@@ -49,9 +49,3 @@ def test_wrong_options_are_named(capsys: pytest.CaptureFixture[str], tmp_path: P
                                  options: list[str], message: str) -> None:
     assert main(['gains', 'korayem_rigid', *MOTION, *options, '--output', str(tmp_path)]) == 1
     assert message in capsys.readouterr().err
-
-
-def test_spatial_arms_are_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    assert main(['gains', 'spatial_3r', '--from-angles', '0,30,30', '--to-angles', '60,30,30',
-                 '--duration', '1', '--output', str(tmp_path)]) == 1
-    assert 'gains of feedback do not know spatial arms' in capsys.readouterr().err

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 import sys
 
-from flex_planner.arms.planar_only import require_planar
 from flex_planner.base.paths import file_stem
 from flex_planner.base.progress import Monitor
 from flex_planner.base.yaml_text import format_yaml
@@ -56,7 +55,6 @@ def _gains(options: argparse.Namespace) -> int:
     request = Request.of(options)
     check_folder(options.output)
 
-    require_planar(request.task.arm, 'gains of feedback')
     errors = given_uncertainty(options, request.uncertainty)
     with translate_errors():
         settings = GainSettings(encoder_resolution=options.encoder_resolution,

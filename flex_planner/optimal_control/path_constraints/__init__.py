@@ -31,7 +31,13 @@ from flex_planner.optimal_control.path_constraints.regions import (
     HalfPlane,
     Region,
 )
+from flex_planner.optimal_control.path_constraints.spatial_regions import (
+    HalfSpace,
+    SpatialCapsule,
+    Sphere,
+)
 
-__all__ = ['BendingMoment', 'Capsule', 'Circle', 'Deflection', 'FORMS', 'HalfPlane', 'JointRange',
-           'JointSpeed', 'KeepOut', 'PathConstraint', 'PathSlacks', 'Region', 'SelfClearance',
-           'SlackLabel', 'limits_of_arm', 'read_constraint', 'write_constraint']
+__all__ = ['BendingMoment', 'Capsule', 'Circle', 'Deflection', 'FORMS', 'HalfPlane', 'HalfSpace',
+           'JointRange', 'JointSpeed', 'KeepOut', 'PathConstraint', 'PathSlacks', 'Region',
+           'SelfClearance', 'SlackLabel', 'SpatialCapsule', 'Sphere', 'limits_of_arm',
+           'read_constraint', 'write_constraint']

@@ -1,13 +1,20 @@
-"""Limits of the bending moment in a link, and of its deflection."""
+"""
+Limits of the bending moment in a link, and of its deflection.
+
+A link of a planar arm bends to one side or the other, each of which has a slack; one in space
+bends in two planes, and what is limited is the length of the resultant.
+
+"""
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+import math
 from typing import Any, TYPE_CHECKING
 
 from flex_planner.arms.arm import Arm
-from flex_planner.arms.link import Link
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.validation import Array, integer, number, vector
 from flex_planner.optimal_control.path_constraints.path_constraint import (
@@ -19,8 +26,10 @@ import numpy as np
 if TYPE_CHECKING:
     from flex_planner.optimal_control.path_constraints.symbolic_arm import SymbolicArm
 
-# of the largest curvature of a mode: less is none
-_NO_CURVATURE = 1e-9
+# of what is most along the link: less is nothing
+_NOTHING = 1e-9
+# of the limit: rounds the tip of the cone where a link in space is straight
+_ROUNDING = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,6 +51,31 @@ class _AlongLink(PathConstraint):
         if not arm.links[self.link - 1].modes:
             raise InvalidValueError(f'{name}.link', self.link, 'a link with modes: a rigid one '
                                     'does not bend')
+        if not self._bending(arm):
+            raise InvalidValueError(f'{name}.link', self.link, 'a link that bends at one of the '
+                                    'stations')
+
+    @abstractmethod
+    def _shapes(self, arm: Arm) -> Array:
+        """Return what modes make of the limited quantity, shape (k, planes, modes)."""
+
+    def _bending(self, arm: Arm) -> list[tuple[float, Array]]:
+        """Return the stations at which there is any, and what modes make of it there."""
+        rows = np.abs(shapes := self._shapes(arm)).max(axis=(1, 2), initial=0.0)
+        return [(share, shape) for share, shape, row in zip(self.stations, shapes, rows,
+                                                            strict=True)
+                if row > _NOTHING * rows.max()]
+
+    def _labels(self, arm: Arm, what: str, unit: str, scale: float) -> list[SlackLabel]:
+        """Return a name for each slack."""
+        return [SlackLabel(name=f'{what} of link {self.link} at {share:.3g} of its length',
+                           unit=unit, scale=scale)
+                for share, shape in self._bending(arm) for _ in range(2 // len(shape))]
+
+    def _express(self, at: SymbolicArm, factor: Any) -> list[Any]:
+        """Return the slacks of what is so many times the sum of modes."""
+        return [slack for _, shape in self._bending(at.arm)
+                for slack in _within([factor * at.bend(self.link - 1, row) for row in shape])]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,7 +83,8 @@ class BendingMoment(_AlongLink):
     """
     The bending moment ``E I v''(x)`` at stations of a link stays below a limit.
 
-    Slacks: 1 less the moment by the limit, in both directions.
+    Slacks: 1 less the moment by the limit, in both directions; in space
+    ``sqrt(1 + r^2) - sqrt(|M|^2 / limit^2 + r^2)`` of the moments M in both planes, r = 0.1.
 
     Parameters
     ----------
@@ -76,10 +111,8 @@ class BendingMoment(_AlongLink):
         object.__setattr__(self, 'stations', _shares(self.stations))
 
     def labels(self, arm: Arm) -> list[SlackLabel]:
-        """Return the names of both directions at each station."""
-        return [SlackLabel(name=f'bending moment of link {self.link} at {share:.3g} of its length',
-                           unit='N m', scale=self.limit)
-                for share, _ in self._curvatures(arm) for _ in (1, -1)]
+        """Return the names of all directions at each station."""
+        return self._labels(arm, 'bending moment', 'N m', self.limit)
 
     def numbers(self, arm: Arm) -> list[float]:
         """Return rigidity and limit."""
@@ -92,18 +125,11 @@ class BendingMoment(_AlongLink):
     def express(self, at: SymbolicArm, numbers: Sequence[Any]) -> list[Any]:
         """Return the slacks."""
         rigidity, limit = numbers
-        shares = [rigidity * at.bend(self.link - 1, row) / limit
-                  for _, row in self._curvatures(at.arm)]
-        return _both_ways(shares)
+        return self._express(at, rigidity / limit)
 
-    def _curvatures(self, arm: Arm) -> list[tuple[float, Array]]:
-        """Return the stations with a moment, and what it is there for E I = 1 and each mode."""
-        link = arm.links[self.link - 1]
-        rows = link.mode_shapes().curvature(np.array(self.stations) * link.length)
-        rows = rows * np.array([_rigidity_at(link, share) for share in self.stations])[:, None]
-        least = _NO_CURVATURE * np.abs(rows).max(initial=0.0)
-        return [(share, row) for share, row in zip(self.stations, rows, strict=True)
-                if np.abs(row).max() > least]
+    def _shapes(self, arm: Arm) -> Array:
+        """Return the moments of modes for E I = 1, shape (k, planes, modes)."""
+        return arm.links[self.link - 1].moment_shapes(np.array(self.stations))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,7 +137,8 @@ class Deflection(_AlongLink):
     """
     The deflection at stations of a link stays below a share of its length.
 
-    Slacks: 1 less the deflection by the limit, in both directions.
+    Slacks: 1 less the deflection by the limit, in both directions; in space as of a
+    `BendingMoment`, of the deflections in both planes.
 
     Parameters
     ----------
@@ -138,11 +165,8 @@ class Deflection(_AlongLink):
         object.__setattr__(self, 'stations', _shares(self.stations))
 
     def labels(self, arm: Arm) -> list[SlackLabel]:
-        """Return the names of both directions at each station."""
-        scale = self.limit * arm.links[self.link - 1].length
-        return [SlackLabel(name=f'deflection of link {self.link} at {share:.3g} of its length',
-                           unit='m', scale=scale)
-                for share in self._moving(arm) for _ in (1, -1)]
+        """Return the names of all directions at each station."""
+        return self._labels(arm, 'deflection', 'm', self.limit * arm.links[self.link - 1].length)
 
     def numbers(self, arm: Arm) -> list[float]:
         """Return the limit."""
@@ -154,17 +178,11 @@ class Deflection(_AlongLink):
 
     def express(self, at: SymbolicArm, numbers: Sequence[Any]) -> list[Any]:
         """Return the slacks."""
-        length = at.arm.links[self.link - 1].length
-        shares = [at.deflection(self.link - 1, share) / (numbers[0] * length)
-                  for share in self._moving(at.arm)]
-        return _both_ways(shares)
+        return self._express(at, 1 / (numbers[0] * at.arm.links[self.link - 1].length))
 
-    def _moving(self, arm: Arm) -> list[float]:
-        """Return the stations that modes move."""
-        link = arm.links[self.link - 1]
-        shapes = np.abs(link.mode_shapes().shape(np.array(self.stations) * link.length))
-        return [share for share, row in zip(self.stations, shapes, strict=True)
-                if row.max() > _NO_CURVATURE * shapes.max()]
+    def _shapes(self, arm: Arm) -> Array:
+        """Return the deflections of modes, shape (k, planes, modes)."""
+        return arm.links[self.link - 1].bend_shapes(np.array(self.stations))
 
 
 def _shares(given: Sequence[float]) -> tuple[float, ...]:
@@ -174,16 +192,9 @@ def _shares(given: Sequence[float]) -> tuple[float, ...]:
     return tuple(vector('stations', given, len(given), at_least=0, at_most=1).tolist())
 
 
-def _both_ways(shares: Sequence[Any]) -> list[Any]:
-    """Return the slacks of shares of a limit, forwards and backwards."""
-    return [1 - sign * share for share in shares for sign in (1, -1)]
-
-
-def _rigidity_at(link: Link, share: float) -> float:
-    """Return E I at a share of a link's length over that of the link."""
-    end = 0.0
-    for section in link.sections:
-        end += section.share
-        if share <= end:
-            return section.rigidity
-    return 1.0
+def _within(shares: Sequence[Any]) -> list[Any]:
+    """Return the slacks of shares of a limit: in both directions, or of those of two planes."""
+    if len(shares) == 1:
+        return [1 - shares[0], 1 + shares[0]]
+    square = sum(share * share for share in shares)
+    return [math.sqrt(1 + _ROUNDING**2) - (square + _ROUNDING**2)**0.5]

@@ -24,7 +24,17 @@ from flex_planner.optimal_control.path_constraints.joint_constraints import (
 )
 from flex_planner.optimal_control.path_constraints.obstacles import KeepOut, SelfClearance
 from flex_planner.optimal_control.path_constraints.path_constraint import PathConstraint
-from flex_planner.optimal_control.path_constraints.regions import Capsule, Circle, HalfPlane
+from flex_planner.optimal_control.path_constraints.regions import (
+    Capsule,
+    Circle,
+    HalfPlane,
+    Region,
+)
+from flex_planner.optimal_control.path_constraints.spatial_regions import (
+    HalfSpace,
+    SpatialCapsule,
+    Sphere,
+)
 
 _Values = list[float]
 _Options = dict[str, Any]
@@ -41,6 +51,13 @@ FORMS: dict[str, tuple[int, str, Callable[[_Values, _Options], PathConstraint]]]
         lambda v: Capsule(start=(v[0], v[1]), end=(v[2], v[3]), radius=v[4]))),
     'keep_out_half_plane': (4, 'x, y of a point, x, y of the normal to the free side', _keep_out(
         lambda v: HalfPlane(point=(v[0], v[1]), normal=(v[2], v[3])))),
+    'keep_out_sphere': (4, 'x, y, z, radius', _keep_out(
+        lambda v: Sphere(center=tuple(v[:3]), radius=v[3]))),
+    'keep_out_spatial_capsule': (7, 'x, y, z, x, y, z, radius', _keep_out(
+        lambda v: SpatialCapsule(start=tuple(v[:3]), end=tuple(v[3:6]), radius=v[6]))),
+    'keep_out_half_space': (6, 'x, y, z of a point, x, y, z of the normal to the free side',
+                            _keep_out(lambda v: HalfSpace(point=tuple(v[:3]),
+                                                          normal=tuple(v[3:])))),
     'joint_range': (3, 'joint, lower, upper', lambda v, o: JointRange(
         joint=_index(v[0]), lower=v[1], upper=v[2], **o)),
     'joint_speed': (2, 'joint, limit', lambda v, o: JointSpeed(
@@ -52,6 +69,10 @@ FORMS: dict[str, tuple[int, str, Callable[[_Values, _Options], PathConstraint]]]
         link=_index(v[0]), limit=v[1], **o)),
 }
 """Kinds of limits: how many values, which, and how they are made."""
+_REGIONS: dict[type[Region], str] = {
+    Circle: 'keep_out', Capsule: 'keep_out_capsule', HalfPlane: 'keep_out_half_plane',
+    Sphere: 'keep_out_sphere', SpatialCapsule: 'keep_out_spatial_capsule',
+    HalfSpace: 'keep_out_half_space'}
 # options by kind, and what they are
 _OPTIONS: dict[str, dict[str, type]] = {
     'keep_out': {'tip_radius': float, 'stations': int, 'link_radius': float, 'name': str},
@@ -106,8 +127,7 @@ def write_constraint(constraint: PathConstraint) -> str:
 def _describe(constraint: PathConstraint) -> tuple[str, list[float]]:
     """Return kind and values of a limit."""
     if isinstance(constraint, KeepOut):
-        kinds = {Circle: 'keep_out', Capsule: 'keep_out_capsule', HalfPlane: 'keep_out_half_plane'}
-        return kinds[type(constraint.region)], constraint.region.numbers
+        return _REGIONS[type(constraint.region)], constraint.region.numbers
     if isinstance(constraint, JointRange):
         return 'joint_range', [constraint.joint, constraint.lower, constraint.upper]
     if isinstance(constraint, JointSpeed):

@@ -36,8 +36,9 @@ class KeepOut(PathConstraint):
 
     Parameters
     ----------
-    region : Circle, Capsule or HalfPlane
-        What is kept free.
+    region : Region
+        What is kept free: a Circle, a Capsule or a HalfPlane, of a spatial arm a Sphere, a
+        SpatialCapsule or a HalfSpace.
     tip_radius : float
         Of a payload round the tip, >= 0 [m].
     stations : int
@@ -62,7 +63,8 @@ class KeepOut(PathConstraint):
 
     def __post_init__(self) -> None:
         if not isinstance(self.region, Region):
-            raise InvalidValueError('region', self.region, 'a Circle, a Capsule or a HalfPlane')
+            raise InvalidValueError('region', self.region, 'a Region such as a Circle, a Capsule '
+                                    'or a HalfPlane, in space a Sphere')
         number('tip_radius', self.tip_radius, at_least=0, unit='m')
         integer('stations', self.stations, at_least=0, at_most=_MOST_STATIONS)
         number('link_radius', self.link_radius, at_least=0, unit='m')
@@ -73,7 +75,12 @@ class KeepOut(PathConstraint):
         return self.region.middle is not None
 
     def check(self, name: str, arm: Arm) -> None:
-        """Accept every arm."""
+        """Refuse a region of the plane for a spatial arm, and one of space for a planar arm."""
+        if self.region.dimension != arm.dimension:
+            raise InvalidValueError(f'{name}.region', type(self.region).__name__,
+                                    'a Sphere, SpatialCapsule or HalfSpace: the arm is spatial'
+                                    if arm.dimension == 3 else
+                                    'a Circle, Capsule or HalfPlane: the arm is planar')
 
     def labels(self, arm: Arm) -> list[SlackLabel]:
         """Return the names of all points."""
@@ -168,14 +175,18 @@ class SelfClearance(PathConstraint):
         slacks = []
         for link, share, other in self._pairs(at.arm):
             point = at.point(link, share)
-            slacks.append(stay_apart(ca.sumsqr(point), base + width) if other is None else
+            slacks.append(stay_apart(ca.sumsqr(point - at.point(0, 0.0)), base + width)
+                          if other is None else
                           stay_apart(distance_to_segment(
                               point, at.point(other, 0.0), at.point(other, 1.0)), 2 * width))
         return slacks
 
     def _pairs(self, arm: Arm) -> list[tuple[int, float, int | None]]:
         """Return link, share of its length, and what it stays away from: None for the base."""
-        others = range(arm.n_joints) if self.link_radius else ()
-        return [(link, k / self.stations, other) for link in range(1, arm.n_joints)
-                for other in (None, *(i for i in others if i < link - 1))
+        long = [i for i, link in enumerate(arm.links) if link.length]
+        others = long if self.link_radius else []
+        # joints of a spatial arm may be at one place: links are neighbours across such a link
+        return [(link, k / self.stations, other) for link in long[1:]
+                for other in (None, *(i for i in others if i < link and any(
+                    i < between < link for between in long)))
                 for k in range(1, self.stations + 1)]

@@ -1,10 +1,16 @@
-"""Regions that are kept free: circles, capsules and half-planes."""
+"""
+Regions that are kept free: circles, capsules and half-planes.
+
+Those in space are in `spatial_regions`.
+
+"""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.validation import number, vector
@@ -15,36 +21,50 @@ _FURTHEST = 1e6
 _ROUNDING = 0.1
 
 
-def _point(name: str, given: Sequence[float]) -> tuple[float, float]:
-    """Return a checked point in the base frame [m]."""
-    x, y = vector(name, given, 2, at_least=-_FURTHEST, at_most=_FURTHEST, unit='m').tolist()
-    return x, y
+class Region(ABC):
+    """What tip and links keep out of; subclasses are frozen dataclasses."""
+
+    __slots__ = ()
+    dimension: ClassVar[int] = 2
+    """Of the space that it is in, 2 or 3."""
+
+    @property
+    @abstractmethod
+    def scale(self) -> float:
+        """Return the length in which slacks are measured [m]."""
+
+    @property
+    @abstractmethod
+    def numbers(self) -> list[float]:
+        """Return its values."""
+
+    @property
+    @abstractmethod
+    def middle(self) -> tuple[float, ...] | None:
+        """Return its middle [m]; None if it cannot be passed on two sides."""
+
+    @staticmethod
+    @abstractmethod
+    def express(point: Any, numbers: Sequence[Any], clearance: Any) -> Any:
+        """Return the slack of a point that stays so far outside, of symbols."""
+
+    def _point(self, name: str) -> tuple[float, ...]:
+        """Check and keep a point in the base frame [m]."""
+        point = tuple(vector(name, getattr(self, name), self.dimension, at_least=-_FURTHEST,
+                             at_most=_FURTHEST, unit='m').tolist())
+        object.__setattr__(self, name, point)
+        return point
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Circle:
-    """
-    A disc.
+class Ball(Region):
+    """All within a distance of a point, in the plane or in space."""
 
-    Parameters
-    ----------
-    center : tuple of float
-        In the base frame [m].
-    radius : float
-        > 0 [m].
-
-    Raises
-    ------
-    InvalidValueError
-        If a value breaks its bound.
-
-    """
-
-    center: tuple[float, float]
+    center: tuple[float, ...]
     radius: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, 'center', _point('center', self.center))
+        self._point('center')
         number('radius', self.radius, above=0, at_most=_FURTHEST, unit='m')
 
     @property
@@ -58,7 +78,7 @@ class Circle:
         return [*self.center, self.radius]
 
     @property
-    def middle(self) -> tuple[float, float]:
+    def middle(self) -> tuple[float, ...]:
         """Return its centre [m]."""
         return self.center
 
@@ -67,37 +87,20 @@ class Circle:
         """Return the slack of a point that stays so far outside, of symbols."""
         import casadi as ca
 
-        x, y, radius = numbers
-        return _outside(ca.sumsqr(point - ca.vertcat(x, y)), radius + clearance, radius)
+        *center, radius = numbers
+        return _outside(ca.sumsqr(point - ca.vertcat(*center)), radius + clearance, radius)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Capsule:
-    """
-    All within a distance of a segment, a wall for example.
+class Pill(Region):
+    """All within a distance of a segment, in the plane or in space."""
 
-    Parameters
-    ----------
-    start, end : tuple of float
-        Of the segment, in the base frame, apart from one another [m].
-    radius : float
-        > 0 [m].
-
-    Raises
-    ------
-    InvalidValueError
-        If a value breaks its bound.
-
-    """
-
-    start: tuple[float, float]
-    end: tuple[float, float]
+    start: tuple[float, ...]
+    end: tuple[float, ...]
     radius: float
 
     def __post_init__(self) -> None:
-        for name in ('start', 'end'):
-            object.__setattr__(self, name, _point(name, getattr(self, name)))
-        if self.start == self.end:
+        if self._point('start') == self._point('end'):
             raise InvalidValueError('end', list(self.end), 'another point than start')
         number('radius', self.radius, above=0, at_most=_FURTHEST, unit='m')
 
@@ -112,10 +115,9 @@ class Capsule:
         return [*self.start, *self.end, self.radius]
 
     @property
-    def middle(self) -> tuple[float, float]:
+    def middle(self) -> tuple[float, ...]:
         """Return the middle of the segment [m]."""
-        x, y = (np.add(self.start, self.end) / 2).tolist()
-        return x, y
+        return tuple((np.add(self.start, self.end) / 2).tolist())
 
     @staticmethod
     def express(point: Any, numbers: Sequence[Any], clearance: Any) -> Any:
@@ -123,39 +125,25 @@ class Capsule:
         import casadi as ca
 
         *ends, radius = numbers
-        square = distance_to_segment(point, ca.vertcat(*ends[:2]), ca.vertcat(*ends[2:]))
+        size = len(ends) // 2
+        square = distance_to_segment(point, ca.vertcat(*ends[:size]), ca.vertcat(*ends[size:]))
         return _outside(square, radius + clearance, radius)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class HalfPlane:
-    """
-    All on one side of a line.
+class Half(Region):
+    """All on one side of a line in the plane, or of a plane in space."""
 
-    Parameters
-    ----------
-    point : tuple of float
-        Of the line, in the base frame [m].
-    normal : tuple of float
-        Towards the side that is allowed, not zero.
-
-    Raises
-    ------
-    InvalidValueError
-        If a value breaks its bound.
-
-    """
-
-    point: tuple[float, float]
-    normal: tuple[float, float]
+    point: tuple[float, ...]
+    normal: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, 'point', _point('point', self.point))
-        x, y = _point('normal', self.normal)
-        length = float(np.hypot(x, y))
+        self._point('point')
+        normal = np.array(self._point('normal'))
+        length = float(np.linalg.norm(normal))
         if not length:
-            raise InvalidValueError('normal', [x, y], 'a direction, not zero')
-        object.__setattr__(self, 'normal', (x / length, y / length))
+            raise InvalidValueError('normal', normal.tolist(), 'a direction, not zero')
+        object.__setattr__(self, 'normal', tuple((normal / length).tolist()))
 
     @property
     def scale(self) -> float:
@@ -177,11 +165,69 @@ class HalfPlane:
         """Return the slack of a point that stays so far outside, of symbols."""
         import casadi as ca
 
-        x, y, along, across = numbers
-        return ca.dot(point - ca.vertcat(x, y), ca.vertcat(along, across)) - clearance
+        size = len(numbers) // 2
+        at, normal = ca.vertcat(*numbers[:size]), ca.vertcat(*numbers[size:])
+        return ca.dot(point - at, normal) - clearance
 
 
-Region = Circle | Capsule | HalfPlane
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Circle(Ball):
+    """
+    A disc.
+
+    Parameters
+    ----------
+    center : tuple of float
+        In the base frame [m].
+    radius : float
+        > 0 [m].
+
+    Raises
+    ------
+    InvalidValueError
+        If a value breaks its bound.
+
+    """
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Capsule(Pill):
+    """
+    All within a distance of a segment, a wall for example.
+
+    Parameters
+    ----------
+    start, end : tuple of float
+        Of the segment, in the base frame, apart from one another [m].
+    radius : float
+        > 0 [m].
+
+    Raises
+    ------
+    InvalidValueError
+        If a value breaks its bound.
+
+    """
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HalfPlane(Half):
+    """
+    All on one side of a line.
+
+    Parameters
+    ----------
+    point : tuple of float
+        Of the line, in the base frame [m].
+    normal : tuple of float
+        Towards the side that is allowed, not zero.
+
+    Raises
+    ------
+    InvalidValueError
+        If a value breaks its bound.
+
+    """
 
 
 def distance_to_segment(point: Any, start: Any, end: Any) -> Any:

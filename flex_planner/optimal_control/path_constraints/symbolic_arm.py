@@ -7,6 +7,8 @@ from typing import Any
 
 import casadi as ca
 from flex_planner.arms.arm import Arm
+from flex_planner.arms.spatial_arm import SpatialArm
+from flex_planner.optimal_control.path_constraints.spatial_points import express_point
 import numpy as np
 
 
@@ -40,14 +42,16 @@ class SymbolicArm:
                    ca.SX(0))
 
     def deflection(self, link: int, share: float) -> Any:
-        """Return how far a link bends at a share of its length [m]."""
+        """Return how far a link of a planar arm bends at a share of its length [m]."""
         body = self.arm.links[link]
         if not body.modes:
             return ca.SX(0)
         return self.bend(link, body.mode_shapes().shape(np.array([share * body.length])))
 
     def point(self, link: int, share: float) -> Any:
-        """Return the position of a point at a share of a link's length, shape (2, 1) [m]."""
+        """Return the position of a point at a share of a link's length, (2 or 3, 1) [m]."""
+        if isinstance(self.arm, SpatialArm):
+            return express_point(self.arm, self.coordinates, link, share)
         angle, base = ca.SX(0), ca.SX.zeros(2)
         elastic = list(self.arm.elastic_joints)
         for i, body in enumerate(self.arm.links[:link + 1]):

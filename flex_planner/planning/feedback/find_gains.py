@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from flex_planner.arms.planar_only import require_planar
 from flex_planner.base.errors import InvalidTaskError, NoEquilibriumError
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array, number
@@ -102,7 +101,7 @@ def find_feedback_gains(plan: Plan, settings: GainSettings | None = None,
     Parameters
     ----------
     plan : Plan
-        Solved, of a planar arm, ending at rest.
+        Solved, ending at rest.
     settings : GainSettings, optional
         Of the controller and the errors of the model.
     monitor : Monitor, optional
@@ -117,13 +116,10 @@ def find_feedback_gains(plan: Plan, settings: GainSettings | None = None,
     ------
     InvalidTaskError
         If the plan is not solved, or does not end at rest.
-    PlanarOnlyError
-        If the arm is a spatial one.
     StoppedError
         If the monitor stopped it.
 
     """
-    require_planar(plan.arm, 'gains of feedback')
     if not plan.solved:
         raise InvalidTaskError(f'gains are found for plans that are solved: {plan.message}')
     if not plan.task.ends_at_rest:

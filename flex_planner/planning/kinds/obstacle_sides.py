@@ -15,7 +15,8 @@ from flex_planner.arms.kinematics import tip_jacobian, tip_position, tip_velocit
 from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationSolution
 from flex_planner.optimal_control.motion_problem import MotionProblem
-from flex_planner.optimal_control.path_constraints import Capsule, KeepOut, PathSlacks
+from flex_planner.optimal_control.path_constraints import KeepOut, PathSlacks
+from flex_planner.optimal_control.path_constraints.regions import Pill
 import numpy as np
 
 # how far beyond the edge of an obstacle a start passes it, in units of its radius
@@ -49,19 +50,29 @@ def find_obstacles(slacks: PathSlacks, values: Array) -> list[KeepOut]:
     return [one for one in every if isinstance(one, KeepOut) and one.is_obstacle]
 
 
-def find_side(problem: MotionProblem, solution: CollocationSolution, obstacle: KeepOut) -> int:
-    """Return 1 if a motion has an obstacle on its left where it is nearest, -1 on its right."""
+def find_side(problem: MotionProblem, solution: CollocationSolution, obstacle: KeepOut) -> str:
+    """
+    Return on which side a motion has an obstacle where it is nearest: left or right.
+
+    In space it is the axis of the base nearest to the direction in which it is passed, as ``+z``.
+
+    """
     _, _, tip, velocity, middle = _nearest(problem, solution, obstacle)
-    x, y = middle - tip
-    return 1 if velocity[0] * y - velocity[1] * x > 0 else -1
+    away = middle - tip
+    if away.size == 2:
+        return 'left' if velocity[0] * away[1] - velocity[1] * away[0] > 0 else 'right'
+    across = _across(away, velocity)
+    axis = int(np.abs(across).argmax())
+    return f'{"+" if across[axis] > 0 else "-"}{"xyz"[axis]}'
 
 
 def say_sides(problem: MotionProblem, solution: CollocationSolution,
               obstacles: list[KeepOut]) -> str:
     """Return on which sides a motion has obstacles."""
-    sides = {1: 'left', -1: 'right'}
-    return ', '.join(f'{one.name or "the keep-out"} on its '
-                     f'{sides[find_side(problem, solution, one)]}' for one in obstacles)
+    side = 'side' if problem.model.arm.dimension == 3 else ''
+    return ', '.join(
+        f'{one.name or "the keep-out"} on its {find_side(problem, solution, one)} {side}'.strip()
+        for one in obstacles)
 
 
 def pass_otherwise(problem: MotionProblem, solution: CollocationSolution,
@@ -94,17 +105,40 @@ def _move_across(problem: MotionProblem, solution: CollocationSolution,
     """Return a motion whose tip passes an obstacle on the other side."""
     arm, duration = problem.model.arm, float(solution.mesh[-1])
     time, q, tip, velocity, middle = _nearest(problem, solution, obstacle)
-    along = velocity / max(float(np.linalg.norm(velocity)), 1e-300)
-    across = np.array([-along[1], along[0]]) * find_side(problem, solution, obstacle)
+    across = _across(middle - tip, velocity)
     reach = _BEYOND * (obstacle.region.scale + obstacle.tip_radius)
-    if isinstance(obstacle.region, Capsule):
+    if isinstance(obstacle.region, Pill):
         ends = np.array([obstacle.region.start, obstacle.region.end])
         reach += float(np.max((ends - middle) @ across))
     slopes = tip_jacobian(arm, q)[:, :arm.n_joints]
     target = middle + reach * across - tip
     turn = slopes.T @ np.linalg.solve(
-        slopes @ slopes.T + (_DAMPING * arm.reach)**2 * np.eye(2), target)
+        slopes @ slopes.T + (_DAMPING * arm.reach)**2 * np.eye(target.size), target)
     return _add_bump(solution, turn, time, duration, arm.n_coordinates)
+
+
+def _across(away: Array, velocity: Array) -> Array:
+    """
+    Return the direction across a path in which an obstacle lies, a unit vector.
+
+    Parameters
+    ----------
+    away : numpy.ndarray, shape (2,) or (3,)
+        From the path to the middle of the obstacle [m].
+    velocity : numpy.ndarray, shape (2,) or (3,)
+        Along the path.
+
+    """
+    along = velocity / max(float(np.linalg.norm(velocity)), 1e-300)
+    if away.size == 2:
+        left = np.array([-along[1], along[0]])
+        return left if left @ away > 0 else -left
+    across = away - (away @ along) * along
+    if np.linalg.norm(across) < 1e-9:  # right through the middle: upwards, or anywhere
+        upwards = np.eye(3)[2 if abs(along[2]) < 0.9 else 0]
+        across = upwards - (upwards @ along) * along
+    direction: Array = across / np.linalg.norm(across)
+    return direction
 
 
 def _add_bump(solution: CollocationSolution, turn: Array, time: float, duration: float,

@@ -12,6 +12,7 @@ from flex_planner.base.colours import ARM, FLEXIBLE, PLANNED, REFUSED
 from flex_planner.base.validation import Array
 from flex_planner.optimal_control.path_constraints import PathConstraint
 from flex_planner.planning.region_outlines import find_keep_outs, outline_region
+from flex_planner.planning.spatial_outlines import outline_in_space
 from flex_planner.reports.recording.contents import RecordedMotion
 from flex_planner.reports.recording.space_view import space_view
 import numpy as np
@@ -40,10 +41,10 @@ def animation(arm: Arm, motion: RecordedMotion,
     dict
         ``times`` (F,) [s]; ``links`` (F, n, 2 k), of each link the points x, y, x, y ... from its
         joint to its end [mm]; ``payload`` (F, 2) [mm]; ``tip`` (2 m,), its recorded path [mm];
-        which links are ``flexible``; colours. In the plane ``keep_outs``, of each region the
-        corners of its outline [mm], and ``box``, left, low, width and height [mm]. In space points
-        have three coordinates, of a rigid link only its ends, and there is what `space_view`
-        returns.
+        which links are ``flexible``; colours; ``keep_outs``, of each region the corners of its
+        outline [mm], in space the lines that show it. In the plane ``box``, left, low, width and
+        height [mm]. In space points have three coordinates, of a rigid link only its ends, and
+        there is what `space_view` returns.
 
     """
     times, coordinates = _even(motion)
@@ -60,7 +61,9 @@ def animation(arm: Arm, motion: RecordedMotion,
         everything = np.concatenate([points.reshape(-1, 3), payload, motion.tip])
         return {**shown, **space_view(arm, coordinates, everything), 'links': [
             [_flat(link[stations]) for link, stations in zip(frame, kept, strict=True)]
-            for frame in points]}
+            for frame in points], 'keep_outs': [
+            _flat(line) for one in find_keep_outs(constraints)
+            for line in outline_in_space(one.region, arm.reach)]}
     return {**shown, 'links': [[_flat(link) for link in frame] for frame in points],
             'keep_outs': [_flat(outline_region(one.region, arm.reach))
                           for one in find_keep_outs(constraints)],

@@ -10,8 +10,13 @@ efforts are those of an optimal motion.
 
 from __future__ import annotations
 
+from typing import Any
+
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import tip_position
+from flex_planner.arms.quaternions import axes_of_quaternion
+from flex_planner.arms.spatial_arm import SpatialArm
+from flex_planner.arms.spatial_kinematics import tip_frame
 from flex_planner.base.errors import RecordingError
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
@@ -191,4 +196,19 @@ def _deviation_from_request(request: RecordedRequest, motion: RecordedMotion,
         findings.append(Finding(
             name=f'deviation from task, {name}', unit='rad' if by_angles else 'm',
             limit=limits.end_error, value=float(np.abs(miss).max())))
-    return findings
+    return [*findings, *_deviation_from_orientation(request, found[-1], limits)]
+
+
+def _deviation_from_orientation(request: RecordedRequest, goal: Array,
+                                limits: CheckLimits) -> list[Finding]:
+    """Return by what angle the tip's frame at the goal is turned from the one asked for."""
+    # older recordings have none
+    asked: Any = getattr(request.task, 'goal_orientation', ())
+    if not (len(asked) and isinstance(request.arm, SpatialArm)):
+        return []
+    wanted = axes_of_quaternion('goal_orientation', [getattr(asked[0], name) for name in 'xyzw'])
+    turn = tip_frame(request.arm, goal)[1].T @ wanted
+    # twice the sine of half the angle: exact where it is small
+    sine = float(np.linalg.norm(turn - np.eye(3)) / np.sqrt(8))
+    return [Finding(name='deviation from task, orientation of the goal', unit='rad',
+                    limit=limits.end_error, value=2 * float(np.arcsin(min(sine, 1.0))))]

@@ -10,6 +10,7 @@ from flex_planner.base.colours import coordinate_colour, REFUSED, VIA
 from flex_planner.base.validation import Array
 from flex_planner.optimal_control.path_constraints import JointRange, JointSpeed
 from flex_planner.planning.region_outlines import find_keep_outs, outline_region
+from flex_planner.planning.spatial_outlines import outline_in_space
 from flex_planner.reports.recording.contents import RecordedMotion, RecordedRequest
 from flex_planner.reports.recording.plot_data import Bands, Plot, Series
 from flex_planner.reports.recording.way_limits import find_active_limits
@@ -30,9 +31,9 @@ def add_limits(request: RecordedRequest, motion: RecordedMotion,
     added = {'positions': [*_angle_bounds(request, motion), *_passed_angles(request, motion)],
              'speeds': _speed_bounds(request, motion),
              'tip': [*_regions(request), *_passed_points(request, motion, (0, 1))]}
-    if motion.tip.shape[1] == 3:  # no regions: they are of the plane
-        added |= {f'tip_{"xyz"[i]}{"xyz"[j]}': _passed_points(request, motion, (i, j))
-                  for i, j in ((0, 1), (0, 2), (1, 2))}
+    if motion.tip.shape[1] == 3:
+        added |= {f'tip_{"xyz"[i]}{"xyz"[j]}': [*_lines(request, (i, j)), *_passed_points(
+            request, motion, (i, j))] for i, j in ((0, 1), (0, 2), (1, 2))}
     bands = _active_bands(request, motion)
     return [replace(plot, series=[*plot.series, *added.get(plot.key, [])],
                     bands=bands if plot.group == _OVER_TIME else plot.bands) for plot in plots]
@@ -76,10 +77,20 @@ def _regions(request: RecordedRequest) -> list[Series]:
     """Return the outlines of regions that are kept free [m]."""
     drawn = []
     for one in find_keep_outs(request.path_constraints):
+        if one.region.dimension == 3:
+            continue
         corners = outline_region(one.region, request.arm.reach)
         drawn.append(Series(name=one.name or 'kept free', x=corners[:, 0], y=corners[:, 1],
                             colour=REFUSED, bound=True, filled=True))
     return drawn
+
+
+def _lines(request: RecordedRequest, sides: tuple[int, int]) -> list[Series]:
+    """Return the outlines of regions in space as seen along one of the axes [m]."""
+    return [Series(name=one.name or 'kept free', x=line[:, sides[0]], y=line[:, sides[1]],
+                   colour=REFUSED, bound=True)
+            for one in find_keep_outs(request.path_constraints)
+            for line in outline_in_space(one.region, request.arm.reach)]
 
 
 def find_via_times(request: RecordedRequest, motion: RecordedMotion) -> Array:

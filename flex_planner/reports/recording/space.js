@@ -44,7 +44,7 @@ class SpatialArm extends Player {
   }
 
   addStill() {
-    const { links, tip, colours, floor, base } = this.spec;
+    const { links, tip, colours, floor, base, keep_outs } = this.spec;
     this.still = floor.map((line) => this.line(line, FLOOR, 0.15));
     this.shadow = this.line([], SHADOW, 0.9);
     const length = 8 * this.unit;
@@ -59,6 +59,7 @@ class SpatialArm extends Player {
     for (const frame of [links[0], links[links.length - 1]]) {
       this.still.push(...frame.map((link) => this.line(link, colours.aside, 0.6)));
     }
+    this.still.push(...keep_outs.map((line) => this.line(line, colours.refused, 0.25)));
     const path = this.line(tip, colours.tip, 0.3);
     path.made.setAttribute('stroke-dasharray', `${this.unit} ${this.unit}`);
     this.still.push(path);

@@ -88,6 +88,9 @@ def _task(request: RecordedRequest) -> ReportTable:
             ('weights W1', numbers(task.position_weights)),
             ('weights W2', numbers(task.velocity_weights)),
             ('tolerance of the boundary error', f'{request.tolerance:g}')]
+    for one in getattr(task, 'goal_orientation', ()):  # older recordings have none
+        parts = (one.x, one.y, one.z, one.w)
+        rows.append(('orientation of the goal (x, y, z, w)', numbers(parts)))
     if task.allow_large_bending:
         rows.append(('large bending', 'allowed'))
     for name in ('start_velocities', 'start_modal_displacements'):

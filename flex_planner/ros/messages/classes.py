@@ -24,7 +24,7 @@ try:
         PayloadSearch,
         PlanReport,
     )
-    from geometry_msgs.msg import Point
+    from geometry_msgs.msg import Point, Quaternion
     from sensor_msgs.msg import JointState
     from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
@@ -47,6 +47,7 @@ except ImportError as _error:
     PayloadSearch = _find(f'{PACKAGE}/msg/PayloadSearch')
     PlanReport = _find(f'{PACKAGE}/msg/PlanReport')
     Point = _find('geometry_msgs/msg/Point')
+    Quaternion = _find('geometry_msgs/msg/Quaternion')
     JointState = _find('sensor_msgs/msg/JointState')
     JointTrajectory = _find('trajectory_msgs/msg/JointTrajectory')
     JointTrajectoryPoint = _find('trajectory_msgs/msg/JointTrajectoryPoint')
@@ -63,6 +64,7 @@ __all__ = [
     'PayloadSearch',
     'PlanReport',
     'Point',
+    'Quaternion',
     'TYPES',
     'Time',
     'WHY_NOT_ROS',

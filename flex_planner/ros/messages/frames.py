@@ -8,7 +8,8 @@ from builtin_interfaces.msg import Time
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.frames import link_frames
 from flex_planner.base.validation import Array
-from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
+from flex_planner.ros.messages.orientations import quaternion_message
+from geometry_msgs.msg import TransformStamped, Vector3
 import numpy as np
 
 
@@ -36,26 +37,7 @@ def frame_transforms(arm: Arm, coordinates: Array, names: Sequence[str],
         message = TransformStamped(child_frame_id=child)
         message.header.stamp, message.header.frame_id = stamp, parent
         message.transform.translation = Vector3(x=x, y=y, z=z)
-        message.transform.rotation = _quaternion(turn.T @ own)
+        message.transform.rotation = quaternion_message(turn.T @ own)
         found.append(message)
         origin, turn = place, own
     return found
-
-
-def _quaternion(axes: Array) -> Quaternion:
-    """
-    Return a rotation as a unit quaternion with w >= 0.
-
-    The eigenvector of K. Itzhack's matrix (Journal of Guidance, Control, and Dynamics 23(6),
-    2000) to its largest eigenvalue: as exact for half turns as for small ones.
-
-    """
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = axes
-    matrix = np.array([
-        [xx - yy - zz, xy + yx, xz + zx, zy - yz],
-        [xy + yx, yy - xx - zz, yz + zy, xz - zx],
-        [xz + zx, yz + zy, zz - xx - yy, yx - xy],
-        [zy - yz, xz - zx, yx - xy, xx + yy + zz]])
-    vector = np.linalg.eigh(matrix)[1][:, -1]
-    x, y, z, w = (float(value) for value in (vector if vector[3] >= 0 else -vector))
-    return Quaternion(x=x, y=y, z=z, w=w)

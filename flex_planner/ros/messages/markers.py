@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import link_points
@@ -10,6 +10,7 @@ from flex_planner.base.validation import Array
 from flex_planner.optimal_control.path_constraints import PathConstraint
 from flex_planner.planning.region_outlines import find_keep_outs, outline_region
 from flex_planner.planning.sampling import SampledPlan
+from flex_planner.planning.spatial_outlines import outline_in_space
 from flex_planner.ros.messages.points import point_message
 import numpy as np
 from std_msgs.msg import ColorRGBA
@@ -57,8 +58,8 @@ def motion_markers(arm: Arm, reference: SampledPlan, frame: str,
     markers += [_line('tip_path', 0, tip[steps], (*_PATH, 1.0), width / 2),
                 _ball('start', tip[0], (*_START, 1.0), 3 * width),
                 _ball('goal', tip[-1], (*_GOAL, 1.0), 3 * width)]
-    markers += [_line('keep_out', i, outline_region(one.region, _reach(arm)), (*_GOAL, 1.0),
-                      width) for i, one in enumerate(find_keep_outs(constraints))]
+    markers += [_line('keep_out', i, line, (*_GOAL, 1.0), width)
+                for i, line in enumerate(_outlines(arm, constraints))]
     passed = np.searchsorted(times * 1e-9, reference.start_hold + np.array(via_times) - _SOON)
     markers += [_ball('via_points', tip[k], (*_PATH, 1.0), 2 * width, i)
                 for i, k in enumerate(passed)]
@@ -87,6 +88,15 @@ def arm_markers(arm: Arm, coordinates: Array, frame: str) -> MarkerArray:
     for marker in markers:
         marker.header.frame_id = frame
     return MarkerArray(markers=markers)
+
+
+def _outlines(arm: Arm, constraints: Sequence[PathConstraint]) -> Iterator[Array]:
+    """Yield the lines of regions that are kept free."""
+    for one in find_keep_outs(constraints):
+        if one.region.dimension == 3:
+            yield from outline_in_space(one.region, _reach(arm))
+        else:
+            yield outline_region(one.region, _reach(arm))
 
 
 def _reach(arm: Arm) -> float:

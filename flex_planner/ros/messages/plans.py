@@ -21,6 +21,7 @@ from flex_planner.base.text import printable
 from flex_planner.base.validation import number, vector
 from flex_planner.control.joint_controller import JointController
 from flex_planner.optimal_control.ends_at_points import ends_at_points
+from flex_planner.optimal_control.goal_in_pose import posture_in_pose
 from flex_planner.optimal_control.path_constraints import read_constraint
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.kinds.clusters import KindOfMotion
@@ -39,6 +40,7 @@ from flex_planner.ros.messages.classes import (
     MotionTask,
     PlanReport,
 )
+from flex_planner.ros.messages.orientations import orientation_axes
 from flex_planner.ros.messages.points import point_coordinates, point_message
 from flex_planner.ros.messages.request_error import RequestError
 from flex_planner.ros.messages.robustness import add_robustness, robustness_from_message
@@ -144,6 +146,9 @@ def _ends(message: MotionTask, arm: Arm, settings: PlannerSettings) -> dict[str,
     """Return start and goal as they are given, with the postures that belong to points."""
     angles = {name: np.asarray(getattr(message, name))
               for name in ('start_positions', 'goal_positions')}
+    if len(message.goal_orientation) and message.space in (MotionTask.JOINT, MotionTask.CARTESIAN):
+        raise InvalidValueError('goal_orientation', 'given', 'empty unless space is '
+                                '2 (CARTESIAN_GOAL)')
     if message.space == MotionTask.JOINT:
         return angles
     if message.space not in SPACES:
@@ -156,8 +161,13 @@ def _ends(message: MotionTask, arm: Arm, settings: PlannerSettings) -> dict[str,
                    for point in (message.start_point, message.goal_point))
     if message.space == MotionTask.CARTESIAN:
         return ends_at_points(arm, start, goal, elbow)
-    return angles | ends_at_points(arm, None, goal, elbow, vector(
-        'start_positions', angles['start_positions'], arm.n_joints, unit='rad'))
+    start_angles = vector('start_positions', angles['start_positions'], arm.n_joints, unit='rad')
+    axes = orientation_axes('goal_orientation', message.goal_orientation)
+    if axes is not None:
+        return angles | {'goal_positions': posture_in_pose(
+            arm, goal, axes, start_angles, payload_mass=message.payload_mass,
+            payload_inertia=message.payload_inertia or arm.payload_inertia)}
+    return angles | ends_at_points(arm, None, goal, elbow, start_angles)
 
 
 def error_code(error: Exception) -> int:

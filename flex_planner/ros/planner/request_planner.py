@@ -146,6 +146,9 @@ class RequestPlanner:
             if objectives_from_message(request.task) is not None:
                 raise InvalidTaskError('objectives such as max_joint_speeds cannot be combined '
                                        'with a search for the maximum payload: leave them out')
+            if len(request.task.goal_orientation):
+                raise InvalidTaskError('goal_orientation cannot be combined with a search for the '
+                                       'maximum payload: another payload has another pose')
             options = search_options(request, settings)
             cell = self._starts.near(task, searched=True)
             found = find_max_payload(

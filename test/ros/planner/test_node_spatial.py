@@ -8,7 +8,12 @@ from typing import Any
 
 from flex_planner.arms.arm_files import load_arm
 from flex_planner.arms.kinematics import link_points
+from flex_planner.arms.quaternions import quaternion_of
+from flex_planner.arms.spatial_arm import SpatialArm
+from flex_planner.arms.spatial_kinematics import tip_frame
+from flex_planner.dynamics.statics import equilibrium
 from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.kinds.effort import SearchEffort
 from flex_planner.planning.plan import Plan
@@ -18,7 +23,7 @@ from flex_planner.reports.recording import check_motion, RecordedRequest
 from flex_planner.ros.settings.planner import PlannerSettings
 from flex_planner_interfaces.msg import FlexibleTrajectory, MotionTask, PlanReport
 from flex_planner_interfaces.srv import PlanPath
-from geometry_msgs.msg import Point
+from geometry_msgs.msg import Point, Quaternion
 import numpy as np
 import pytest
 from ros_support import Planner
@@ -141,15 +146,38 @@ def test_largest_payload_is_found_and_certified(planner: Planner) -> None:
 
 
 @pytest.mark.parametrize(('fields', 'what'), [
-    ({'via_times': [0.5], 'via_points': [Point(x=0.5, y=0.3)]}, 'points on the way'),
-    ({'path_constraints': [NO_POST]}, 'limits of points and of links on the way'),
+    ({'path_constraints': [NO_POST]}, "path_constraints[0].region is 'Circle', but must be a "
+     'Sphere, SpatialCapsule or HalfSpace'),
     ({'max_residual': 1e-3, 'stiffness_error': 0.1},
-     'plans that forgive errors of the model')])
-def test_what_knows_planar_arms_only_says_so(planner: Planner, fields: dict[str, Any],
-                                             what: str) -> None:
+     'must be a planar one: plans that forgive errors of the model do not know spatial arms')])
+def test_what_is_not_for_spatial_arms_is_refused(planner: Planner, fields: dict[str, Any],
+                                                 what: str) -> None:
     report = planner.report(**MOTION, **fields)
     assert report.error_code == PlanReport.OUT_OF_RANGE
-    assert f'must be a planar one: {what} do not know spatial arms' in report.error_msg
+    assert what in report.error_msg
+
+
+def test_tip_comes_to_rest_in_a_pose(planner: Planner) -> None:
+    arm, angles = load_arm(NAME), np.array([0.8, -0.3, 0.9])
+    assert isinstance(arm, SpatialArm)
+    rest, _ = equilibrium(ArmModel.of(arm), angles, Parameters.of(arm, payload_mass=0.1))
+    place, axes = tip_frame(arm, rest)
+    x, y, z, w = (2 * part for part in quaternion_of(axes))  # of any length
+    fields = {**MOTION, 'goal_point': Point(x=place[0], y=place[1], z=place[2]),
+              'goal_orientation': [Quaternion(x=x, y=y, z=z, w=w)]}
+    response = planner.plan(**fields)
+    assert response.report.error_code == PlanReport.NONE, response.report.error_msg
+    last = response.trajectory.joint_trajectory.points[-1].positions
+    np.testing.assert_allclose(last, angles, atol=1e-8)
+    check = check_motion(RecordedRequest.read(response.report.recording))
+    assert check.passed, [str(finding) for finding in check.findings]
+    (found,) = (one for one in check.findings if 'orientation' in one.name)
+    assert found.value < 1e-8
+    bad = planner.report(**{**fields, 'goal_orientation': [Quaternion(w=0.0)]})
+    assert bad.error_code == PlanReport.OUT_OF_RANGE
+    assert bad.error_msg.startswith('goal_orientation is [0.0, 0.0, 0.0, 0.0]')
+    refused = planner.search(**{**ANGLES, **fields}, payload_accuracy=0.05)
+    assert 'goal_orientation cannot be combined' in refused.report.error_msg
 
 
 def test_point_that_is_too_high_is_out_of_reach(planner: Planner) -> None:
