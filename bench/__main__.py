@@ -88,6 +88,16 @@ whole process, interpreter and libraries (90 MB) included.
 """
 
 
+CLAMPED = """
+### Growth with clamped links
+
+The same motion with clamped links, lying and under gravity, of at most 12 coordinates. *Not
+solved* is within {limit:.0f} s of time.
+
+{table}
+"""
+
+
 PAYLOAD = """
 ## Maximum payload
 
@@ -202,6 +212,16 @@ def measured_solver() -> dict[str, object]:
             'plans': [solver.plan_seconds(payload) for payload in solver.PAYLOADS]}
 
 
+def measured_clamped() -> dict[str, object]:
+    """Measure plans of arms with clamped links."""
+    rows = []
+    for links, modes, setting in growth.CLAMPED:
+        print(f'clamped: {links} links, {modes} modes each, {setting}', flush=True)
+        rows.append(asdict(growth.measure(links, modes, setting)))
+        print(rows[-1], flush=True)
+    return {'clamped': rows}
+
+
 def text(figures: dict[str, Any]) -> str:
     """Return the page."""
     rows = [model.Row(**row) for row in figures['model']]
@@ -215,8 +235,8 @@ def text(figures: dict[str, Any]) -> str:
         table=solver.table([solver.Row(**row) for row in figures['solver']]), shares=shares,
         cold_1=cold_1, warm_1=warm_1, cold_2=cold_2, warm_2=warm_2, limit=growth.TIME_LIMIT,
         growth=growth.table([growth.Growth(**row) for row in figures['growth']])) + (
-        payload_text(figures) + earlier_text(figures) + battery_text(figures)
-        + soak_text(figures))
+        clamped_text(figures) + payload_text(figures) + earlier_text(figures)
+        + battery_text(figures) + soak_text(figures))
 
 
 def earlier_text(figures: dict[str, Any]) -> str:
@@ -231,6 +251,14 @@ def battery_text(figures: dict[str, Any]) -> str:
     if 'battery' not in figures:
         return ''
     return BATTERY.format(limit=battery.LIMITS[-1], table=battery.table(figures['battery']))
+
+
+def clamped_text(figures: dict[str, Any]) -> str:
+    """Return the part on clamped links, once it was measured."""
+    if 'clamped' not in figures:
+        return ''
+    rows = [growth.Growth(**row) for row in figures['clamped']]
+    return CLAMPED.format(limit=growth.CLAMPED_LIMIT, table=growth.clamped_table(rows))
 
 
 def payload_text(figures: dict[str, Any]) -> str:
@@ -258,8 +286,8 @@ def main() -> None:
     """Run the benchmarks named on the command line, or all; the others keep their figures."""
     kept = DOCS / 'benchmarks.json'
     figures = json.loads(kept.read_text()) if kept.exists() else {}
-    parts = {'model': measured_model, 'solver': measured_solver, 'payload': measured_payload,
-             'earlier': measured_earlier, 'speed': measured_speed,
+    parts = {'model': measured_model, 'solver': measured_solver, 'clamped': measured_clamped,
+             'payload': measured_payload, 'earlier': measured_earlier, 'speed': measured_speed,
              'battery': measured_battery, 'soak': measured_soak}
     for name in sys.argv[1:] or parts:
         figures |= parts[name]()

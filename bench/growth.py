@@ -25,6 +25,11 @@ import numpy as np
 
 SIZES = [(n, m) for n in range(1, 5) for m in range(5) if n * m <= 8]
 TIME_LIMIT = 20.0
+# of clamped links, lying and hanging: at most 12 coordinates
+CLAMPED = [(n, m, setting) for setting in ('horizontal', 'gravity') for n in range(1, 5)
+           for m in range(4) if n * (1 + m) <= 12]
+CLAMPED_LIMIT = 15.0
+_GRAVITY = 9.81
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,37 +45,46 @@ class Growth:
     iterations: int
     intervals: int
     memory: float
+    setting: str = ''
 
 
-def growth_task(links: int, modes: int) -> Task:
-    """Return a motion whose torques do not saturate: every joint turns by 0.6 rad in 2 s."""
+def growth_task(links: int, modes: int, setting: str = '') -> Task:
+    """
+    Return a motion whose torques do not saturate: every joint turns by 0.6 rad in 2 s.
+
+    Links are pinned, or with a setting clamped: ``horizontal`` or, with weight, ``gravity``.
+
+    """
     arm = uniform_arm(links, modes)
     strong = replace(arm.joints[0], motor=Motor(stall_torque=1e3))
-    arm = Arm(name=arm.name, links=arm.links, joints=(strong,) * links)
+    beams = tuple(replace(link, mode_family='clamped_free') if setting else link
+                  for link in arm.links)
+    arm = Arm(name=arm.name, links=beams, joints=(strong,) * links,
+              gravity=[0.0, -_GRAVITY if setting == 'gravity' else 0.0])
     start = np.resize([0.5, -0.8], links)
     return Task(arm=arm, start_positions=start, goal_positions=start + 0.6, duration=2.0,
                 payload_mass=1.0)
 
 
-def measure(links: int, modes: int) -> Growth:
+def measure(links: int, modes: int, setting: str = '') -> Growth:
     """Return a row, measured in a process of its own."""
-    code = f'from bench.growth import report; report({links}, {modes})'
+    code = f'from bench.growth import report; report({links}, {modes}, {setting!r})'
     done = subprocess.run([sys.executable, '-c', code], check=True, capture_output=True,
                           text=True)
     return Growth(**json.loads(done.stdout.splitlines()[-1]))
 
 
-def report(links: int, modes: int) -> None:
+def report(links: int, modes: int, setting: str = '') -> None:
     """Plan a few times and print a row as JSON."""
-    task = growth_task(links, modes)
+    task, limit = growth_task(links, modes, setting), CLAMPED_LIMIT if setting else TIME_LIMIT
     model = ArmModel(task.arm)
     plans: list[Plan] = []
     while len(plans) < 5 and sum(plan.planning_time for plan in plans) < 10:
-        plans.append(plan_path(task, model=model, monitor=Monitor(time_limit=TIME_LIMIT)))
+        plans.append(plan_path(task, model=model, monitor=Monitor(time_limit=limit)))
     peak = next(line for line in open('/proc/self/status') if line.startswith('VmHWM'))
     last = plans[-1]
     print(json.dumps({
-        'links': links, 'modes': modes, 'unknowns': 4 * task.arm.n_coordinates,
+        'links': links, 'modes': modes, 'setting': setting, 'unknowns': 4 * task.arm.n_coordinates,
         'solved': last.solved, 'strategy': last.strategy, 'iterations': last.iterations,
         'seconds': statistics.median(plan.planning_time for plan in plans),
         'intervals': last.mesh_intervals, 'memory': int(peak.split()[1]) / 1024}))
@@ -84,6 +98,19 @@ def table(rows: list[Growth]) -> str:
         how = row.strategy if row.solved else 'not solved'
         lines.append(f'| {row.links} x {row.modes} | {row.unknowns} | {row.seconds:.3g} '
                      f'| {row.iterations} | {row.intervals} | {how} | {row.memory:.0f} |')
+    return '\n'.join(lines)
+
+
+def clamped_table(rows: list[Growth]) -> str:
+    """Return the rows of clamped links as Markdown, lying and hanging side by side."""
+    lines = ['| links x modes | coordinates | horizontal [s] | strategy | gravity [s] '
+             '| strategy |', '|' + '---|' * 6]
+    found = {(row.links, row.modes, row.setting): row for row in rows}
+    for links, modes in dict.fromkeys((row.links, row.modes) for row in rows):
+        cells = [f'{row.seconds:.3g} | {row.strategy if row.solved else "not solved"}'
+                 for setting in ('horizontal', 'gravity')
+                 for row in [found[links, modes, setting]]]
+        lines.append(f'| {links} x {modes} | {links * (1 + modes)} | {" | ".join(cells)} |')
     return '\n'.join(lines)
 
 

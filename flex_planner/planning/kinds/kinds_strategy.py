@@ -19,6 +19,7 @@ from flex_planner.planning.kinds.search import (
     explore_near_limit,
     find_kinds,
     is_better,
+    is_too_short,
     rigid_twin,
 )
 from flex_planner.planning.strategies.homotopies import (
@@ -50,14 +51,17 @@ def explore_kinds(problem: MotionProblem, solver: Solver) -> Attempt | None:
     if rigid is None:
         return None
     kinds = find_kinds(bare, Free.NOTHING, starts, solver)
-    if sum(kind.met for kind in kinds) < _SELDOM * starts:
+    late = not kinds and is_too_short(rigid, Free.NOTHING, solver)
+    if not late and sum(kind.met for kind in kinds) < _SELDOM * starts:
         near = cluster(explore_near_limit(rigid, solver), _LESS)
         kinds = reduce(lambda known, kind: merge(known, kind, _LESS), near, kinds)
     attempt = _solve_first(problem, bare, kinds, solver)
     if attempt.decides:
         return attempt
-    heaviest = find_kinds(bare, Free.PAYLOAD, starts, solver)
-    enough = [kind for kind in heaviest if kind.value >= problem.task.payload_mass]
+    wanted = problem.task.payload_mass
+    # without a payload there is none to spare
+    heaviest = find_kinds(bare, Free.PAYLOAD, starts, solver) if wanted or not late else []
+    enough = [kind for kind in heaviest if kind.value >= wanted]
     again = _solve_first(problem, bare, enough, solver)
     again = replace(again, kinds=(*kinds, *again.kinds), starts=2 * starts)
     if again.decides:

@@ -22,6 +22,7 @@ from flex_planner.planning.kinds.paths import (
     JointPath,
     random_paths,
 )
+from flex_planner.planning.kinds.shortest import seems_too_short
 from flex_planner.planning.strategies.initial_guesses import rigid_problem
 from flex_planner.planning.way_limits import find_limit_violations
 import numpy as np
@@ -35,6 +36,8 @@ _FEWEST, _FEWEST_BY_IPOPT, _OFTEN, _SAME = 8, 5, 3, 0.01
 _NEAR_STARTS = 16
 # starts between which the best motion is looked up
 _ROUND = 4
+# starts in vain after which it is asked whether the time is too short
+_IN_VAIN = 3
 
 
 def find_kinds(problem: MotionProblem, free: Free, starts: int,
@@ -73,7 +76,8 @@ def find_kinds(problem: MotionProblem, free: Free, starts: int,
     if free is Free.PAYLOAD:
         most = holding_limit(problem.model, problem.task, problem.parameters)[0]
     explorer = Explorer(rigid, free, solver.monitor, most, solver.settings.max_intervals)
-    search = _Search(explorer, is_better(free), starts, solver.monitor)
+    search = _Search(explorer, is_better(free), starts, solver.monitor,
+                     lambda: is_too_short(rigid, free, solver))
     if free is Free.NOTHING:
         search.explore_until_settled(rigid)
     else:
@@ -106,11 +110,20 @@ def explore_near_limit(rigid: MotionProblem,
     most, finest = holding_limit(rigid.model, rigid.task, rigid.parameters)[0], (
         solver.settings.max_intervals)
     heavy = Explorer(rigid, Free.PAYLOAD, solver.monitor, most, finest)
-    with closing(heavy.explore(list(starting_paths(rigid, _NEAR_STARTS)))) as motions:
-        met = [motion for motion in motions if motion is not None]
+    search = _Search(heavy, is_better(Free.PAYLOAD), _NEAR_STARTS, solver.monitor,
+                     lambda: is_too_short(rigid, Free.PAYLOAD, solver))
+    met = search.explore_paths(rigid)
     asked = Explorer(rigid, Free.NOTHING, solver.monitor, most_intervals=finest)
     for kind in cluster(met, is_better(Free.PAYLOAD)):
         yield from asked.adapt(kind.motion)
+
+
+def is_too_short(rigid: MotionProblem, free: Free, solver: Solver) -> bool:
+    """Return whether the time of a task seems too short, with no payload where that is free."""
+    if free is Free.DURATION:
+        return False
+    asked = rigid.with_changes(payload_mass=0.0) if free is Free.PAYLOAD else rigid
+    return seems_too_short(asked, starting_paths(rigid, _NEAR_STARTS), solver)
 
 
 def is_better(free: Free) -> Callable[[float, float], bool]:
@@ -169,13 +182,16 @@ class _Search:
         How many to explore.
     monitor : Monitor
         Receives progress.
+    is_vain : callable
+        Whether nothing may be found at all; asked once, where some starts led to nothing.
 
     """
 
     def __init__(self, explorer: Explorer, better: Callable[[float, float], bool], starts: int,
-                 monitor: Monitor) -> None:
+                 monitor: Monitor, is_vain: Callable[[], bool]) -> None:
         self._explorer, self._better, self._most = explorer, better, starts
-        self._monitor, self._starts = monitor, 0
+        self._monitor, self._starts, self._is_vain = monitor, 0, is_vain
+        self._in_vain = False
         self._met: list[ExploredMotion] = []
         # the best of a kind, and what was confirmed of it
         self._tried: list[tuple[ExploredMotion, ExploredMotion | None]] = []
@@ -196,10 +212,15 @@ class _Search:
         """
         others = starting_paths(rigid, self._most)
         self._explore(islice(others, sum(1 for _ in _fixed_paths(rigid))))
-        while paths := list(islice(others, _ROUND)):
+        while not self._in_vain and (paths := list(islice(others, _ROUND))):
             stands = self._confirm(kept=1)
             self._explore([DetourFrom(stands[0].motion.solution, path.detours) for path in paths]
                           if stands else paths)
+
+    def explore_paths(self, rigid: MotionProblem) -> list[ExploredMotion]:
+        """Explore all paths, and return what was met."""
+        self._explore(starting_paths(rigid, self._most))
+        return self._met
 
     def best_kinds(self) -> list[KindOfMotion]:
         """Return the best kinds with values that stand on finer meshes."""
@@ -213,7 +234,9 @@ class _Search:
             for motion in motions:
                 self._starts += 1
                 self._met += [] if motion is None else [motion]
-                if enough():
+                if self._starts == _IN_VAIN and not self._met:
+                    self._in_vain = self._is_vain()
+                if self._in_vain or enough():
                     return
                 self._announce()
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from flex_planner.base.errors import FlexPlannerError
+from flex_planner.base.progress import LimitedMonitor
 from flex_planner.collocation import CollocationSolution, GaussRule, INTERRUPTED, Solver
 from flex_planner.collocation.interior_point import (
     BarrierOutcome,
@@ -29,7 +30,7 @@ from flex_planner.planning.strategies.interior_point import applies, pass_barrie
 import numpy as np
 
 # of the method, and of its mesh, in those of `fewest_intervals`
-_STAGES, _FEWEST, _MESH = 4, 14, 0.65
+STAGES, _FEWEST, _MESH = 4, 14, 0.65
 # the mesh, and the next one, in units of it
 _FINER = 1, 2
 # price, in units of all effort that the motors can spend for what the price is of
@@ -38,6 +39,10 @@ _PRICE = 1e3
 _FIRST, _LAST = 0.15, 3e-4
 _TOLERANCE = 0.1
 _PATIENCE = 60
+# iterations times intervals for each share of what was reached, on meshes of so many intervals at
+# most: next to the limit, links whose joints have hardly any inertia of their own leave torques
+# that switch ever more often
+_WORK, _USUAL = 8e3, 40
 # mu at last at the lower price, of the effort that the motors can spend per time, and iterations
 _AT_LAST, _FEW = 1e-4, 20
 # the price, in units of all effort for the value, that leaves a gap of this share; the gap falls
@@ -60,7 +65,7 @@ class _Limit:
     amount : callable
         From a motion to about how much of it there is to pay for [kg, s].
     easier : tuple of float
-        Shares of what was reached, tried where there is no motion within the limits.
+        Shares of what was reached, tried in turn where there is no motion within the limits.
     cheap : int
         Intervals beyond which it takes longer than what a rigid motion leads to.
 
@@ -78,10 +83,10 @@ def moved_mass(problem: MotionProblem) -> float:
 
 
 _LIMITS: Mapping[FreeParameter, _Limit] = {
-    PAYLOAD: _Limit(barrier=PayloadBarrier, amount=moved_mass, easier=(1.0, 0.99, 0.95),
-                    cheap=40),
+    PAYLOAD: _Limit(barrier=PayloadBarrier, amount=moved_mass,
+                    easier=(1.0, 0.99, 0.95, 0.9, 0.8, 0.7), cheap=40),
     DURATION: _Limit(barrier=DurationBarrier, amount=lambda problem: problem.task.duration,
-                     easier=(1.0, 1.01, 1.05), cheap=100)}
+                     easier=(1.0, 1.01, 1.05, 1.1, 1.25, 1.4), cheap=100)}
 
 
 def reach_limit(parameter: FreeParameter, problem: MotionProblem, solver: Solver,
@@ -119,16 +124,47 @@ def reach_limit(parameter: FreeParameter, problem: MotionProblem, solver: Solver
     return reached or _solve_easier(parameter, problem, value, solver)
 
 
+def limit_from_guess(parameter: FreeParameter, problem: MotionProblem,
+                     guess: CollocationSolution, solver: Solver) -> float | None:
+    """
+    Return nearly the limit of a value for the kind of motion that a guess leads to; None if none.
+
+    Parameters
+    ----------
+    parameter, problem
+        As of `reach_limit`.
+    guess : CollocationSolution
+        With the stages of the method.
+    solver : Solver
+        Its monitor may stop it.
+
+    Raises
+    ------
+    StoppedError
+        If the monitor stopped it.
+
+    """
+    most, limit = _most_effort(problem), _LIMITS[parameter]
+    if not (applies(problem, solver) and np.isfinite(most)):
+        return None
+    problem.model.prepare_barrier(solver.monitor)
+    barrier = limit.barrier(problem, _PRICE * most / limit.amount(problem))
+    met = _fall(barrier, guess, solver)
+    return barrier.restrict(met.solution)[0] if met is not None and met.converged else None
+
+
 def _solve_easier(parameter: FreeParameter, problem: MotionProblem, value: float,
                   solver: Solver) -> Extremal | None:
     """Return the motion with a little less than what was reached with the barrier."""
     patient = solver.with_settings(max_iterations=_PATIENCE)
+    work = _WORK * max(1.0, _count(problem) / _USUAL)
     for share in _LIMITS[parameter].easier:
         if not parameter.improves(share * value, parameter.value(problem)):
             break
         try:
             near = parameter.with_value(problem, share * value)
-            attempt = pass_barrier(near, patient)
+            attempt = pass_barrier(near, patient.watched_by(
+                LimitedMonitor.of(solver.monitor, work)))
             assert attempt is not None  # the method is our own
             result = attempt.result
             price = parameter.price(near, result.solution) if result.converged else 0.0
@@ -145,27 +181,33 @@ def is_cheap(parameter: FreeParameter, problem: MotionProblem) -> bool:
 
 
 def _count(problem: MotionProblem) -> int:
-    return max(_FEWEST, int(_MESH * problem.fewest_intervals(_STAGES)))
+    return max(_FEWEST, int(_MESH * problem.fewest_intervals(STAGES)))
 
 
 def _lower_mu(barrier: LimitBarrier, solver: Solver) -> BarrierOutcome | None:
     """Return the motion at the end of the barrier, from a straight line."""
     problem = barrier.motion
     problem.model.prepare_barrier(solver.monitor)
-    scale = _PRICE * _most_effort(problem) / problem.task.duration
-    schedule = BarrierSchedule(first=_FIRST * scale, last=_LAST * scale, tolerance=_TOLERANCE,
-                               max_iterations=_PATIENCE)
     for finer in _FINER:
         count = min(finer * _count(problem), solver.settings.max_intervals)
-        guess = barrier.extend(problem.straight_line(count, GaussRule.of(_STAGES)))
-        try:
-            met = solve_barrier(barrier, guess, barrier.guess(guess, schedule.first), schedule,
-                                solver.monitor)
-        except FlexPlannerError:  # a payload that no equilibrium carries
-            return None
-        if met.converged:
+        met = _fall(barrier, problem.straight_line(count, GaussRule.of(STAGES)), solver)
+        if met is None or met.converged:
             return met
     return None
+
+
+def _fall(barrier: LimitBarrier, guess: CollocationSolution,
+          solver: Solver) -> BarrierOutcome | None:
+    """Return where mu ended that fell from a guess; None if that had no equilibrium."""
+    scale = _PRICE * _most_effort(barrier.motion) / barrier.motion.task.duration
+    schedule = BarrierSchedule(first=_FIRST * scale, last=_LAST * scale, tolerance=_TOLERANCE,
+                               max_iterations=_PATIENCE)
+    try:
+        first = barrier.extend(guess)
+        return solve_barrier(barrier, first, barrier.guess(first, schedule.first), schedule,
+                             solver.monitor)
+    except FlexPlannerError:  # a payload that no equilibrium carries
+        return None
 
 
 def _find_price(problem: MotionProblem, value: float, wanted: float) -> float:
