@@ -31,7 +31,7 @@ import numpy as np
 
 _DEGREE = 3
 _OPTIONS: Any = {'ipopt': {'print_level': 0, 'sb': 'yes', 'tol': 1e-8, 'max_iter': 300},
-            'print_time': False}
+                 'print_time': False}
 # of the moments of mass: what is smaller is rounding
 _NO_MASS = 1e-13
 
@@ -140,7 +140,7 @@ class Judge:
         cost = self._step * ca.dot(ca.DM(np.tile(np.array(weights).ravel(), self.intervals)).T,
                                    effort)
         programme: Any = {'x': ca.vertcat(ca.vec(q), ca.vec(v), ca.vec(a)), 'f': cost,
-                     'g': ca.vertcat(equal, ca.vec(unequal))}
+                          'g': ca.vertcat(equal, ca.vec(unequal))}
         return (ca.nlpsol('judge', 'ipopt', programme, _OPTIONS),
                 (equal.numel(), unequal.numel()))
 
