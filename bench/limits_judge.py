@@ -30,8 +30,8 @@ from flex_planner.optimal_control.path_constraints import (
 import numpy as np
 
 _DEGREE = 3
-_OPTIONS = {'ipopt': {'print_level': 0, 'sb': 'yes', 'tol': 1e-8, 'max_iter': 300},
-            'print_time': False}
+_OPTIONS: Any = {'ipopt': {'print_level': 0, 'sb': 'yes', 'tol': 1e-8, 'max_iter': 300},
+                 'print_time': False}
 # of the moments of mass: what is smaller is rounding
 _NO_MASS = 1e-13
 
@@ -99,7 +99,7 @@ class Judge:
         q, v, a = (ca.SX.sym(name, n_t) for name in 'qva')
         slacks = ca.vertcat(*(express(task, one, q, v) for one in constraints))
         self._slacks = ca.Function('slacks', [q, v], [slacks])
-        forces = self._forces(q, v, a)
+        forces = self.forces(q, v, a)
         torques, passive = forces[:task.arm.n_joints], forces[task.arm.n_joints:]
         self._point = ca.Function('point', [q, v, a], [
             passive, ca.vertcat(self._motors(v, torques), slacks),
@@ -139,15 +139,15 @@ class Judge:
                            ca.vec(passive), q[:, -1] - goal, v[:, -1])
         cost = self._step * ca.dot(ca.DM(np.tile(np.array(weights).ravel(), self.intervals)).T,
                                    effort)
-        programme = {'x': ca.vertcat(ca.vec(q), ca.vec(v), ca.vec(a)), 'f': cost,
-                     'g': ca.vertcat(equal, ca.vec(unequal))}
+        programme: Any = {'x': ca.vertcat(ca.vec(q), ca.vec(v), ca.vec(a)), 'f': cost,
+                          'g': ca.vertcat(equal, ca.vec(unequal))}
         return (ca.nlpsol('judge', 'ipopt', programme, _OPTIONS),
                 (equal.numel(), unequal.numel()))
 
     def _follow(self, x: Any, rate: Any, begin: Any) -> Any:
         """Return what polynomials of x lack of having a rate at the points."""
-        slopes, _, _ = ca.collocation_coeff(ca.collocation_points(_DEGREE, 'radau'))
-        slopes = np.array(slopes)
+        coefficients, _, _ = ca.collocation_coeff(ca.collocation_points(_DEGREE, 'radau'))
+        slopes = np.array(coefficients)
         ends = x[:, _DEGREE - 1::_DEGREE]
         parts = [ca.horzcat(begin, ends[:, :-1]),
                  *(x[:, k::_DEGREE] for k in range(_DEGREE))]
@@ -165,12 +165,12 @@ class Judge:
                         else 0.0)
                 share = torques[joint] / motor.stall_torque
                 slacks += [1 - lost - share, 1 + lost + share]
-            if np.isfinite(motor.max_torque):
+            if motor.max_torque is not None and np.isfinite(motor.max_torque):
                 share = torques[joint] / motor.max_torque
                 slacks += [1 - share, 1 + share]
         return ca.vertcat(*slacks)
 
-    def _forces(self, q: Any, v: Any, a: Any) -> Any:
+    def forces(self, q: Any, v: Any, a: Any) -> Any:
         """Return the forces that a motion takes, by virtual power; 0 those of the modes."""
         task = self._task
         arm = Equations.of(task.arm, task.payload_mass, task.payload_inertia)

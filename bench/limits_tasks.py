@@ -148,15 +148,13 @@ def _post(free: Plan, kind: str, draw: np.random.Generator) -> KeepOut | None:
 
 def _at_ends(free: Plan, stations: int) -> list[Array]:
     """Return where the tip and stations of the links are at both ends."""
-    task, places = free.task, []
+    task, last, places = free.task, free.arm.n_joints - 1, list[Array]()
+    shares = [(link, k / stations) for link in range(last + 1) for k in range(1, stations + 1)]
     for angles in (task.start_positions, task.goal_positions):
         q = ca.DM(np.pad(angles, (0, free.arm.n_coordinates - free.arm.n_joints)))
-        for link in range(free.arm.n_joints):
-            for k in range(1, stations + 1):
-                places.append(np.array(ca.vertcat(
-                    *place_of(task, link, k / stations, q))).ravel().astype(float))
-        places.append(np.array(ca.vertcat(
-            *place_of(task, free.arm.n_joints - 1, 1.0, q))).ravel().astype(float))
+        for link, share in [*shares, (last, 1.0)]:
+            x, y = place_of(task, link, share, q)
+            places.append(np.array([float(x), float(y)]))
     return places
 
 

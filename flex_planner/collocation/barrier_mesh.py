@@ -31,6 +31,9 @@ _MOST_MESHES = 12
 _STEEPEST, _MATTERS = 1.5, 1e-3
 # positions between the points of an interval, for each of them
 _BETWEEN = 4
+# iterations before a mesh is taken to be too coarse to settle on, if corrections are smaller than
+# this; products of slacks and multipliers are then off mu by more than this factor (its logarithm)
+_STALLED, _NEARLY, _OFF = 30, 0.1, np.log(3.0)
 
 Slacks = Callable[[Array], Array]
 """From unknowns (k, m) to slacks (k, n_c)."""
@@ -70,23 +73,46 @@ def follow_barrier(problem: BarrierProblem, guess: CollocationSolution, y: Array
     solution, made, first, mu = guess, 0, schedule.first, schedule.first
     while True:
         for _ in range(_MOST_MESHES):
-            met = solve_barrier(problem, solution, y, replace(schedule, first=first, last=mu),
-                                monitor)
+            met = _settle(problem, solution, y, replace(schedule, first=first, last=mu), monitor,
+                          count)
             made += met.iterations
             met = replace(met, iterations=made)
-            if not met.converged:
-                return met
-            solution, y, first = met.solution, met.y, mu
-            cut = _find_cuts(problem, met, slacks, count)
+            cut = (_find_cuts(problem, met, slacks, count) if met.converged
+                   else _find_unsettled(met, problem.free, count))
+            solution, y, first = met.solution, met.y, met.mu
             if not cut.any():
                 break
             if solution.intervals + int(cut.sum()) > most_intervals:
                 return replace(met, converged=False, message=(
                     f'the mesh would need more than {most_intervals} intervals'))
             solution, y = _cut(problem, solution, y, cut)
-        if mu <= schedule.last:
+        if mu <= schedule.last or not met.converged:
             return met
         mu = max(schedule.last, _FALL * mu)
+
+
+def _settle(problem: BarrierProblem, guess: CollocationSolution, y: Array,
+            schedule: BarrierSchedule, monitor: Monitor, count: int) -> BarrierOutcome:
+    """Lower mu on one mesh; where a finer one would settle sooner, not to the last iteration."""
+    met = solve_barrier(problem, guess, y, replace(
+        schedule, max_iterations=min(_STALLED, schedule.max_iterations)), monitor)
+    left = schedule.max_iterations - met.iterations
+    if met.converged or left <= 0 or _find_unsettled(met, problem.free, count).any():
+        return met
+    more = solve_barrier(problem, met.solution, met.y, replace(
+        schedule, first=met.mu, max_iterations=left), monitor)
+    return replace(more, iterations=met.iterations + more.iterations)
+
+
+def _find_unsettled(met: BarrierOutcome, free: int, count: int) -> Array:
+    """Return the intervals whose multipliers go to and fro, shape (N,); none if all does."""
+    if not met.correction <= _NEARLY:
+        return np.zeros(met.solution.intervals, dtype=bool)
+    middle = free + (met.y.shape[-1] - free) // 2
+    products = met.y[..., middle - count:middle] * met.y[..., -count:]
+    off = np.abs(np.log(products / met.mu)).max(axis=(1, 2)) > _OFF
+    unsettled: Array = off & (met.solution.steps > 0)
+    return unsettled
 
 
 def _find_cuts(problem: BarrierProblem, met: BarrierOutcome, slacks: Slacks,

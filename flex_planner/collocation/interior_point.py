@@ -92,6 +92,10 @@ class BarrierSchedule:
         Root mean square of the relative correction that counts as converged.
     max_iterations : int
         Linear systems at most.
+    settling : int
+        Iterations after which the last step need not be a whole one for the multipliers. Where a
+        limit is only touched a multiplier may go to and fro on a coarse mesh for ever, while z
+        and slacks have settled.
 
     """
 
@@ -99,6 +103,7 @@ class BarrierSchedule:
     last: float
     tolerance: float = 1e-5
     max_iterations: int = 80
+    settling: int = 1_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -245,7 +250,7 @@ def _advance(problem: BarrierProblem, at: BarrierOutcome, step: _Step,
     moved = CollocationSolution(at.solution.mesh, at.solution.nodes + primal * step.nodes,
                                 at.solution.stages + primal * step.stages, at.solution.rule)
     done = (at.mu <= schedule.last and step.norm <= schedule.tolerance
-            and primal == dual == 1.0)
+            and primal == 1.0 and (dual == 1.0 or at.iterations >= schedule.settling))
     return replace(at, solution=moved, y=at.y + share * step.y, correction=step.norm,
                    mu=_lower(at.mu, step.norm, min(primal, dual), schedule), converged=done,
                    iterations=at.iterations + 1, message='converged' if done else at.message)

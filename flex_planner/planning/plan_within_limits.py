@@ -166,23 +166,40 @@ class _Search:
         self._free, self._slacks, self._solver = free, slacks, solver
         self._starts = 0
         self._near: list[_Near] = []
+        self._left_out: list[tuple[MotionProblem, CollocationSolution]] = []
         self._failed: CollocationSolution | None = None
+        self._failure = ''
 
     def run(self, effort: SearchEffort) -> None:
         """Come near to a motion from each start that may lead to something cheaper."""
         for problem, start, bound in self._choose_starts(effort):
             if bound >= (1 - _CHEAPER) * self._best_cost():
-                continue
-            self._starts += 1
-            met = approach_limits(problem, self._slacks, start, self._solver)
-            if met.converged:
-                self._add(problem, met)
-            elif self._failed is None:
-                self._failed = met.solution
+                self._left_out.append((problem, start))
+            else:
+                self._approach(problem, start)
+
+    def _approach(self, problem: MotionProblem, start: CollocationSolution) -> None:
+        """Come near to a motion from a start."""
+        self._starts += 1
+        met = approach_limits(problem, self._slacks, start, self._solver)
+        if met.converged:
+            self._add(problem, met)
+        elif self._failed is None:
+            self._failed = met.solution
 
     def conclude(self) -> Plan:
-        """Return the plan of the cheapest motion that is found."""
-        free, best, failure = self._free, None, ''
+        """Return the plan of the cheapest motion that is found, of starts left out if need be."""
+        plan = self._find_best()
+        if plan is None and self._left_out:
+            self._near.clear()
+            for problem, start in self._left_out:
+                self._approach(problem, start)
+            plan = self._find_best()
+        return plan or self._refuse(self._failure)
+
+    def _find_best(self) -> Plan | None:
+        """Return the plan of the cheapest motion that was come near to; None without any."""
+        free, best = self._free, None
         order = sorted(self._near, key=lambda one: one.kind.value)
         exact: dict[int, KindOfMotion] = {}
         for one in order:
@@ -194,9 +211,9 @@ class _Search:
             if plan.solved:
                 exact[id(one)] = replace(one.kind, value=plan.cost)
                 best = plan if best is None or plan.cost < best.cost else best
-            failure = failure or plan.message
+            self._failure = self._failure or plan.message
         if best is None or (free.solved and free.cost <= best.cost):
-            return free if free.solved else self._refuse(failure)
+            return free if free.solved else None
         kinds = sorted((exact.get(id(one), one.kind) for one in order),
                        key=lambda kind: kind.value)
         return _describe(replace(best, kinds=tuple(kinds)[:MOST_KINDS], starts=self._starts))
@@ -219,7 +236,8 @@ class _Search:
         assert free.solution is not None
         if not free.solved:
             yield free.problem, free.solution, 0.0
-            for start in pass_otherwise(free.problem, free.solution, self._obstacles()):
+            for start in pass_otherwise(free.problem, free.solution,
+                                        self._obstacles(free.solution)):
                 yield free.problem, start, 0.0
         if not effort.explores:
             return
@@ -227,12 +245,15 @@ class _Search:
             home = turn_goal(free.problem, kind.motion.problem)
             # values of the rigid arm are no bounds
             bound = kind.value if kind.motion.problem.size == home.size else 0.9 * kind.value
-            yield home, as_guess(home, kind, self._solver), bound
+            start = as_guess(home, kind, self._solver)
+            yield home, start, bound
+            if free.solved:  # which passes no obstacle that could be passed on its other side
+                for other in pass_otherwise(home, start, self._obstacles(start)):
+                    yield home, other, bound
 
-    def _obstacles(self) -> list[KeepOut]:
-        """Return the obstacles that the free motion passes through."""
-        assert self._free.solution is not None
-        return find_obstacles(self._slacks, self._values(self._free.solution))
+    def _obstacles(self, motion: CollocationSolution) -> list[KeepOut]:
+        """Return the obstacles that a motion passes through."""
+        return find_obstacles(self._slacks, self._values(motion))
 
     def _values(self, solution: CollocationSolution) -> Array:
         """Return the slacks along a motion, shape (k, n_c)."""
@@ -246,7 +267,8 @@ class _Search:
     def _add(self, problem: MotionProblem, met: BarrierOutcome) -> None:
         """Keep a motion, unless it is one that is known."""
         kind = as_kind(ConstrainedMotion(problem, self._slacks, met.mu), met.solution)
-        sides = say_sides(problem, met.solution, self._obstacles())
+        assert self._free.solution is not None
+        sides = say_sides(problem, met.solution, self._obstacles(self._free.solution))
         if sides:
             kind = replace(kind, sentence=f'{sides}; {kind.sentence}')
         same = [one for one in self._near if one.kind.sentence == kind.sentence

@@ -9,6 +9,8 @@ left are solved exactly, as those of any motion.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from flex_planner.base.validation import Array
 from flex_planner.collocation import (
     CollocationResult,
@@ -40,11 +42,16 @@ STAGES, _FEWEST = 4, 40
 # slacks then, where a motion is told from others, and at last; the second of each where the first
 # leads to nothing
 _FIRST, _COARSE, _LAST = ((1e-2, 0.1), (1.0, 0.01)), 1e-3, (1e-4, 1e-3)
+# iterations on a mesh: of the interior point, at the end, of a first look from a motion like it
+_PATIENCE, _FINISH, _FIRST_LOOK = 60, 30, 10
+# iterations after which multipliers need not have settled, see `BarrierSchedule`
+_SETTLING = 20
+# mu at last and the iterations after which multipliers need not have settled, one after the other
+# where the one before leads to no solution: a mesh that is cut until they do may suit better
+_ENDS = (_LAST[0], _SETTLING), (_LAST[1], _SETTLING), (_LAST[1], _PATIENCE)
 # at first, from a motion that limits have bent, in units of mu at last
 _NEAR = 10.0
 _TOLERANCE = 1e-2
-# iterations on a mesh: of the interior point, at the end, of a first look from a motion like it
-_PATIENCE, _FINISH, _FIRST_LOOK = 60, 30, 10
 # of the mesh at the end: more would take long and are seldom a solution
 _MOST_INTERVALS, _MOST_MESHES = 1000, 8
 # positions in an interval
@@ -111,8 +118,8 @@ def solve_within_limits(problem: MotionProblem, slacks: PathSlacks, met: Barrier
     rate = find_cost_rate(problem, met.solution)
     limited = ConstrainedMotion(problem, slacks, _LAST[0] * rate)
     failed: CollocationResult | None = None
-    for last in _LAST[int(coarse):] if met.converged else ():
-        finer = _follow(problem, slacks, met, last * rate, solver)
+    for last, settling in _ENDS[int(coarse):] if met.converged else ():
+        finer = _follow(problem, slacks, met, last * rate, solver, settling)
         limited = limited.with_mu(last * rate).floored(finer.solution, _FLOOR)
         # where the interior point goes to and fro, Newton's method may still settle
         result = _finish(limited, finer.solution, solver)
@@ -165,17 +172,18 @@ def first_mesh(problem: MotionProblem, solver: Solver) -> Array:
 
 
 def _schedule(first: float, last: float, solver: Solver) -> BarrierSchedule:
-    return BarrierSchedule(first=first, last=last, tolerance=_TOLERANCE,
+    return BarrierSchedule(first=first, last=last, tolerance=_TOLERANCE, settling=_SETTLING,
                            max_iterations=min(_PATIENCE, solver.settings.max_iterations))
 
 
 def _follow(problem: MotionProblem, slacks: PathSlacks, met: BarrierOutcome, last: float,
-            solver: Solver) -> BarrierOutcome:
+            solver: Solver, settling: int) -> BarrierOutcome:
     """Return the motion at the end of the barrier, which keeps its limits between points, too."""
     states, barrier = problem.layout.states, limit_states(problem, slacks)
+    schedule = replace(_schedule(met.mu, min(last, met.mu), solver), settling=settling)
     return follow_barrier(
-        barrier, met.solution, met.y, _schedule(met.mu, min(last, met.mu), solver),
-        solver.monitor, slacks=lambda z: slacks(z[:, states]), count=slacks.count,
+        barrier, met.solution, met.y, schedule, solver.monitor,
+        slacks=lambda z: slacks(z[:, states]), count=slacks.count,
         most_intervals=solver.settings.max_intervals)
 
 
