@@ -39,7 +39,7 @@ STAGES, _FEWEST = 4, 40
 # mu in units of the cost per time of the motion that it starts from: at first, with the smallest
 # slacks then, where a motion is told from others, and at last; the second of each where the first
 # leads to nothing
-_FIRST, _COARSE, _LAST = ((1e-2, 0.1), (1.0, 0.01)), 1e-3, (1e-4, 1e-3)
+_FIRST, COARSE, _LAST = ((1e-2, 0.1), (1.0, 0.01)), 1e-3, (1e-4, 1e-3)
 # at first, from a motion that limits have bent, in units of mu at last
 _NEAR = 10.0
 _TOLERANCE = 1e-2
@@ -78,7 +78,7 @@ def approach_limits(problem: MotionProblem, slacks: PathSlacks, near: Collocatio
     barrier, rate = limit_states(problem, slacks), find_cost_rate(problem, near)
     guess = near.on_mesh(first_mesh(problem, solver), GaussRule.of(STAGES))
     for first, slack in _FIRST:
-        schedule = _schedule(first * rate, _COARSE * rate, solver)
+        schedule = _schedule(first * rate, COARSE * rate, solver)
         y = barrier.guess(guess, schedule.first, slack)
         met = solve_barrier(barrier, guess, y, schedule, solver.monitor)
         if met.converged:
