@@ -14,7 +14,7 @@ from dataclasses import replace
 
 from flex_planner.base.errors import HoldingError, InvalidTaskError
 from flex_planner.base.processes import helper_processes
-from flex_planner.base.progress import Monitor
+from flex_planner.base.progress import Monitor, StoppedError
 from flex_planner.base.validation import number
 from flex_planner.capacity.extrapolation import Neighbours
 from flex_planner.capacity.payload_methods import search_directly
@@ -22,6 +22,7 @@ from flex_planner.capacity.payload_outcome import with_bound
 from flex_planner.capacity.results import MaxPayload, PayloadMethod
 from flex_planner.capacity.rigid_search import search_as_rigid
 from flex_planner.capacity.step_search import search_in_steps
+from flex_planner.capacity.without_jumps import carry_without_jumps
 from flex_planner.collocation import Solver
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
@@ -29,6 +30,7 @@ from flex_planner.optimal_control.task import MAX_PAYLOAD, Task
 from flex_planner.optimal_control.via_points import free_times
 from flex_planner.planning.kinds.effort import SearchEffort
 from flex_planner.planning.plan import PlanStatus
+from flex_planner.planning.plan_problem import STOP_STATUS
 from flex_planner.planning.proofs import (
     bound_payload,
     check_duration,
@@ -37,7 +39,12 @@ from flex_planner.planning.proofs import (
     Proof,
     prove_not_held,
 )
-from flex_planner.planning.smooth_torques import refuse_torque_rates
+from flex_planner.planning.smooth_torques import (
+    refuse_torque_rates,
+    STIFF_LINKS,
+    without_torque_rates,
+)
+from flex_planner.planning.stiff_links import find_stiff_links
 from flex_planner.planning.strategies.extremals import SearchStart
 import numpy as np
 
@@ -92,7 +99,7 @@ def find_max_payload(task: Task, *, model: ArmModel | None = None, solver: Solve
     InvalidTaskError
         If no motor has a limit, if the goal is the start, if the duration is free or absurdly
         short, if the arm need not come to rest at the goal, if a via point has no time, or if the
-        incremental method is to keep limits on the way.
+        incremental method is to keep limits on the way or rates of torques.
     InvalidValueError
         If accuracy or step breaks its bound.
 
@@ -103,6 +110,8 @@ def find_max_payload(task: Task, *, model: ArmModel | None = None, solver: Solve
     effort = SearchEffort.of(search)
     helper_processes()  # what the environment says is refused before anything is solved
     _check(task)
+    if method is PayloadMethod.INCREMENTAL:
+        refuse_torque_rates(task, 'the incremental method: the direct method keeps them')
     if task.path_constraints and method is PayloadMethod.INCREMENTAL:
         raise InvalidTaskError('path_constraints are given, but must be left out for the '
                                'incremental method: it knows only motions that no limit on the '
@@ -122,6 +131,8 @@ def find_max_payload(task: Task, *, model: ArmModel | None = None, solver: Solve
     doubt = find_doubt(problem)
     if doubt is not None:
         return MaxPayload(task=task, method=method, status=PlanStatus.NOT_FOUND, message=doubt)
+    if task.has_torque_rates:
+        return _carry_smoothly(problem, solver, accuracy, effort, start_from)
     rigid = search_as_rigid(problem, solver, lambda stiff: find_max_payload(
         stiff, solver=solver, method=method, accuracy=accuracy, step=step, start_from=start_from,
         search=effort))
@@ -135,6 +146,25 @@ def find_max_payload(task: Task, *, model: ArmModel | None = None, solver: Solve
                    planning_time=solver.monitor.elapsed - began[1])
 
 
+def _carry_smoothly(problem: MotionProblem, solver: Solver, accuracy: float, effort: SearchEffort,
+                    start: MaxPayload | SearchStart | Neighbours | None) -> MaxPayload:
+    """Return the outcome for torques without jumps, from that for torques that may jump."""
+    task, began = problem.task, (solver.monitor.iteration, solver.monitor.elapsed)
+    jumping = without_torque_rates(task)
+    if find_stiff_links(MotionProblem(problem.model, jumping, problem.parameters), solver):
+        return MaxPayload(task=task, method=PayloadMethod.DIRECT, status=PlanStatus.NOT_FOUND,
+                          message=STIFF_LINKS)
+    free = find_max_payload(jumping, model=problem.model, solver=solver, accuracy=accuracy,
+                            start_from=start, search=effort)
+    try:
+        found = carry_without_jumps(task, free, solver, accuracy)
+    except StoppedError as error:
+        found = replace(free, task=task, status=STOP_STATUS[error.reason], message=str(error),
+                        plan=None, payload=0.0)
+    return replace(found, iterations=solver.monitor.iteration - began[0],
+                   planning_time=solver.monitor.elapsed - began[1])
+
+
 def stays(task: Task) -> bool:
     """Return whether a task begins where it ends, at rest, but for what rounding may add."""
     apart = np.abs(task.goal_positions - task.start_positions).max()
@@ -143,7 +173,6 @@ def stays(task: Task) -> bool:
 
 def _check(task: Task) -> None:
     """Refuse a task that has no largest payload."""
-    refuse_torque_rates(task, 'a search for the largest payload')
     if not np.isfinite([joint.motor.standstill_torque for joint in task.arm.joints]).any():
         raise InvalidTaskError('no motor of the arm has a stall torque, so no payload is the '
                                'largest')

@@ -20,6 +20,7 @@ from flex_planner.capacity.max_payload import find_max_payload, stays
 from flex_planner.capacity.results import describe_kinds, MaxPayload, MinDuration, say_lost_weights
 from flex_planner.capacity.rigid_search import search_as_rigid
 from flex_planner.capacity.within_limits import hurry_within_limits
+from flex_planner.capacity.without_jumps import hurry_without_jumps
 from flex_planner.collocation import Solver
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
@@ -29,7 +30,8 @@ from flex_planner.planning.kinds.effort import SearchEffort
 from flex_planner.planning.plan import PlanStatus
 from flex_planner.planning.plan_problem import STOP_STATUS
 from flex_planner.planning.proofs import bound_duration, guess_duration, prove_not_held
-from flex_planner.planning.smooth_torques import refuse_torque_rates
+from flex_planner.planning.smooth_torques import STIFF_LINKS, without_torque_rates
+from flex_planner.planning.stiff_links import find_stiff_links
 from flex_planner.planning.strategies.extremals import SearchStart
 from flex_planner.planning.strategies.free_parameters import DURATION
 from flex_planner.planning.within_model import bound_by_limits
@@ -70,7 +72,7 @@ def find_min_duration(task: Task, *, model: ArmModel | None = None,
     ------
     InvalidTaskError
         If a motor has no limit, if the arm need not come to rest at the goal, or if there are via
-        points, or rates of torques with a price or a bound.
+        points.
     InvalidValueError
         If the accuracy breaks its bound.
 
@@ -81,7 +83,6 @@ def find_min_duration(task: Task, *, model: ArmModel | None = None,
     if not np.isfinite([joint.motor.standstill_torque for joint in task.arm.joints]).all():
         raise InvalidTaskError('a motor of the arm has no stall torque, so no duration is the '
                                'shortest')
-    refuse_torque_rates(task, 'a search for the shortest duration')
     if task.via_points:
         raise InvalidTaskError('via_points must be empty: the shortest duration is that of a '
                                'motion without via points')
@@ -99,6 +100,8 @@ def find_min_duration(task: Task, *, model: ArmModel | None = None,
     except HoldingError as error:
         return MinDuration(task=task, status=PlanStatus.INFEASIBLE, proved_lower=np.inf,
                            message=str(prove_not_held(error, task.payload_mass)))
+    if task.has_torque_rates:
+        return _hurry_smoothly(problem, task, solver, accuracy, effort, start_from)
     problem = problem.with_changes(duration=guess_duration(problem))
     rigid = search_as_rigid(problem, solver, lambda stiff: find_min_duration(
         stiff, solver=solver, accuracy=accuracy, start_from=start_from, search=effort))
@@ -116,6 +119,25 @@ def find_min_duration(task: Task, *, model: ArmModel | None = None,
         found = _certified_so_far(limits, _result(task, limits, PlanStatus.NOT_CONVERGED,
                                                   str(error)))
     found = replace(found, proved_lower=bound_duration(problem))
+    return replace(found, iterations=solver.monitor.iteration - began[0],
+                   planning_time=solver.monitor.elapsed - began[1])
+
+
+def _hurry_smoothly(problem: MotionProblem, task: Task, solver: Solver, accuracy: float,
+                    effort: SearchEffort,
+                    start: MinDuration | Neighbours | None) -> MinDuration:
+    """Return the outcome for torques without jumps, from that for torques that may jump."""
+    began, jumping = (solver.monitor.iteration, solver.monitor.elapsed), without_torque_rates(task)
+    plain = MotionProblem(problem.model, replace(jumping, time_weight=0.0), problem.parameters)
+    if find_stiff_links(plain, solver):
+        return MinDuration(task=task, status=PlanStatus.NOT_FOUND, message=STIFF_LINKS)
+    free = find_min_duration(jumping, model=problem.model, solver=solver, accuracy=accuracy,
+                             start_from=start, search=effort)
+    try:
+        found = hurry_without_jumps(task, free, solver, accuracy)
+    except StoppedError as error:
+        found = replace(free, task=task, status=STOP_STATUS[error.reason], message=str(error),
+                        plan=None, duration=np.inf)
     return replace(found, iterations=solver.monitor.iteration - began[0],
                    planning_time=solver.monitor.elapsed - began[1])
 

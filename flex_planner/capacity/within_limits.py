@@ -10,7 +10,7 @@ shorter and shorter ones, each from the motion before.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from flex_planner.base.errors import FlexPlannerError
@@ -25,14 +25,15 @@ from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.plan_problem import STOP_STATUS
 from flex_planner.planning.plan_within_limits import plan_from
+from flex_planner.planning.strategies.free_parameters import FreeParameter, PAYLOAD
 from flex_planner.planning.strategies.homotopies import drop_weights
 from flex_planner.planning.strategies.interior_point import applies
 from flex_planner.planning.strategies.payload_within_limits import reach_largest_payload
 import numpy as np
 
-# shares of the payload that was reached, at which a motion is certified: the first as little less
-# as the accuracy allows
-_LESS = (0.9995, 0.999, 0.997, 0.99, 0.97, 0.9)
+# shares by which a value is eased from what was reached, until a motion is certified: the first
+# as little as the accuracy allows
+_EASED = (0.0005, 0.001, 0.003, 0.01, 0.03, 0.1)
 # costates of a payload that is nearly endless in price, as those of a least effort
 _COSTATES = 1e-3
 # of a motion so near the limit
@@ -75,10 +76,10 @@ def carry_within_limits(problem: MotionProblem, solver: Solver, accuracy: float,
     solver.monitor.phase = 'largest payload within the limits'
     first = plan_path(problem.task, model=problem.model, solver=solver, search='fast')
     solver.monitor.check()
-    reached = [found for near in _motions(first) if (found := reach_largest_payload(
+    reached = [found for near in known_motions(first) if (found := reach_largest_payload(
         drop_weights(problem), slacks, solver, near)) is not None]
     for payload, gap, motion in sorted(reached, key=lambda one: -one[0]):
-        certified = _certify(problem, slacks, payload, motion, accuracy, solver)
+        certified = certify_near(PAYLOAD, problem, payload, motion, accuracy, solver)
         if certified is None:
             continue
         lighter, plan = certified
@@ -89,7 +90,7 @@ def carry_within_limits(problem: MotionProblem, solver: Solver, accuracy: float,
                 f'{lighter:.6g} kg can be carried within the limits on the way, and a motion with '
                 f'more than {lighter:.6g} kg was not certified, though about {payload:.6g} kg '
                 'seem possible'))
-    return _carry_more(problem.task, first, solver, accuracy, free) if first.solved else None
+    return carry_more(problem.task, first, solver, accuracy, free) if first.solved else None
 
 
 def hurry_within_limits(task: Task, solver: Solver, accuracy: float,
@@ -151,7 +152,7 @@ def _plan_near(task: Task, near: Plan, solver: Solver) -> Plan | None:
     return plan if plan.solved else None
 
 
-def _motions(plan: Plan) -> Iterator[CollocationSolution | None]:
+def known_motions(plan: Plan) -> Iterator[CollocationSolution | None]:
     """Yield motions within the limits that a search may start from; None for a straight line."""
     if plan.solved and plan.solution is not None:
         yield plan.solution
@@ -161,8 +162,8 @@ def _motions(plan: Plan) -> Iterator[CollocationSolution | None]:
     yield None
 
 
-def _carry_more(task: Task, plan: Plan, solver: Solver, accuracy: float,
-                free: MaxPayload) -> MaxPayload:
+def carry_more(task: Task, plan: Plan, solver: Solver, accuracy: float,
+               free: MaxPayload) -> MaxPayload:
     """Return the outcome with the heaviest payload of those tried, from a plan with a lighter."""
     failed, status = free.local_upper, PlanStatus.NOT_CONVERGED
     try:
@@ -183,23 +184,70 @@ def _carry_more(task: Task, plan: Plan, solver: Solver, accuracy: float,
                  f'{failed:.6g} kg was found from there, which does not show that there is none'))
 
 
-def _certify(problem: MotionProblem, slacks: PathSlacks, payload: float,
-             motion: CollocationSolution, accuracy: float,
-             solver: Solver) -> tuple[float, Plan] | None:
-    """Return the plan with a little less than what was reached, and its payload."""
-    costates = np.ones(problem.size)
-    costates[problem.size // 2:] = _COSTATES
-    near = CollocationSolution(motion.mesh, motion.nodes * costates, motion.stages * costates,
-                               motion.rule)
+def certify_near(parameter: FreeParameter, problem: MotionProblem, value: float,
+                 motion: CollocationSolution, accuracy: float,
+                 solver: Solver) -> tuple[float, Plan] | None:
+    """
+    Return a value a little easier than what was reached, and its certified plan; None without.
+
+    Parameters
+    ----------
+    parameter : FreeParameter
+        ``PAYLOAD``, which is at least that of the problem, or ``DURATION``.
+    problem : MotionProblem
+        Of the task.
+    value : float
+        Payload or duration that was reached [kg, s].
+    motion : CollocationSolution
+        With that value.
+    accuracy : float
+        To which the limit is wanted [kg, s].
+    solver : Solver
+        Its monitor may interrupt the work.
+
+    Raises
+    ------
+    StoppedError
+        If the monitor stopped it.
+
+    """
     quick = solver.with_settings(max_intervals=min(_MOST_INTERVALS, solver.settings.max_intervals))
-    for share in (1 - accuracy / (3 * payload), *_LESS):
-        if not problem.task.payload_mass <= share * payload:
+
+    def plan_at(limit: MotionProblem, slacks: PathSlacks) -> Plan | None:
+        costates = np.ones(problem.size)
+        costates[problem.layout.costates] = _COSTATES
+        near = CollocationSolution(motion.mesh, motion.nodes * costates,
+                                   motion.stages * costates, motion.rule)
+        return plan_from(limit, slacks, near.stretched(limit.task.duration / motion.mesh[-1]),
+                         quick)
+
+    return certify_eased(parameter, problem, value, plan_at, accuracy)
+
+
+def certify_eased(parameter: FreeParameter, problem: MotionProblem, value: float,
+                  plan_at: Callable[[MotionProblem, PathSlacks], Plan | None],
+                  accuracy: float) -> tuple[float, Plan] | None:
+    """
+    Return the first of some values, easier and easier, with a plan; None without one.
+
+    Parameters
+    ----------
+    parameter, problem, value, accuracy
+        As of `certify_near`.
+    plan_at : callable
+        From the problem with a value and its slacks to a certified plan, or None.
+
+    """
+    for share in (accuracy / (3 * value), *_EASED):
+        eased = parameter.ease(value, share)
+        if parameter is PAYLOAD and eased < problem.task.payload_mass:
             return None
         try:
-            heavy = problem.with_changes(payload_mass=share * payload)
-            plan = plan_from(heavy, slacks, near, quick)
+            limit = parameter.with_value(problem, eased)
+            slacks = slacks_of(limit)
+            plan = None if slacks is None else plan_at(limit, relieve_ends(limit, slacks))
         except FlexPlannerError:  # too heavy to hold
             continue
         if plan is not None:
-            return share * payload, plan
+            return eased, plan
     return None

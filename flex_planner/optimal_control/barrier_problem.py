@@ -48,6 +48,12 @@ class BarrierOfMotion:
         """Return what holds at a via point."""
         return self.motion.join(junction, before, after)
 
+    def growth(self, mu: float) -> float:
+        """Return by how much a barrier of the motors' limits makes torques dearer, at least 1."""
+        limits = self.motion.parameters
+        grown = 2 * mu / (limits.effort_weights * limits.torque_limits.standstill**2)
+        return max(1.0, float(grown.max()))
+
 
 class MotionBarrier(BarrierOfMotion):
     """
@@ -86,14 +92,8 @@ class MotionBarrier(BarrierOfMotion):
         """
         half = self.motion.size // 2
         scale = self.motion.scale.copy()
-        scale[half:] *= self._growth(mu)
+        scale[half:] *= self.growth(mu)
         return scale
-
-    def _growth(self, mu: float) -> float:
-        """Return by how much the barrier makes torques dearer, at least 1."""
-        limits = self.motion.parameters
-        grown = 2 * mu / (limits.effort_weights * limits.torque_limits.standstill**2)
-        return max(1.0, float(grown.max()))
 
     def condense(self, z: Array, y: Array, mu: float) -> tuple[Array, Array]:
         """Return F and J of the step z' = F + J dz."""
@@ -153,7 +153,7 @@ class PayloadBarrier(MotionBarrier):
         """Return the magnitudes of the unknowns; costates are no larger than the price."""
         half = self.motion.size // 2
         scale = self.payload.scale.copy()
-        scale[half:2 * half] *= min(self._growth(mu), max(1.0, self.price))
+        scale[half:2 * half] *= min(self.growth(mu), max(1.0, self.price))
         return scale
 
     def condense(self, z: Array, y: Array, mu: float) -> tuple[Array, Array]:
@@ -169,10 +169,7 @@ class PayloadBarrier(MotionBarrier):
 
     def longest(self, node: Array, step: Array) -> float:
         """Return the share of a step with which the payload stays positive, and is no jump."""
-        change, least = float(step[-2]), _LEAST_LEFT * float(node[-2])
-        most = _LARGEST_JUMP * self.motion.model.arm.link_mass
-        room = most if change > 0 else min(most, float(node[-2]) - least)
-        return min(1.0, room / max(abs(change), 1e-300))
+        return payload_step(self.motion, float(node[-2]), float(step[-2]))
 
     def left(self, z: Array) -> tuple[Array, Array]:
         """Return the initial conditions."""
@@ -202,3 +199,10 @@ class PayloadBarrier(MotionBarrier):
     def restrict(self, solution: CollocationSolution) -> tuple[float, CollocationSolution]:
         """Return the payload, and the motion with it."""
         return self.payload.restrict(solution)
+
+
+def payload_step(motion: MotionProblem, payload: float, change: float) -> float:
+    """Return the share of a change [kg] with which a payload stays positive, and is no jump."""
+    most = _LARGEST_JUMP * motion.model.arm.link_mass
+    room = most if change > 0 else min(most, (1 - _LEAST_LEFT) * payload)
+    return min(1.0, room / max(abs(change), 1e-300))

@@ -73,17 +73,15 @@ class DurationBarrier(MotionBarrier):
 
     def longest(self, node: Array, step: Array) -> float:
         """Return the share of a step with which the duration stays positive, and is no jump."""
-        change, duration = float(step[-2]), float(node[-2])
-        room = duration * (_MOST_ADDED if change > 0 else 1 - _LEAST_LEFT)
-        return min(1.0, room / max(abs(change), 1e-300))
+        return duration_step(float(node[-2]), float(step[-2]))
 
     def left(self, z: Array) -> tuple[Array, Array]:
         """Return the initial conditions."""
-        return _with_end(self.motion.left(z[:-2]), z)
+        return with_end(self.motion.left(z[:-2]), z)
 
     def right(self, z: Array) -> tuple[Array, Array]:
         """Return the final conditions."""
-        return _with_end(self.motion.right(z[:-2]), z)
+        return with_end(self.motion.right(z[:-2]), z)
 
     def extend(self, solution: CollocationSolution) -> CollocationSolution:
         """Return a motion with the duration of the task as a guess."""
@@ -97,9 +95,15 @@ class DurationBarrier(MotionBarrier):
             solution.mesh, solution.nodes[:, :-1], solution.stages[..., :-1], solution.rule))
 
 
-def _with_end(rows: tuple[Array, Array], z: Array) -> tuple[Array, Array]:
+def with_end(rows: tuple[Array, Array], z: Array) -> tuple[Array, Array]:
     """Return boundary rows with nu = 0 after them."""
     residual, inner = rows
     last = np.zeros((1, z.size))
     last[0, -1] = 1
     return np.append(residual, z[-1]), np.vstack([append_zeros(inner, 2), last])
+
+
+def duration_step(duration: float, change: float) -> float:
+    """Return the share of a change [s] with which a duration stays positive, and is no jump."""
+    room = duration * (_MOST_ADDED if change > 0 else 1 - _LEAST_LEFT)
+    return min(1.0, room / max(abs(change), 1e-300))

@@ -65,8 +65,8 @@ class FreeDurationProblem:
         return append_zeros(duration * rate, 1), jacobian
 
     def compiled_rate(self) -> CompiledRate | None:
-        """Return both as machine code, None without a compiler or with limits on the way."""
-        if self.motion.compiled_rate() is None:
+        """Return both as machine code; None without a compiler or with limits of states."""
+        if self.motion.layout.torques or self.motion.compiled_rate() is None:
             return None
         return self.motion.model.compiled_rate('free_duration', self.motion.p)
 
@@ -83,11 +83,10 @@ class FreeDurationProblem:
         """Return the motion's rows and H + rho, whose gradient is (-psi', x')."""
         residual, rows = self.motion.right(z[:-1])
         point = z[None, :-1]
-        hamiltonian = self.motion.model.controls(point, self.motion.p).hamiltonian
+        hamiltonian = self.motion.controls(np.zeros(1), point).hamiltonian
         hamiltonian = hamiltonian + self.motion.barrier_rate(point)
-        rate = self.motion.rate(np.zeros(1), point)[0]
-        half = rate.size // 2
-        gradient = np.concatenate([-rate[half:], rate[:half], [0.0]])
+        rate = self.motion.rate(np.zeros(1), point)
+        gradient = append_zeros(self.motion.layout.turn(rate)[0], 1)
         return (np.concatenate([residual, hamiltonian + self._price]),
                 np.vstack([append_zeros(rows, 1), gradient]))
 

@@ -15,7 +15,7 @@ from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationResult, CollocationSolution
 from flex_planner.collocation.problem import CompiledRate, SingularSystemError
 from flex_planner.optimal_control.boundary_conditions import PayloadEnds
-from flex_planner.optimal_control.free_problem import append_zeros
+from flex_planner.optimal_control.free_problem import append_zeros, join_with_more
 from flex_planner.optimal_control.motion_problem import Indices, MotionProblem
 from flex_planner.optimal_control.parameters import payload_index
 import numpy as np
@@ -102,11 +102,7 @@ class FreePayloadProblem:
 
     def join(self, junction: int, before: Array, after: Array) -> tuple[Array, Array]:
         """Return what holds at a via point: payload and nu go on as they were."""
-        inner, size = self.motion.size, self.size
-        residual, rows = after - before, np.hstack([-np.eye(size), np.eye(size)])
-        residual[:inner], found = self.motion.join(junction, before[:inner], after[:inner])
-        rows[:inner, :inner], rows[:inner, size:size + inner] = np.hsplit(found, 2)
-        return residual, rows
+        return join_with_more(self.motion, junction, before, after)
 
     def extend(self, solution: CollocationSolution) -> CollocationSolution:
         """Return a motion with the payload of the task as a guess."""

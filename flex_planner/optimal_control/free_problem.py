@@ -33,3 +33,13 @@ class FreeProblem(BoundaryValueProblem, Protocol):
 def append_zeros(values: Array, count: int) -> Array:
     """Return an array with so many columns of zeros appended to its last axis."""
     return np.concatenate([values, np.zeros((*values.shape[:-1], count))], axis=-1)
+
+
+def join_with_more(motion: MotionProblem, junction: int, before: Array,
+                   after: Array) -> tuple[Array, Array]:
+    """Return what holds at a via point where unknowns after those of a motion go on."""
+    inner, size = motion.size, before.size
+    residual, rows = after - before, np.hstack([-np.eye(size), np.eye(size)])
+    residual[:inner], found = motion.join(junction, before[:inner], after[:inner])
+    rows[:inner, :inner], rows[:inner, size:size + inner] = np.hsplit(found, 2)
+    return residual, rows

@@ -62,8 +62,8 @@ class FreeViaTimesProblem:
         return np.hstack([phase * rate, phase, np.zeros_like(phase)]), jacobian
 
     def compiled_rate(self) -> CompiledRate | None:
-        """Return both as machine code, None without a compiler or for limits on the way."""
-        if self.motion.compiled_rate() is None:
+        """Return both as machine code; None without a compiler or with limits of states."""
+        if self.motion.layout.torques or self.motion.compiled_rate() is None:
             return None
         return self.motion.model.compiled_rate('free_times', self.motion.p)
 
@@ -100,10 +100,8 @@ class FreeViaTimesProblem:
             rows[-1, size - 2] = 1
             return residual, rows
         points = np.stack([before[:inner], after[:inner]])
-        controls = self.motion.model.controls(points, self.motion.p)
-        rates = self.motion.rate(np.zeros(2), points)
-        # the gradient of H is (-psi', x')
-        slopes = np.hstack([-rates[:, inner // 2:], rates[:, :inner // 2]])
+        controls = self.motion.controls(np.zeros(2), points)
+        slopes = self.motion.layout.turn(self.motion.rate(np.zeros(2), points))
         unit = self._unit
         fall = float(controls.hamiltonian[0] - controls.hamiltonian[1])
         residual[-1] = unit * (fall - self._jumps[junction])
@@ -113,7 +111,8 @@ class FreeViaTimesProblem:
     @property
     def _unit(self) -> float:
         """Return what turns H into a duration, by which its row is scaled."""
-        _, rates, costates, _ = self.motion.scale.reshape(4, -1)
+        scale = self.motion.scale[:4 * self.motion.layout.coordinates]
+        _, rates, costates, _ = scale.reshape(4, -1)
         return float(self.scale[-1]) / (_TYPICAL * float(rates @ costates))
 
     def with_jumps(self, jumps: Array) -> FreeViaTimesProblem:
@@ -123,9 +122,9 @@ class FreeViaTimesProblem:
     def jumps(self, solution: CollocationSolution) -> Array:
         """Return by how much H falls at each via point, shape (K,)."""
         twice = np.flatnonzero(solution.steps == 0)
-        before, after = (self.motion.model.controls(solution.nodes[at, :self.motion.size],
-                                                    self.motion.p).hamiltonian
-                         for at in (twice, twice + 1))
+        before, after = (self.motion.controls(
+            solution.mesh[at], solution.nodes[at, :self.motion.size]).hamiltonian
+            for at in (twice, twice + 1))
         fall: Array = before - after
         return fall
 

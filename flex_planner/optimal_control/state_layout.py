@@ -61,6 +61,13 @@ class StateLayout:
         states: Array = z[..., self.states] if self.torques else z[..., :2 * self.coordinates]
         return states
 
+    def turn(self, rate: Array) -> Array:
+        """Return the gradient of H (..., m) from the rates of an extremal: (-psi', x')."""
+        gradient = np.empty_like(rate)
+        gradient[..., self.states] = -rate[..., self.costates]
+        gradient[..., self.costates] = rate[..., self.states]
+        return gradient
+
     @cached_property
     def explicit(self) -> Indices:
         """Return q, psi_1 and tau, whose rates the collocation need not factorise."""

@@ -13,7 +13,7 @@ from flex_planner.base.validation import Array, listed, number, vector
 from flex_planner.optimal_control.ends_at_points import ends_at_points, MAX_COORDINATE
 from flex_planner.optimal_control.goal_in_pose import posture_in_pose
 from flex_planner.optimal_control.path_constraints.path_constraint import PathConstraint
-from flex_planner.optimal_control.via_points import check_via_points, free_times, ViaPoint
+from flex_planner.optimal_control.via_points import check_via_points, ViaPoint
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -68,8 +68,7 @@ class Task:
     max_torque_rate : array_like, a number or shape (n,)
         Largest rates of the torques in either direction, > 0 [N m/s], ``inf`` for none, one
         number for all joints; empty for none. Without `torque_rate_weight` a small price on the
-        rates is added, see `torque_rate_prices`. Neither goes with `time_weight`, nor with via
-        points without a time.
+        rates is added, see `torque_rate_prices`; with `time_weight` the weight must be given.
     start_velocities, goal_velocities : array_like, shape (n,) or (n_t,)
         Rates at both ends [rad/s, m/s]; empty for zeros, n entries for the joints alone.
     start_modal_displacements : array_like, shape (n_f,)
@@ -340,16 +339,10 @@ class Task:
         self._check_torque_rates()
 
     def _check_torque_rates(self) -> None:
-        """Refuse what motions whose torques are states cannot have yet."""
-        if not self.has_torque_rates:
-            return
-        given = 'torque_rate_weight' if self.torque_rate_weight.size else 'max_torque_rate'
-        if self.time_weight:
-            raise InvalidValueError('time_weight', self.time_weight, f'0 where {given} is given: '
-                                    'the duration must be given then')
-        if free_times(self.via_points):
-            raise InvalidValueError('via_points', 'one without a time', 'points with their times '
-                                    f'where {given} is given')
+        """Refuse bounds of rates whose small price would change with a free duration."""
+        if self.time_weight and self.max_torque_rate.size and not self.torque_rate_weight.size:
+            raise InvalidValueError('time_weight', self.time_weight, '0 where max_torque_rate is '
+                                    'given without torque_rate_weight')
 
     def _set(self, name: str, value: Array) -> None:
         object.__setattr__(self, name, value)

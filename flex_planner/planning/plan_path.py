@@ -38,6 +38,7 @@ from flex_planner.planning.robust.make_robust import make_robust
 from flex_planner.planning.smooth_torques import (
     plan_without_jumps,
     refuse_torque_rates,
+    STIFF_LINKS,
     without_torque_rates,
 )
 from flex_planner.planning.stiff_links import find_stiff_links
@@ -240,9 +241,7 @@ def _plan_smoothly(problem: MotionProblem, solver: Solver,
     task = without_torque_rates(problem.task)
     stiff = find_stiff_links(MotionProblem(problem.model, task, problem.parameters), solver)
     if stiff is not None:
-        return _not_found(problem, 'links or joints are so stiff that they are planned as rigid, '
-                          'which torques without jumps cannot be: make them rigid in the arm '
-                          'file, or leave torque_rate_weight and max_torque_rate out')
+        return _not_found(problem, STIFF_LINKS)
     plain = plan_path(task, model=problem.model, solver=solver, start_from=start,
                       strategies=strategies, search=effort)
     if plain.status is PlanStatus.INFEASIBLE:  # nor is a motion whose torques are less free

@@ -19,7 +19,7 @@ from flex_planner.planning.kinds.effort import SearchEffort
 from flex_planner.planning.largest_rates import find_largest_rates
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.strategies.catalogue import CATALOGUE
-from flex_planner.planning.strategies.initial_guesses import WARM_START
+from flex_planner.planning.strategies.initial_guesses import SMOOTHED, WARM_START
 from flex_planner.planning.strategies.price_continuation import free_duration
 from flex_planner.planning.strategies.strategy import Attempt, Strategy
 from flex_planner.planning.strategies.try_strategies import TriedStrategy, try_strategies
@@ -99,7 +99,7 @@ def _solve_at_via_times(
 
     """
     near = choose_via_times(problem, solver)
-    warm = any(strategy.name == WARM_START for strategy in strategies)
+    warm = any(strategy.name in (WARM_START, SMOOTHED) for strategy in strategies)
     quick = [strategy for strategy in strategies if strategy.quick] or strategies
     homes = [problem, near.problem] if warm else [near.problem, problem]
     found, names, failures = near, list[str](), list[str]()

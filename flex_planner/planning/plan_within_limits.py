@@ -141,7 +141,21 @@ def plan_from(problem: MotionProblem, slacks: PathSlacks, near: CollocationSolut
         If the monitor stopped it.
 
     """
-    met = approach_limits(problem, slacks, near, solver)
+    return plan_from_barrier(problem, slacks, approach_limits(problem, slacks, near, solver),
+                             solver)
+
+
+def plan_from_barrier(problem: MotionProblem, slacks: PathSlacks, met: BarrierOutcome,
+                      solver: Solver) -> Plan | None:
+    """
+    Return the plan within limits that a motion with a barrier leads to, or None.
+
+    Raises
+    ------
+    StoppedError
+        If the monitor stopped it.
+
+    """
     limited, result = solve_within_limits(problem, slacks, met, solver, coarse=True)
     if not result.converged:
         solver.monitor.check()

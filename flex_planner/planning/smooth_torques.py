@@ -16,15 +16,22 @@ from flex_planner.collocation import CollocationSolution, follow_homotopy, Solve
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import Task
 from flex_planner.optimal_control.torque_conditions import TorqueState
+from flex_planner.optimal_control.via_points import free_times
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_problem import plan_problem, STOP_STATUS
-from flex_planner.planning.strategies.initial_guesses import cold_start, direct_collocation
+from flex_planner.planning.strategies.initial_guesses import (
+    cold_start,
+    direct_collocation,
+    SMOOTHED,
+)
 from flex_planner.planning.strategies.strategy import Attempt, Strategy
 import numpy as np
 
 # of the duration, over which torques turn at first in the homotopy, and its first step
 _GENTLE, _FIRST_STEP = 1 / 20, 0.25
-SMOOTHED = 'torques that may jump, then such that may not'
+STIFF_LINKS = ('links or joints are so stiff that they are planned as rigid, which torques '
+               'without jumps cannot be: make them rigid in the arm file, or leave '
+               'torque_rate_weight and max_torque_rate out')
 
 
 def refuse_torque_rates(task: Task, where: str) -> None:
@@ -71,8 +78,18 @@ def plan_without_jumps(problem: MotionProblem, plain: Plan, solver: Solver) -> P
                   Strategy('direct collocation', direct_collocation, cost=5.0)]
     if plain.solution is not None:
         strategies.insert(0, _smooth(plain))
-    plan = plan_problem(problem, solver, strategies)
+    plan = plan_problem(_at_times_of(problem, plain), solver, strategies)
     return replace(plan, tried=(*plain.tried, *plan.tried))
+
+
+def _at_times_of(problem: MotionProblem, plain: Plan) -> MotionProblem:
+    """Return a problem whose free times are those of the motion whose torques may jump."""
+    if plain.solution is None:
+        return problem
+    if problem.task.time_weight:
+        return problem.with_changes(duration=plain.task.duration)
+    free = free_times(problem.task.via_points)
+    return problem.with_via_times(plain.via_times) if free else problem
 
 
 def _smooth(plain: Plan) -> Strategy:

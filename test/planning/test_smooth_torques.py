@@ -9,8 +9,6 @@ from typing import Any
 from factories import PlanFactory, TaskFactory
 from flex_planner.arms.arm import Arm, Joint, Link
 from flex_planner.base.errors import FlexPlannerError, InvalidTaskError
-from flex_planner.capacity.max_payload import find_max_payload
-from flex_planner.capacity.min_duration import find_min_duration
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.task import Task
 from flex_planner.optimal_control.torque_conditions import TorqueState
@@ -186,17 +184,37 @@ def test_rates_that_are_too_slow_are_said_to_be(bar: Task) -> None:
     ({'torque_rate_weight': np.inf}, 'torque_rate_weight'),
     ({'max_torque_rate': -1.0}, 'max_torque_rate.* > 0'),
     ({'max_torque_rate': np.nan}, 'max_torque_rate'),
-    ({'torque_rate_weight': 1.0, 'time_weight': 1.0}, 'time_weight is 1.0, but must be 0 where '
-                                                      'torque_rate_weight'),
+    ({'max_torque_rate': 1.0, 'time_weight': 1.0}, 'time_weight is 1.0, but must be 0 where '
+                                                   'max_torque_rate is given without'),
 ])
 def test_tasks_are_checked(bar: Task, changes: dict[str, Any], message: str) -> None:
     with pytest.raises(FlexPlannerError, match=message):
         replace(bar, **changes)
 
 
-def test_via_points_need_times(rigid_arm: Arm, paper_task: TaskFactory) -> None:
-    with pytest.raises(FlexPlannerError, match='via_points.*where max_torque_rate is given'):
-        paper_task(rigid_arm, max_torque_rate=9.0, via_points=[ViaPoint(positions=[1.2, -2.1])])
+def test_free_duration_is_the_best(gentle: Plan, ei50_model: ArmModel) -> None:
+    plan = plan_path(replace(gentle.task, time_weight=4.0), model=ei50_model, search='fast')
+    assert plan.solved and plan.task.torque_rate_weight.any(), plan.message
+    assert abs(plan.task.duration - 1.0) > 0.05
+    for factor in (0.99, 1.01):  # J with the price of time, of durations that are given
+        other = plan_path(replace(gentle.task, duration=factor * plan.task.duration),
+                          model=ei50_model, start_from=plan, search='fast')
+        assert other.solved, other.message
+        assert other.cost + 4.0 * other.task.duration > plan.cost
+
+
+def test_free_times_of_via_points_are_the_best(rigid_model: ArmModel,
+                                               paper_task: TaskFactory) -> None:
+    via = ViaPoint(positions=[1.2, -2.1])
+    task = priced(paper_task(rigid_model.arm, via_points=[via]))
+    plan = plan_path(task, model=rigid_model, search='fast')
+    assert plan.solved, plan.message
+    best = float(plan.via_times[0])
+    np.testing.assert_allclose(plan.sample([best]).coordinates[0], [1.2, -2.1], atol=1e-8)
+    for time in (0.98 * best, 1.02 * best):
+        given = replace(task, via_points=[replace(via, time=time)])
+        other = plan_path(given, model=rigid_model, search='fast')
+        assert other.solved and other.cost > plan.cost, other.message
 
 
 def test_one_number_stands_for_all_joints(rigid_arm: Arm, paper_task: TaskFactory) -> None:
@@ -207,11 +225,8 @@ def test_one_number_stands_for_all_joints(rigid_arm: Arm, paper_task: TaskFactor
     np.testing.assert_allclose(bound.torque_rate_prices, 1 / 8 * (1 / 200)**2)
 
 
-def test_searches_refuse_a_price_on_rates(rigid_model: ArmModel, paper_task: TaskFactory) -> None:
-    task = priced(paper_task(rigid_model.arm))
-    with pytest.raises(InvalidTaskError, match='torque_rate_weight .* largest payload'):
-        find_max_payload(task, model=rigid_model)
-    with pytest.raises(InvalidTaskError, match='torque_rate_weight .* shortest duration'):
-        find_min_duration(task, model=rigid_model)
+def test_objectives_refuse_a_price_on_rates(rigid_model: ArmModel,
+                                            paper_task: TaskFactory) -> None:
     with pytest.raises(InvalidTaskError, match='torque_rate_weight .* objectives'):
-        plan_path(task, model=rigid_model, objectives=Objectives(max_joint_speeds=[1.0, 1.0]))
+        plan_path(priced(paper_task(rigid_model.arm)), model=rigid_model,
+                  objectives=Objectives(max_joint_speeds=[1.0, 1.0]))

@@ -223,7 +223,7 @@ class _Duration(FreeParameter):
 
     def price(self, problem: MotionProblem, solution: CollocationSolution) -> float:
         """Return -dJ/dt_f = -H, at least something positive."""
-        hamiltonian = problem.model.controls(solution.nodes, problem.p).hamiltonian
+        hamiltonian = problem.controls(solution.mesh, solution.nodes).hamiltonian
         hamiltonian = hamiltonian + problem.barrier_rate(solution.nodes)
         share = integrate_totals(problem, solution).cost / problem.task.duration
         return max(-float(np.mean(hamiltonian)), _LEAST_SHARE * share, _LEAST_PRICE)

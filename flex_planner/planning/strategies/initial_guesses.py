@@ -30,6 +30,7 @@ from flex_planner.planning.strategies.strategy import Attempt, Strategy
 import numpy as np
 
 WARM_START = 'warm start'
+SMOOTHED = 'torques that may jump, then such that may not'
 
 # intervals on which Newton's method takes ringing as linear, in units of those that overlook
 # nothing, and the iterations of a first look on fewer

@@ -22,6 +22,7 @@ from flex_planner.planning.strategies.free_parameters import (
     solve_stretched,
 )
 from flex_planner.planning.strategies.ipopt_continuation import jump_in_price
+import numpy as np
 
 # of the price from one motion to the next; grows where that is easy, shrinks where it fails
 _FACTOR, _LARGEST_FACTOR, _SMALLEST_FACTOR = 4.0, 16.0, 1.02
@@ -32,6 +33,8 @@ _STALLED, _MOST_JUMPS = 2.0, 4
 _CLOSE, _SURE, _LEAST_FACTOR = 0.2, 0.6, 1.5
 # the gap falls with this power of the price: 2 for rigid arms, less where links ring
 _POWER = 1.5
+# that are tried where the price of a duration is approached
+_MOST_DURATIONS = 40
 # a price so near is left to Newton's method
 _NEAR_PRICE = 16.0
 
@@ -129,12 +132,16 @@ def free_duration(problem: MotionProblem, result: CollocationResult,
     shorter = wanted > DURATION.price(problem, result.solution)
     freed = _free_at(problem, result, wanted, solver)
     coarse = solver.coarse()
-    extremals = (continue_in_price(DURATION, problem, result, coarse) if shorter
-                 else _lengthen(problem, result, coarse))
+    extremals = _lengthen(problem, result, coarse)
+    if problem.layout.torques:
+        extremals = _approach_price(problem, result, wanted, coarse)
+    elif shorter:
+        extremals = continue_in_price(DURATION, problem, result, coarse)
     for extremal in extremals if freed is None else ():
         if extremal.interrupted:
             return problem, extremal.result
-        passed = extremal.price > wanted if shorter else extremal.price < wanted
+        passed = not problem.layout.torques and (
+            extremal.price > wanted if shorter else extremal.price < wanted)
         if passed or max(extremal.price / wanted, wanted / extremal.price) < _NEAR_PRICE:
             near = DURATION.with_value(problem, extremal.value)
             freed = _free_at(near, extremal.result, wanted, solver)
@@ -153,6 +160,22 @@ def _free_at(problem: MotionProblem, result: CollocationResult, price: float,
     if found is None or found.interrupted:
         return None if found is None else (problem, found.result)
     return found.problem, found.result
+
+
+def _approach_price(problem: MotionProblem, first: CollocationResult, wanted: float,
+                    solver: Solver) -> Iterator[Extremal]:
+    """Yield durations whose prices come near to one: they fall about with the fourth power."""
+    here, price = first, DURATION.price(problem, first.solution)
+    for _ in range(_MOST_DURATIONS):
+        factor = float(np.clip((price / wanted)**0.25, SHORTER, 1 / SHORTER))
+        if not DURATION.is_possible(factor * problem.task.duration):
+            break
+        problem = DURATION.with_value(problem, factor * problem.task.duration)
+        here = solve_stretched(problem, here.solution, solver)
+        price = DURATION.price(problem, here.solution) if here.converged else wanted
+        yield Extremal(value=problem.task.duration, price=price, result=here, problem=problem)
+        if not here.converged:
+            break
 
 
 def _lengthen(problem: MotionProblem, first: CollocationResult,

@@ -66,7 +66,8 @@ def without_via_points(problem: MotionProblem) -> MotionProblem:
 def solve_bare(bare: MotionProblem, solver: Solver) -> CollocationResult:
     """Return the motion of a task without via points, by the first ways to one."""
     result = cold_start(bare, solver).result
-    if not result.converged and result.status not in INTERRUPTED:
+    # rigid motions are lifted without their torques
+    if not (result.converged or result.status in INTERRUPTED or bare.layout.torques):
         lifted = lift_rigid_motion(bare, solver)
         result = result if lifted is None else lifted.result
     return result

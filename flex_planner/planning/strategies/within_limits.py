@@ -41,7 +41,7 @@ STAGES, _FEWEST = 4, 40
 # mu in units of the cost per time of the motion that it starts from: at first, with the smallest
 # slacks then, where a motion is told from others, and at last; the second of each where the first
 # leads to nothing
-_FIRST, _COARSE, _LAST = ((1e-2, 0.1), (1.0, 0.01)), 1e-3, (1e-4, 1e-3)
+_FIRST, COARSE, _LAST = ((1e-2, 0.1), (1.0, 0.01)), 1e-3, (1e-4, 1e-3)
 # iterations on a mesh: of the interior point, at the end, of a first look from a motion like it
 _PATIENCE, _FINISH, _FIRST_LOOK = 60, 30, 10
 # iterations after which multipliers need not have settled, see `BarrierSchedule`
@@ -85,7 +85,7 @@ def approach_limits(problem: MotionProblem, slacks: PathSlacks, near: Collocatio
     barrier, rate = limit_states(problem, slacks), find_cost_rate(problem, near)
     guess = near.on_mesh(first_mesh(problem, solver), GaussRule.of(STAGES))
     for first, slack in _FIRST:
-        schedule = _schedule(first * rate, _COARSE * rate, solver)
+        schedule = _schedule(first * rate, COARSE * rate, solver)
         y = barrier.guess(guess, schedule.first, slack)
         met = solve_barrier(barrier, guess, y, schedule, solver.monitor)
         if met.converged:
