@@ -214,8 +214,8 @@ def judge_execution(plan: Plan, sampled: SampledPlan,
         What must be kept.
 
     """
-    broken = (limits or ExecutionLimits()).violations(sampled.execution, plan.arm.reach,
-                                                       plan.arm)
+    broken = (limits or ExecutionLimits()).violations(
+        sampled.execution, plan.arm.reach, plan.arm)
     if not plan.solved or not broken:
         return plan
     return replace(plan, status=PlanStatus.CERTIFICATE_FAILED,
