@@ -16,6 +16,7 @@ from flex_planner.planning.uncertainty import ASSUMED, ASSUMED_ERROR, MAX_ERROR,
 
 # of a value in the arm file and the one that was found, which the file has with all its digits
 _SAME = 1e-6
+_PAYLOAD = 'payload_mass'
 
 
 def identification_file(arm_file: Path) -> Path:
@@ -68,7 +69,9 @@ def read_uncertainty(path: Path, arm: Arm) -> Uncertainty:
         content: Any = read_yaml(path)[1]
         entries = {one['name']: one for one in content['parameters']}
         shares = {one: _share(entries[one.name]) for one in list_parameters(arm.n_joints)
-                  if one.kind in (Quantity.PAYLOAD, Quantity.RIGIDITY) and one.name in entries}
+                  if one.kind is Quantity.RIGIDITY and one.name in entries}
+        payload = entries[_PAYLOAD]
+        payload_share, payload_mass = _share(payload), float(payload['value'])
     except YamlFileError as error:
         raise LogError(str(error)) from None
     except (LookupError, TypeError, ValueError) as error:
@@ -76,10 +79,8 @@ def read_uncertainty(path: Path, arm: Arm) -> Uncertainty:
                        f'{error}') from None
     for one in shares:
         _check(path, arm, one, entries[one.name])
-    payload = next(one for one in shares if one.kind is Quantity.PAYLOAD)
-    rigid = [share for one, share in shares.items() if one.kind is Quantity.RIGIDITY]
-    return Uncertainty(stiffness=max(rigid, default=ASSUMED_ERROR), payload=shares[payload],
-                       payload_mass=float(entries[payload.name]['value']),
+    return Uncertainty(stiffness=max(shares.values(), default=ASSUMED_ERROR),
+                       payload=payload_share, payload_mass=payload_mass,
                        source=f'identified, {say_file(path)}')
 
 
@@ -95,8 +96,6 @@ def _share(entry: dict[str, Any]) -> float:
 
 def _check(path: Path, arm: Arm, one: Parameter, entry: dict[str, Any]) -> None:
     """Raise LogError if a rigidity of the arm is not the one that was found."""
-    if one.kind is not Quantity.RIGIDITY:
-        return
     found, has = float(entry['value']), arm.links[one.index].flexural_rigidity
     if abs(found - has) > _SAME * found:
         raise LogError(f'{say_file(path)} is of another arm: {one.name} was found to be '

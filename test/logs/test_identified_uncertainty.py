@@ -59,6 +59,7 @@ def test_without_such_a_file_it_is_assumed(tmp_path: Path) -> None:
 @pytest.mark.parametrize(('content', 'message'), [
     ('parameters: 3', 'is not what flex-planner identify writes'),
     ('parameters: [{name: payload_mass, value: 1}]', 'is not what flex-planner identify writes'),
+    ('parameters: []', "is not what flex-planner identify writes: 'payload_mass'"),
     (format_yaml({'parameters': [entry('payload_mass', 1, 0.1, 0.1), entry(
         'links[0].flexural_rigidity', 6, 0.1, 0.1)]}), 'is of another arm')])
 def test_file_that_is_of_something_else_is_refused(tmp_path: Path, content: str,
