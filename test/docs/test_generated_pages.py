@@ -96,7 +96,7 @@ def test_every_command_and_option_is_there() -> None:
         said = re.findall(r'^  (?:-\w, )?(--[\w-]+)', parser.format_help(), re.MULTILINE)
         assert [option for option in said if f'`{option}' not in shown] == ['--help']
         assert '%(' not in shown
-    listed = re.findall(r'^    (\w[\w-]*)  ', build_parser().format_help(), re.MULTILINE)
+    listed = re.findall(r'^    (\w[\w-]*)(?:  |$)', build_parser().format_help(), re.MULTILINE)
     assert names == listed
 
 
