@@ -15,8 +15,8 @@ _MAX_ITERATIONS = 50
 _LEAST_INERTIA = 1e-14  # of a motion relative to those of single coordinates; rounding is 1e-16
 
 
-def equilibrium(dynamics: ArmDynamics, positions: Array, parameters: PhysicalParameters,
-                near: Array | None = None) -> tuple[Array, Array]:
+def equilibrium(dynamics: ArmDynamics, positions: Array,
+                parameters: PhysicalParameters) -> tuple[Array, Array]:
     """
     Return the arm at rest with its joints held.
 
@@ -28,8 +28,6 @@ def equilibrium(dynamics: ArmDynamics, positions: Array, parameters: PhysicalPar
         Joint angles [rad].
     parameters : PhysicalParameters
         Payload and stiffness.
-    near : numpy.ndarray, shape (n_t,), optional
-        q at rest there with a little more or less payload, from which it is found sooner.
 
     Returns
     -------
@@ -45,7 +43,7 @@ def equilibrium(dynamics: ArmDynamics, positions: Array, parameters: PhysicalPar
 
     """
     n, p = dynamics.arm.n_joints, parameters.physical
-    q = np.concatenate([positions, np.zeros(dynamics.arm.n_passive) if near is None else near[n:]])
+    q = np.concatenate([positions, np.zeros(dynamics.arm.n_passive)])
     for _ in range(_MAX_ITERATIONS):
         force, stiffness = dynamics.static_forces(q[None], p)
         if not dynamics.arm.n_passive:

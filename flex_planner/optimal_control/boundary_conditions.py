@@ -110,7 +110,7 @@ def rest_at_end(model: ArmModel, task: Task, end: str, parameters: Parameters,
     """
     positions, point = getattr(task, f'{end}_positions'), getattr(task, f'{end}_point')
     if not point.size:
-        return equilibrium(model, positions, parameters, near)
+        return equilibrium(model, positions, parameters)
     try:
         return rest_at_point(model, task.arm, point, positions, parameters, near)
     except (UnreachableError, SingularError) as error:
@@ -151,7 +151,7 @@ class PayloadEnds:
         self._given = conditions.start, conditions.goal
         bends = task.arm.bends_at_rest
         self._bent = bends and not task.start_modal_displacements.size, bends
-        # states that were found last, from which others are found soon
+        # that were found last, from which others are found soon
         self._near: list[Array | None] = [None, None]
 
     def at(self, end: int, payload: float) -> tuple[Array, Array, Array]:
@@ -170,19 +170,18 @@ class PayloadEnds:
         given = self._given[end]
         if not self._bent[end]:
             return given, np.zeros_like(given), np.zeros_like(given)
-        here = self._state(end, payload, self._near[end])
-        less = self._state(end, payload - _NUDGE, here)
-        more = self._state(end, payload + _NUDGE, 2 * here - less)
-        self._near[end] = here
+        here, less, more = (self._state(end, payload + change)
+                            for change in (0.0, -_NUDGE, _NUDGE))
         return here, (more - less) / (2 * _NUDGE), (more - 2 * here + less) / _NUDGE**2
 
-    def _state(self, end: int, payload: float, near: Array | None) -> Array:
+    def _state(self, end: int, payload: float) -> Array:
         parameters = replace(self._parameters, payload_mass=payload)
         name, velocities = (('start', self._task.start_velocities),
                             ('goal', self._task.goal_velocities))[end]
         try:
             coordinates, _ = rest_at_end(self._model, self._task, name, parameters,
-                                         None if near is None else near[:near.size // 2])
+                                         self._near[end])
         except (SingularError, UnreachableError) as error:
             raise NoEquilibriumError(str(error)) from None
+        self._near[end] = coordinates
         return np.concatenate([coordinates, velocities])

@@ -84,28 +84,6 @@ def test_deflection_of_a_chain_leaves_no_force_on_its_modes(crane_arm: Arm) -> N
     assert np.abs(q[2:]).min() > 1e-5
 
 
-def test_rest_is_found_sooner_from_that_with_another_payload(
-        crane_arm: Arm, monkeypatch: pytest.MonkeyPatch) -> None:
-    model, asked, static_forces = LightModel(crane_arm), list[Array](), LightModel.static_forces
-
-    def watched(self: LightModel, q: Array, p: Array) -> tuple[Array, Array]:
-        asked.append(q)
-        return static_forces(self, q, p)
-
-    monkeypatch.setattr(LightModel, 'static_forces', watched)
-
-    def rest(payload: float, near: Array | None = None) -> tuple[Array, int]:
-        asked.clear()
-        parameters = Parameters.of(crane_arm, payload_mass=payload)
-        q, _ = equilibrium(model, np.array([0.3, -0.8]), parameters, near)  # type: ignore
-        return q, len(asked)
-
-    straight, count = rest(1.001)
-    warm, fewer = rest(1.001, rest(1.0)[0])
-    np.testing.assert_allclose(warm, straight, rtol=0, atol=1e-14)
-    assert fewer < count
-
-
 @pytest.mark.parametrize(('angle', 'rigidity', 'payload', 'degrees'), [
     # Newton finds nothing; an upright arm that would buckle, though it could be balanced
     (0.0, 2.0, 1.0, '0, 0'), (np.pi / 2, 5.0, 5.0, '90, 0')])

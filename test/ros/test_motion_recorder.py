@@ -11,8 +11,9 @@ from builtin_interfaces.msg import Duration
 from flex_planner.arms.arm import Arm
 from flex_planner.base.errors import RecordingError
 from flex_planner.logs.recorded_log import read_recorded_logs
-from flex_planner.ros.motion_recorder import MotionRecorder, RecordedMotion
+from flex_planner.ros.motion_recorder import MotionRecorder
 from flex_planner.ros.planner.recorder import OutcomeRecorder
+from flex_planner.ros.recorded_motion import RecordedMotion
 from flex_planner.ros.settings.planner import PlannerSettings
 import numpy as np
 import pytest

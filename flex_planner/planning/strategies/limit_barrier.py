@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from flex_planner.base.errors import FlexPlannerError
-from flex_planner.base.progress import LimitedMonitor
 from flex_planner.collocation import CollocationSolution, GaussRule, INTERRUPTED, Solver
 from flex_planner.collocation.interior_point import (
     BarrierOutcome,
@@ -39,10 +38,6 @@ _PRICE = 1e3
 _FIRST, _LAST = 0.15, 3e-4
 _TOLERANCE = 0.1
 _PATIENCE = 60
-# iterations times intervals for each share of what was reached, on meshes of so many intervals at
-# most: next to the limit, links whose joints have hardly any inertia of their own leave torques
-# that switch ever more often
-_WORK, _USUAL = 8e3, 40
 # mu at last at the lower price, of the effort that the motors can spend per time, and iterations
 _AT_LAST, _FEW = 1e-4, 20
 # the price, in units of all effort for the value, that leaves a gap of this share; the gap falls
@@ -84,9 +79,9 @@ def moved_mass(problem: MotionProblem) -> float:
 
 _LIMITS: Mapping[FreeParameter, _Limit] = {
     PAYLOAD: _Limit(barrier=PayloadBarrier, amount=moved_mass,
-                    easier=(1.0, 0.99, 0.95, 0.9, 0.8, 0.7), cheap=40),
+                    easier=(1.0, 0.99, 0.95), cheap=40),
     DURATION: _Limit(barrier=DurationBarrier, amount=lambda problem: problem.task.duration,
-                     easier=(1.0, 1.01, 1.05, 1.1, 1.25, 1.4), cheap=100)}
+                     easier=(1.0, 1.01, 1.05), cheap=100)}
 
 
 def reach_limit(parameter: FreeParameter, problem: MotionProblem, solver: Solver,
@@ -157,14 +152,12 @@ def _solve_easier(parameter: FreeParameter, problem: MotionProblem, value: float
                   solver: Solver) -> Extremal | None:
     """Return the motion with a little less than what was reached with the barrier."""
     patient = solver.with_settings(max_iterations=_PATIENCE)
-    work = _WORK * max(1.0, _count(problem) / _USUAL)
     for share in _LIMITS[parameter].easier:
         if not parameter.improves(share * value, parameter.value(problem)):
             break
         try:
             near = parameter.with_value(problem, share * value)
-            attempt = pass_barrier(near, patient.watched_by(
-                LimitedMonitor.of(solver.monitor, work)))
+            attempt = pass_barrier(near, patient)
             assert attempt is not None  # the method is our own
             result = attempt.result
             price = parameter.price(near, result.solution) if result.converged else 0.0

@@ -30,9 +30,9 @@ from flex_planner.recording import (
 from flex_planner.ros.messages.classes import MotionTask, PlanReport, TYPES
 from flex_planner.ros.messages.feedback import feedback_message
 from flex_planner.ros.messages.plans import reference_state
-from flex_planner.ros.motion_recorder import in_order, RecordedMotion
 from flex_planner.ros.planner.outcome import Outcome
 from flex_planner.ros.planner.request_state import RequestState
+from flex_planner.ros.recorded_motion import in_order, RecordedMotion
 from flex_planner.ros.settings.fields import as_mapping
 from flex_planner.ros.settings.planner import PlannerSettings
 

@@ -246,6 +246,6 @@ def test_where_no_other_process_can_be_had_this_one_does_it(
 
 
 def test_error_in_a_helper_is_raised_here() -> None:
-    start = Start(recipe=pickle.dumps(('no arm', 'no mesh', {})), inputs={})
+    start = Start(recipe=pickle.dumps(('no arm', 'no mesh', None, {})), inputs={})
     with pytest.raises(AttributeError, match="'str' object has no attribute"):
         list(solve_each([start], Monitor(), 1))
