@@ -22,6 +22,7 @@ SECTIONS = {
              'flex_planner.dynamics.arm_dynamics', 'flex_planner.optimal_control.arm_model'),
     'Arms in space': ('flex_planner.arms.spatial_arm', 'flex_planner.arms.spatial_joint',
                       'flex_planner.arms.spatial_link', 'flex_planner.arms.spatial_beam',
+                      'flex_planner.arms.elements', 'flex_planner.arms.element_modes',
                       'flex_planner.arms.spatial_body',
                       'flex_planner.arms.spatial_inverse_kinematics'),
     'Tasks and plans': ('flex_planner.optimal_control.task',

@@ -85,10 +85,10 @@ def _align(direction: Array) -> tuple[Array, int, float]:
 
 
 def _beam(arm: SpatialArm, index: int, axes: Array) -> FlexibleBody:
-    """Return what lies between a joint and the end of its link: a beam, or nothing but a way."""
+    """Return what lies between a joint and the end of its link: what bends, or a way alone."""
     link = arm.links[index]
-    if link.beam is not None and link.modes:
-        return link.beam.flexible_body(link.length)
+    if link.modes:
+        return link.flexible_body()
     none, empty = np.zeros((3, 0)), np.zeros((0, 0))
     return FlexibleBody(
         mass=0.0, first_moment=np.zeros(3), inertia=np.zeros((3, 3)), displacement=none,

@@ -6,7 +6,9 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
+from flex_planner.arms.element_modes import ElementModes
 from flex_planner.arms.joint import Elasticity, Motor, Node
+from flex_planner.arms.mechanism import FlexibleBody
 from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.arms.spatial_beam import SpatialBeam
 from flex_planner.arms.spatial_body import SpatialBody
@@ -50,8 +52,19 @@ def _link(fields: Mapping[str, Any]) -> SpatialLink:
     beam = fields['beam']
     bodies = {name: SpatialBody(**{key: _tuples(value) for key, value in fields[name].items()})
               for name in ('body', 'tip_body')}
-    return SpatialLink(end=_tuples(fields['end']), **bodies, beam=None if beam is None else (
-        SpatialBeam(**{key: _tuples(value) for key, value in beam.items()})))
+    return SpatialLink(
+        end=_tuples(fields['end']), **bodies, beam=None if beam is None else (
+            SpatialBeam(**{key: _tuples(value) for key, value in beam.items()})),
+        elements=_elements(fields.get('elements')))
+
+
+def _elements(fields: Mapping[str, Any] | None) -> ElementModes | None:
+    """Return modes of finite elements; recordings of older planners have none."""
+    if fields is None:
+        return None
+    body: dict[str, Any] = {key: value if key == 'mass' else np.array(value)
+                            for key, value in fields['body'].items()}
+    return ElementModes(**{**fields, 'body': FlexibleBody(**body)})
 
 
 def _plain(value: Any) -> Any:

@@ -16,6 +16,7 @@ from typing import Any
 
 from flex_planner.arms.arm_fields import read_joint_values
 from flex_planner.arms.beam_fields import is_beam, read_beam, read_body
+from flex_planner.arms.element_files import read_elements
 from flex_planner.arms.joint import COULOMB_SPEED, Motor
 from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.arms.spatial_body import (
@@ -79,7 +80,7 @@ def read_spatial_arm(top: YamlSection, folder: Path, description: str = '') -> S
     """
     named = top.has('urdf')
     values = {**_common(top), **(_of_urdf(top, folder, description) if named or description
-                                 else _alone(top))}
+                                 else _alone(top, folder))}
     arm: SpatialArm = top.build(SpatialArm, **values)
     return arm
 
@@ -98,7 +99,7 @@ def _common(top: YamlSection) -> dict[str, Any]:
     return values
 
 
-def _alone(top: YamlSection) -> dict[str, Any]:
+def _alone(top: YamlSection, folder: Path) -> dict[str, Any]:
     """Return the fields of an arm without URDF: joints and links in their order."""
     places: list[Any] = []
     joints = [_read_joint(section, places) for section in top.sections('joints')]
@@ -109,7 +110,7 @@ def _alone(top: YamlSection) -> dict[str, Any]:
         end, rotation = (tip.take(key, (0.0, 0.0, 0.0)) for key in ('xyz', 'rpy'))
         tip.finish()
     ends = [*places[1:], point(top.name('tip.xyz'), end)]
-    links = [_read_link(section, end) for section, end in _paired(top, ends)]
+    links = [_read_link(section, end, folder) for section, end in _paired(top, ends)]
     return {'name': top.text('name'), 'joints': tuple(joints), 'links': tuple(links),
             'base': places[0] if places else (0.0, 0.0, 0.0), 'tip_rotation': rotation}
 
@@ -136,18 +137,21 @@ def _read_joint(section: YamlSection, places: list[Any]) -> SpatialJoint:
     return joint
 
 
-def _read_link(section: YamlSection, end: Any) -> SpatialLink:
-    """Return a link: a body, a beam with what is at its ends, or both."""
-    bodies = {f'{name}body' if name else 'body': read_body(section.section(field))
-              for name, field in (('', 'inertial'), ('tip_', 'tip_body')) if section.has(field)}
-    if is_beam(section):
+def _read_link(section: YamlSection, end: Any, folder: Path) -> SpatialLink:
+    """Return a link: a body, a beam or finite elements with what is at its ends."""
+    parts: dict[str, Any] = {f'{name}body' if name else 'body': read_body(section.section(field))
+                             for name, field in (('', 'inertial'), ('tip_', 'tip_body'))
+                             if section.has(field)}
+    if section.has('elements'):
+        parts['elements'] = read_elements(section.section('elements'), end, folder)
+    elif is_beam(section):
         length = math.hypot(*end)
         if not length:
             raise InvalidValueError(section.name('modes'), 'given',
                                     'left out where the next joint is at the same place')
         beam = read_beam(section, length, 0.0)
-        return SpatialLink(end=end, beam=beam, **bodies)
-    link: SpatialLink = section.build(SpatialLink, end=end, **bodies)
+        return SpatialLink(end=end, beam=beam, **parts)
+    link: SpatialLink = section.build(SpatialLink, end=end, **parts)
     return link
 
 
@@ -228,6 +232,9 @@ class _Overlay:
         """Return a link: rigid as the URDF has it, or the beam that the file says."""
         if section is None:
             return SpatialLink(end=link.end, body=whole_body(link))
+        if section.has('elements'):
+            raise InvalidValueError(section.name('elements'), 'given', 'left out with a URDF: '
+                                    'links of finite elements are read in arms without one')
         length = math.hypot(*link.end)
         if not length:
             raise InvalidValueError(section.path, 'a beam', 'left out: the next joint is where '

@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 import math
 
+from flex_planner.arms.element_modes import ElementModes
 from flex_planner.arms.link import MAX_MODES
+from flex_planner.arms.mechanism import FlexibleBody
 from flex_planner.arms.spatial_beam import SpatialBeam
-from flex_planner.arms.spatial_body import clean, Point, point, SpatialBody
+from flex_planner.arms.spatial_body import clean, join_bodies, Point, point, SpatialBody
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.validation import Array
 import numpy as np
@@ -30,13 +32,15 @@ class SpatialLink:
         base.
     beam : SpatialBeam, optional
         From the origin to the end; none for a rigid link.
+    elements : ElementModes, optional
+        In place of a beam: modes of finite elements, in the frame of the link.
     tip_body : SpatialBody
         Fixed to the end, with the axes of the link as it is bent there.
 
     Raises
     ------
     InvalidValueError
-        If a value breaks its bound, or a beam has no length.
+        If a value breaks its bound, a beam has no length, or there are beam and elements.
 
     """
 
@@ -44,15 +48,27 @@ class SpatialLink:
     body: SpatialBody = field(default_factory=SpatialBody)
     beam: SpatialBeam | None = None
     tip_body: SpatialBody = field(default_factory=SpatialBody)
+    elements: ElementModes | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, 'end', point('end', self.end))
+        if self.elements is not None:
+            self._check_elements()
         if self.beam is not None and not self.length:
             raise InvalidValueError('end', list(self.end),
                                     'apart from the joint where the link is a beam')
         if self.beam is not None:
             self.axes()
             self.beam.flexible_body(self.length)  # refuses shapes that cannot be computed
+
+    def _check_elements(self) -> None:
+        """Refuse elements beside a beam, or with another end."""
+        if self.beam is not None:
+            raise InvalidValueError('elements', 'given', 'left out where there is a beam')
+        assert self.elements is not None
+        if not np.array_equal(self.elements.body.tip, self.end):
+            raise InvalidValueError('end', list(self.end), 'that of elements, '
+                                    f'{self.elements.body.tip.tolist()}')
 
     @property
     def length(self) -> float:
@@ -62,23 +78,34 @@ class SpatialLink:
     @property
     def modes(self) -> int:
         """Return the number of modes of bending and twisting."""
+        if self.elements is not None:
+            return self.elements.count
         return 0 if self.beam is None else self.beam.count
 
     @property
     def mass(self) -> float:
         """Return the mass of all that belongs to the link [kg]."""
         beam = 0.0 if self.beam is None else self.beam.linear_density * self.length
-        return self.body.mass + beam + self.tip_body.mass
+        elements = 0.0 if self.elements is None else self.elements.body.mass
+        return self.body.mass + beam + elements + self.tip_body.mass
 
     @property
     def flexural_rigidity(self) -> float:
-        """Return `SpatialBeam.reference_rigidity`; infinite for a rigid link [N m^2]."""
+        """
+        Return `SpatialBeam.reference_rigidity`; infinite for a rigid link [N m^2].
+
+        Of elements the factor of their stiffness, which has no unit.
+
+        """
+        if self.elements is not None:
+            return self.elements.factor
         return math.inf if self.beam is None else self.beam.reference_rigidity
 
     @property
     def damping_ratios(self) -> Array:
         """Return the damping ratio of each mode, shape (modes,)."""
-        return np.full(self.modes, 0.0 if self.beam is None else self.beam.damping_ratio)
+        bends = self.elements or self.beam
+        return np.full(self.modes, 0.0 if bends is None else bends.damping_ratio)
 
     @property
     def is_clamped(self) -> bool:
@@ -97,7 +124,9 @@ class SpatialLink:
 
     @property
     def mode_names(self) -> tuple[str, ...]:
-        """Return a name of each mode: ``across1``, ``across2`` for the planes, ``twist``."""
+        """Return a name of each mode: ``y1``, ``z1``, ``twist1``; of elements ``mode1``."""
+        if self.elements is not None:
+            return tuple(f'mode{j}' for j in range(1, self.elements.count + 1))
         if self.beam is None:
             return ()
         counts = zip(('y', 'z', 'twist'), (*self.beam.modes, self.beam.twist_modes), strict=True)
@@ -115,15 +144,17 @@ class SpatialLink:
             If the beam's `across` is along it.
 
         """
-        if self.beam is None:
-            return np.eye(3)
+        return np.eye(3) if self.beam is None else self._axes_of_line(self.beam.across)
+
+    def _axes_of_line(self, given: Point | None) -> Array:
+        """Return axes whose first is along the link, the second nearest to a direction."""
         along = np.array(self.end) / self.length
         across = (np.eye(3)[(int(np.abs(along).argmax()) + 1) % 3]
-                  if self.beam.across is None else np.array(self.beam.across))
+                  if given is None else np.array(given))
         across = across - (across @ along) * along
         size = float(np.linalg.norm(across))
-        if not size > _PARALLEL * max(1.0, float(np.linalg.norm(self.beam.across or 1.0))):
-            raise InvalidValueError('beam.across', self.beam.across, 'a direction across the beam')
+        if not size > _PARALLEL * max(1.0, float(np.linalg.norm(given or 1.0))):
+            raise InvalidValueError('beam.across', given, 'a direction across the beam')
         across /= size
         return clean(np.column_stack([along, across, np.cross(along, across)]))
 
@@ -144,43 +175,86 @@ class SpatialLink:
             In the frame of the link, to first order [m].
 
         """
-        if self.beam is None or not self.modes:
+        if not self.modes:
             return np.zeros((*modal.shape[:-1], stations, 3))
-        places = np.linspace(0.0, self.length, stations, dtype=np.float64)
-        shapes = self.axes() @ self.beam.displace(self.length, places)  # (stations, 3, m)
+        shapes = self.axes() @ self.shapes(np.linspace(0.0, 1.0, stations, dtype=np.float64))
         moved: Array = np.einsum('sam,...m->...sa', shapes, modal)
         return moved
 
+    def flexible_body(self) -> FlexibleBody:
+        """Return the integrals over what bends, in the axes `axes`."""
+        if self.elements is not None:
+            return self.elements.flexible_body()
+        if self.beam is None:
+            raise InvalidValueError('beam', None, 'given: a rigid link does not bend')
+        return self.beam.flexible_body(self.length)
+
+    def shapes(self, shares: Array) -> Array:
+        """Return how modes move points at shares (k,) of the link in `axes`, (k, 3, modes)."""
+        if self.elements is not None:
+            return self.elements.displace(shares)
+        if self.beam is None:
+            return np.zeros((shares.size, 3, 0))
+        return self.beam.displace(self.length, shares * self.length)
+
     def bend_shapes(self, shares: Array) -> Array:
         """Return how modes move points at shares (k,) of the length across, (k, 2, modes)."""
-        if self.beam is None:
-            return np.zeros((shares.size, 2, 0))
-        return self.beam.displace(self.length, shares * self.length)[:, 1:]
+        if self.elements is not None:
+            return (self._axes_of_line(None).T @ self.shapes(shares))[:, 1:]
+        return self.shapes(shares)[:, 1:]
 
     def moment_shapes(self, shares: Array) -> Array:
-        """Return the bending moments of modes there for E I = 1, see `SpatialBeam.moments`."""
+        """
+        Return the bending moments of modes there for E I = 1, see `SpatialBeam.moments`.
+
+        Raises
+        ------
+        InvalidValueError
+            If the link is one of elements, whose stresses are not kept.
+
+        """
+        if self.elements is not None:
+            raise InvalidValueError('link', 'one of finite elements', 'a beam: bending moments of '
+                                    'elements are not known')
         if self.beam is None:
             return np.zeros((shares.size, 2, 0))
         return self.beam.moments(self.length, shares * self.length)
 
     def rigid(self) -> SpatialLink:
         """Return the same link without modes."""
+        if self.elements is not None:
+            return replace(self, elements=None,
+                           body=join_bodies(self.body, self.elements.rigid_body()))
         return self if self.beam is None else replace(self, beam=self.beam.rigid())
 
     def with_rigidity(self, factor: float) -> SpatialLink:
         """Return the same link with all its rigidities multiplied."""
+        if self.elements is not None:
+            return replace(self, elements=self.elements.with_rigidity(factor))
         return (self if self.beam is None
                 else replace(self, beam=self.beam.with_rigidity(factor)))
 
     def with_modes(self, count: int) -> SpatialLink:
-        """Return the same link with so many modes in each plane that has any; 0: rigid."""
+        """
+        Return the same link with so many modes in each plane that has any; 0: rigid.
+
+        Of elements the first ones, as many as there are.
+
+        """
+        if self.elements is not None and count:
+            return replace(self, elements=self.elements.first(count))
         if self.beam is None or not count:
             return self.rigid()
         first, second = (count if given else 0 for given in self.beam.modes)
         return replace(self, beam=replace(self.beam, modes=(first, second)))
 
     def with_more_modes(self, more: int) -> SpatialLink:
-        """Return the same link with so many modes more in each plane that has any."""
+        """
+        Return the same link with so many modes more in each plane that has any.
+
+        Elements have no more than they are given with.
+
+        """
         if self.beam is None:
             return self
         first, second = (min(count + more, MAX_MODES) if count else 0

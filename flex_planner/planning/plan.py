@@ -7,7 +7,9 @@ from enum import Enum
 import os
 
 from flex_planner.arms.arm import Arm, BeamSection, Elasticity, Joint, Link, Motor, Node
+from flex_planner.arms.element_modes import ElementModes
 from flex_planner.arms.kinematics import tip_position
+from flex_planner.arms.mechanism import FlexibleBody
 from flex_planner.arms.motion_svg import motion_svg
 from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.arms.spatial_beam import SpatialBeam
@@ -336,8 +338,9 @@ class Plan:
 
 # what a file of a plan may hold
 _SAVED = (Plan, PlanStatus, Certificate, Task, Arm, Link, BeamSection, Joint, Elasticity, Motor,
-          Node, SpatialArm, SpatialLink, SpatialBeam, SpatialBody, SpatialJoint, ArmModel,
-          MotionProblem, BoundaryConditions, Parameters, CollocationSolution, GaussRule,
+          Node, SpatialArm, SpatialLink, SpatialBeam, SpatialBody, SpatialJoint, ElementModes,
+          FlexibleBody, ArmModel, MotionProblem, BoundaryConditions, Parameters,
+          CollocationSolution, GaussRule,
           ObjectiveSearch, Objectives, Objective, WeightTrial, Margin, KindOfMotion,
           ExploredMotion, PlanWarning, WarningKind, TriedStrategy, ConstraintMargin,
           ConstrainedMotion, PathSlacks, JointRange, JointSpeed, KeepOut, Circle, Capsule,

@@ -19,6 +19,7 @@ from flex_planner.planning.feedback.differing_arm import (
 )
 from flex_planner.planning.feedback.find_gains import RESOLUTION
 from flex_planner.planning.plan import Plan
+from flex_planner.planning.robust.differing_arms import has_all_modes
 from flex_planner.planning.uncertainty import ASSUMED, Uncertainty
 import numpy as np
 
@@ -67,7 +68,7 @@ def list_differences(plan: Plan, uncertainty: Uncertainty) -> tuple[Difference, 
                if given.payload_mass or given.payload_inertia else 0.0)
     errors = [(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1), (1, -1), (1, 1), (-1, -1), (-1, 1)]
     found = [Difference(stiffness=a * stiffness, payload=b * payload) for a, b in errors]
-    if plan.arm.n_passive:
+    if plan.arm.n_passive and not has_all_modes(plan.arm):
         found += [Difference(more_modes=True), replace(found[-1], more_modes=True)]
     return tuple(dict.fromkeys(found))
 

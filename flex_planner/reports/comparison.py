@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from flex_planner.arms.link import Link
+from flex_planner.arms.spatial_link import SpatialLink
 from flex_planner.base.sentences import say_reason
 from flex_planner.planning.plan import Plan
 from flex_planner.reports.motion import columns, planning_row, Row, warning_rows
@@ -14,7 +16,7 @@ _MILLI = 1e3
 def comparison_rows(comparison: Comparison) -> list[Row]:
     """Return both plans, the warnings of the flexible one, the simulated arm and the goal."""
     simulated = comparison.arm
-    rigidity = ', '.join(f'{link.flexural_rigidity:g}' for link in simulated.links)
+    rigidity = ', '.join(_say_rigidity(link) for link in simulated.links)
     goal = ', '.join(f'{value:.6g}' for value in comparison.goal)
     return [
         ('planned flexible', _planning(comparison.flexible)),
@@ -24,6 +26,12 @@ def comparison_rows(comparison: Comparison) -> list[Row]:
                           f'{comparison.payload_mass:g} kg'),
         ('goal of the tip', f'({goal}) m'),
         ('watched after arrival', f'{comparison.settling:g} s')]
+
+
+def _say_rigidity(link: Link | SpatialLink) -> str:
+    """Return E I; of finite elements there is none."""
+    elements = isinstance(link, SpatialLink) and link.elements is not None
+    return '(finite elements)' if elements else f'{link.flexural_rigidity:g}'
 
 
 def comparison_table(comparison: Comparison) -> str:

@@ -8,7 +8,7 @@ from flex_planner.planning.execution import (
     ExecutionCertificate,
     RobustnessReport,
 )
-from flex_planner.planning.robust.differing_arms import MORE_MODES
+from flex_planner.planning.robust.differing_arms import has_all_modes, MORE_MODES
 from flex_planner.planning.robustness import share
 from flex_planner.reports.motion import Row
 import numpy as np
@@ -41,12 +41,14 @@ def robustness_rows(robustness: RobustnessReport, arm: Arm) -> list[Row]:
     if not arm.n_modes:
         return []
     return [('residual vibration if', 'the arm is not quite the one of the plan, with feedback'),
-            *((f'  {change}', length) for change, length in vibrations(robustness))]
+            *((f'  {change}', length) for change, length in vibrations(robustness, arm))]
 
 
-def vibrations(robustness: RobustnessReport) -> list[Row]:
+def vibrations(robustness: RobustnessReport, arm: Arm) -> list[Row]:
     """Return what differs, and the residual vibration then."""
-    return [(f'{MORE_MODES} more modes per link', millimetres(robustness.more_modes)),
+    more = [] if has_all_modes(arm) else [
+        (f'{MORE_MODES} more modes per link', millimetres(robustness.more_modes))]
+    return [*more,
             (f'stiffness +-{share(robustness.stiffness_difference)}',
              millimetres(robustness.stiffness_differs)),
             (f'payload +-{share(robustness.payload_difference)}',

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from flex_planner.arms.arm import Arm
+from flex_planner.arms.element_modes import ElementModes
 from flex_planner.arms.joint_units import units_of
 from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.arms.spatial_body import Matrix, SpatialBody
@@ -55,6 +56,8 @@ def describe_place(joint: SpatialJoint) -> str:
 def _describe_link(link: SpatialLink) -> str:
     """Return a link's properties in one line."""
     text = f'to {_say(link.end)} m, {link.mass:.4g} kg'
+    if link.elements is not None:
+        return text + _describe_elements(link.elements) + _describe_ends(link)
     if link.beam is None:
         return f'{text}, rigid{_describe_body(link.body)}'
     if not link.modes:
@@ -67,11 +70,22 @@ def _describe_link(link: SpatialLink) -> str:
         parts.append(f'{beam.twist_modes} of twisting with GJ {beam.torsional_rigidity:.4g} N m^2')
     damping = f', damping ratio {beam.damping_ratio:g}' if beam.damping_ratio else ''
     shortened = ', shortened by bending' if beam.foreshortening else ''
-    at_ends = [f'{body.mass:.4g} kg at its {name}' for name, body in (
-        ('base', link.body), ('end', link.tip_body)) if body.mass]
     return (f'{text}, beam of {beam.linear_density:.4g} kg/m, {beam.mode_family}: '
-            f'{", ".join(parts)}{damping}{shortened}'
-            + ''.join(f', {part}' for part in at_ends))
+            f'{", ".join(parts)}{damping}{shortened}' + _describe_ends(link))
+
+
+def _describe_elements(elements: ElementModes) -> str:
+    """Return what a link of finite elements is."""
+    modes = f'{elements.count} mode{"s" if elements.count > 1 else ""}'
+    damping = f', damping ratio {elements.damping_ratio:g}' if elements.damping_ratio else ''
+    factor = f', stiffness multiplied by {elements.factor:g}' if elements.factor != 1 else ''
+    return f', {modes} of finite elements of {elements.body.mass:.4g} kg{factor}{damping}'
+
+
+def _describe_ends(link: SpatialLink) -> str:
+    """Return what a link that bends carries at its ends."""
+    return ''.join(f', {body.mass:.4g} kg at its {name}' for name, body in (
+        ('base', link.body), ('end', link.tip_body)) if body.mass)
 
 
 def _describe_body(body: SpatialBody) -> str:

@@ -76,5 +76,6 @@ def test_tip_goes_where_that_of_exact_beams_does() -> None:
     assert np.linalg.norm(exact - exact[0], axis=1).max() > 1.3
     shortened, plain = (np.linalg.norm(simulated_tip(tube(2, 1, given)) - exact, axis=1).max()
                         for given in (True, False))
-    assert shortened < 2e-4  # [m]; the table itself is good to some hundredths of a millimetre
+    # [m]; the table's own tip moved by up to 0.18 mm from 8 to 16 elements, then extrapolated
+    assert shortened < 2e-4
     assert shortened < 0.7 * plain

@@ -8,6 +8,7 @@ import casadi as ca
 from flex_planner.arms.mechanism import MechanismLink
 from flex_planner.arms.mechanism_of_arm import mechanism_of
 from flex_planner.arms.spatial_arm import SpatialArm
+from flex_planner.arms.spatial_link import SpatialLink
 from flex_planner.base.validation import Array
 import numpy as np
 
@@ -50,7 +51,7 @@ def express_point(arm: SpatialArm, coordinates: Any, link: int, share: float) ->
         axes, modal = axes @ _sparse(part.turned), coordinates[slices[i]]
         end = place + axes @ _end(part, modal)
         if i == link:
-            return _along(arm, link, share, (joint, place, end), axes, modal)
+            return _along(arm.links[link], share, (joint, place, end), axes, modal, part.beam.tip)
         place = end
         for k in part.tip_order:
             if part.beam.tip_turn[k].any():
@@ -58,17 +59,15 @@ def express_point(arm: SpatialArm, coordinates: Any, link: int, share: float) ->
     raise IndexError(link)
 
 
-def _along(arm: SpatialArm, link: int, share: float, places: tuple[Any, Any, Any], axes: Any,
-           modal: Any) -> Any:
+def _along(body: SpatialLink, share: float, places: tuple[Any, Any, Any], axes: Any, modal: Any,
+           rest: Array) -> Any:
     """Return a point between the joint of a link, where it may have slid to, and its end."""
     joint, place, end = places
-    body = arm.links[link]
     if share == 1:
         return end
-    if not body.modes or body.beam is None:
+    if not body.modes:
         return joint + share * (end - joint)
-    shapes = body.beam.displace(body.length, np.array([share * body.length]))[0]
-    local = ca.DM([share * body.length, 0, 0]) + _sparse(shapes) @ modal
+    local = ca.DM(share * rest) + _sparse(body.shapes(np.array([share]))[0]) @ modal
     return place + axes @ local
 
 

@@ -37,6 +37,7 @@ from flex_planner.planning.feedback.differing_arm import (
 )
 from flex_planner.planning.feedback.gains import FeedbackGains, Record
 from flex_planner.planning.plan import Plan
+from flex_planner.planning.robust.differing_arms import has_all_modes
 import numpy as np
 
 # encoders of 16 bits
@@ -88,7 +89,7 @@ class GainSettings:
                                          or plan.task.payload_inertia) else 0.0
         corners = [Difference(stiffness=a * stiffness, payload=b * payload)
                    for a in (1, -1) for b in (-1, 1)]
-        if plan.arm.n_passive:
+        if plan.arm.n_passive and not has_all_modes(plan.arm):
             corners += [Difference(more_modes=True), replace(corners[-1], more_modes=True)]
         return tuple(dict.fromkeys([Difference(), *corners]))
 

@@ -27,6 +27,11 @@ def with_more_modes(arm: Arm) -> Arm:
         for link in arm.links))
 
 
+def has_all_modes(arm: Arm) -> bool:
+    """Return whether an arm has modes, and none of its links can have more."""
+    return 0 < arm.n_modes == with_more_modes(arm).n_modes
+
+
 def plain_parameters(given: PhysicalParameters) -> PhysicalParameters:
     """Return the part of a plan's parameters that is about the arm."""
     return PhysicalParameters(**{one.name: getattr(given, one.name)

@@ -30,8 +30,7 @@ def spatial_links(arm: SpatialArm) -> ReportTable:
         'G J [N m²]': [f'{link.beam.torsional_rigidity:g}'
                        if link.beam is not None and link.beam.twist_modes else ''
                        for link in links],
-        'damping ratio': [f'{link.beam.damping_ratio:g}'
-                          if link.beam is not None and link.modes else '' for link in links],
+        'damping ratio': [f'{link.damping_ratios[0]:g}' if link.modes else '' for link in links],
         'body at its joint': [_body(link.body) for link in links],
         'body at its end': [_body(link.tip_body) for link in links],
         'payload': [''] * (len(links) - 1) + [_payload(arm)]})
@@ -40,6 +39,8 @@ def spatial_links(arm: SpatialArm) -> ReportTable:
 
 def _modes(link: SpatialLink) -> str:
     """Return how many modes of which kind."""
+    if link.elements is not None:
+        return f'{link.modes} of finite elements'
     if link.beam is None or not link.modes:
         return 'rigid'
     counts = (*link.beam.modes, link.beam.twist_modes)

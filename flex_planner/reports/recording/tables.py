@@ -224,7 +224,7 @@ def _execution(request: RecordedRequest) -> list[ReportTable]:
         execution_rows(certificate, request.arm)))]
     if robustness is not None and request.arm.n_modes:
         found.append(ReportTable(title='Residual vibration with feedback if ...', rows=tuple(
-            vibrations(robustness))))
+            vibrations(robustness, request.arm))))
     return found
 
 

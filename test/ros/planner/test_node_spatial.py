@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from flex_planner.arms.arm_files import load_arm
@@ -20,13 +21,14 @@ from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.sampling import sample_plan, SampledPlan
 from flex_planner.reports.recording import check_motion, RecordedRequest
+from flex_planner.ros.runtime.processes import NodeProcess
 from flex_planner.ros.settings.planner import PlannerSettings
 from flex_planner_interfaces.msg import FlexibleTrajectory, MotionTask, PlanReport
 from flex_planner_interfaces.srv import PlanPath
 from geometry_msgs.msg import Point, Quaternion
 import numpy as np
 import pytest
-from ros_support import Planner
+from ros_support import LATCHED, Planner
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import Marker, MarkerArray
@@ -135,6 +137,28 @@ def test_recording_is_of_the_same_arm_and_passes_its_check(answer: Answer) -> No
     np.testing.assert_array_equal(request.motion.tip, tips(answer.response.trajectory))
     check = check_motion(request)
     assert check.passed, [str(finding) for finding in check.findings]
+
+
+def test_recording_is_replayed_in_space(answer: Answer, tmp_path: Path) -> None:
+    planner, again = answer.planner, '/again'
+    names = [f'{planner.name}/{topic}'
+             for topic in ('flexible_trajectory', 'joint_trajectory', 'reference_states')]
+    found = [planner.listen(kind, again + name, qos) for kind, name, qos in zip(
+        (FlexibleTrajectory, JointTrajectory, JointState), names, (LATCHED, LATCHED, 10),
+        strict=True)]
+    # beside the planner, whose own topics are latched
+    with NodeProcess('flex_planner.ros.replay',
+                     {'recording': answer.response.report.recording, 'rate': 10.0, 'delay': 4.0},
+                     {name: again + name for name in names}, log=tmp_path / 'log') as replay:
+        planner.wait('the end of the replay', lambda: replay.process.poll() is not None)
+        planner.wait('what was recorded', lambda: all(found))
+    assert replay.process.returncode == 0
+    assert 'Traceback' not in (tmp_path / 'log').read_text()
+    trajectory, motion, state = (messages[-1] for messages in found)
+    assert trajectory == answer.response.trajectory
+    assert motion == answer.response.trajectory.joint_trajectory
+    assert np.ptp(tips(trajectory)[:, 2]) > 0.1
+    assert state.name == ['joint1', 'joint2', 'joint3', *answer.plan.arm.modal_names]
 
 
 def test_largest_payload_is_found_and_certified(planner: Planner) -> None:
