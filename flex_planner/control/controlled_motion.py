@@ -27,8 +27,10 @@ from numpy.typing import NDArray
 
 _LONGEST_STEP = 1e-3
 _TOLERANCES = 1e-8, 1e-10
-# periods in one call, and the most steps of one: the arm must have run away
-_TOGETHER, _MOST_STEPS = 256, 256
+# steps in one call: at first, and after others that needed no cut; a call costs as much as 100
+_TOGETHER, _MOST_TOGETHER = 256, 2048
+# in a period: the arm must have run away
+_MOST_STEPS = 256
 # rounds of cutting steps at limits: each knows better than the last where they lie
 _MOST_CUTS = 8
 
@@ -98,11 +100,12 @@ class ControlledArm:
         times = np.arange(count + 1, dtype=np.float64) * period
         states = np.full((count + 1, state.size), np.nan)
         states[0], fewest = state, int(np.ceil(period / _LONGEST_STEP - 1e-9))
-        first, steps = 0, fewest
+        first, steps, together = 0, fewest, _TOGETHER
         while first < count and steps <= _MOST_STEPS:
             watch.check()
-            last = min(first + max(_TOGETHER // steps, 1), count)
-            found = self._cross(reference, states[first], times[first:last], steps)
+            last = min(first + max(together // steps, 1), count)
+            found, cuts = self._cross(reference, states[first], times[first:last], steps)
+            together = _TOGETHER if cuts else min(2 * together, _MOST_TOGETHER)
             if found is None:
                 steps *= 2
             else:
@@ -111,21 +114,21 @@ class ControlledArm:
         return ControlledMotion(times=times, states=states)
 
     def _cross(self, reference: Reference, state: Array, times: Array,
-               count: int) -> Array | None:
-        """Return the states after periods that begin at times; None if they need more steps."""
+               count: int) -> tuple[Array | None, int]:
+        """Return the states after periods from times on, None if they need more steps; cuts."""
         steps, done = PeriodSteps.even(times, self.controller.period, count), list[Array]()
-        for _ in range(_MOST_CUTS):
+        for cuts in range(_MOST_CUTS):
             after, too_long, (crossed, shares) = self._take(reference, state, steps)
             ends = after[np.append(steps.firsts[1:], True)]
             if not too_long.any():
-                return np.vstack([*done, ends])
+                return np.vstack([*done, ends]), cuts
             if np.setdiff1d(np.flatnonzero(too_long), crossed).size:
-                return None
+                return None, cuts + 1
             good, wanted = int(steps.numbers[too_long.argmax()]), too_long[crossed]
             done.append(ends[:good])
             state = ends[good - 1] if good else state
             steps = steps.cut(crossed[wanted], shares[wanted]).since(good)
-        return None
+        return None, _MOST_CUTS
 
     def _take(self, reference: Reference, state: Array, steps: PeriodSteps) -> tuple[
             Array, NDArray[np.bool_], tuple[NDArray[np.intp], Array]]:

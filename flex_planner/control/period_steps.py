@@ -26,24 +26,29 @@ class PeriodSteps:
         Their length [s].
     begins : numpy.ndarray, shape (k,)
         When the steps begin; the times are among them [s].
+    numbers : numpy.ndarray of int, shape (k,)
+        In which period each step lies.
 
     """
 
     times: Array
     period: float
     begins: Array
+    numbers: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, times: Array, period: float, begins: Array) -> PeriodSteps:
+        """Return steps that begin at times (k,)."""
+        return cls(times=times, period=period, begins=begins,
+                   numbers=np.searchsorted(times, begins, side='right') - 1)
 
     @classmethod
     def even(cls, times: Array, period: float, count: int) -> PeriodSteps:
         """Return as many equal steps in each period."""
         shares = np.arange(count) / count
         begins: Array = (times[:, None] + period * shares).ravel()
-        return cls(times=times, period=period, begins=begins)
-
-    @property
-    def numbers(self) -> NDArray[np.intp]:
-        """Return in which period each step lies, shape (k,)."""
-        return np.searchsorted(self.times, self.begins, side='right') - 1
+        return cls(times=times, period=period, begins=begins,
+                   numbers=np.repeat(np.arange(times.size), count))
 
     @property
     def lengths(self) -> Array:
@@ -63,13 +68,14 @@ class PeriodSteps:
     def cut(self, steps: NDArray[np.intp], shares: Array) -> PeriodSteps:
         """Return them with some steps (c,) cut at shares (c,) of each."""
         new = self.begins[steps] + shares * self.lengths[steps]
-        return PeriodSteps(times=self.times, period=self.period,
-                           begins=np.sort(np.concatenate([self.begins, new])))
+        return PeriodSteps.of(self.times, self.period,
+                              np.sort(np.concatenate([self.begins, new])))
 
     def since(self, number: int) -> PeriodSteps:
         """Return what is left from the beginning of a period."""
+        left = self.numbers >= number
         return PeriodSteps(times=self.times[number:], period=self.period,
-                           begins=self.begins[self.numbers >= number])
+                           begins=self.begins[left], numbers=self.numbers[left] - number)
 
 
 def limit_crossings(limits: TorqueLimits, torques: tuple[Array, Array],

@@ -316,6 +316,14 @@ class Plan:
             hamiltonian=control.hamiltonian,
             tip=tip_position(arm, z[:, :n_t]))
 
+    def torques(self, times: ArrayLike) -> Array:
+        """Return the torques of `sample`, which takes longer, shape (k, n) [N m]."""
+        if self.solution is None:
+            raise ValueError(f'the plan has no solution: {self.message}')
+        times = self._within(times)
+        torques: Array = self.problem.controls(times, self.solution(times)).torque
+        return torques
+
     def _within(self, times: ArrayLike) -> Array:
         """Return times (k,) after a check that the motion lasts so long."""
         end = self.task.duration

@@ -101,11 +101,11 @@ class PublishedMotion:
 
     def samples(self, times: Array) -> Samples:
         """Return the samples of the plan at times of the trajectory (m,)."""
-        return self.plan.sample(np.clip(times - self.begin, 0, self.plan.task.duration))
+        return self.plan.sample(self._on_plan(times))
 
     def torque(self, times: Array) -> Array:
         """Return the efforts at times (m,), shape (m, n) [N m]."""
-        moving = self.samples(np.minimum(times, self.end) - self.delay).torques
+        moving = self.plan.torques(self._on_plan(np.minimum(times, self.end) - self.delay))
         share = np.clip((times - self.end) / self.hold_delay, 0, 1)[:, None]
         efforts: Array = moving + share * (self.plan.problem.holding_torque - moving)
         if self.begin:
@@ -113,6 +113,10 @@ class PublishedMotion:
             share = np.clip((times - self.begin - first) / (last - first), 0, 1)[:, None]
             efforts = (1 - share) * self.start_torque + share * efforts
         return efforts
+
+    def _on_plan(self, times: Array) -> Array:
+        """Return times of the trajectory on the clock of the plan, within its motion."""
+        return np.clip(times - self.begin, 0, self.plan.task.duration)
 
 
 def start_ramp(controller: JointController) -> tuple[float, float]:

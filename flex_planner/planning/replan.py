@@ -191,7 +191,7 @@ def torque_step(departure: Departure, again: Plan) -> Array:
     """Return by how much torques jump when a plan begins, NaN without one, shape (n,) [N m]."""
     if again.solution is None:
         return np.full(departure.torque.size, np.nan)
-    step: Array = again.sample(0.0).torques[0] - departure.torque
+    step: Array = again.torques(0.0)[0] - departure.torque
     return step
 
 

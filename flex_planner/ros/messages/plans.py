@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Sequence
 from typing import Any
 
@@ -18,7 +19,7 @@ from flex_planner.base.errors import (
 from flex_planner.base.progress import StopReason
 from flex_planner.base.sentences import say_reason
 from flex_planner.base.text import printable
-from flex_planner.base.validation import number, vector
+from flex_planner.base.validation import Array, number, vector
 from flex_planner.control.joint_controller import JointController
 from flex_planner.optimal_control.ends_at_points import ends_at_points
 from flex_planner.optimal_control.goal_in_pose import posture_in_pose
@@ -48,6 +49,7 @@ from flex_planner.ros.messages.spaces import SPACES
 from flex_planner.ros.messages.via_points import via_points_from_message
 from flex_planner.ros.settings.planner import PlannerSettings
 import numpy as np
+from numpy.typing import NDArray
 
 ERROR_CODES: tuple[tuple[type[FlexPlannerError], int], ...] = (
     (InvalidSizeError, PlanReport.INVALID_SIZE),
@@ -282,14 +284,32 @@ def duration_seconds(duration: Duration) -> float:
 def joint_trajectory(reference: SampledPlan, joint_names: Sequence[str]) -> JointTrajectory:
     """Return the trajectory for a joint_trajectory_controller with an effort interface."""
     samples, n = reference.samples, len(joint_names)
-    points = [
-        JointTrajectoryPoint(
-            time_from_start=duration_message(time), positions=samples.coordinates[k, :n].tolist(),
-            velocities=samples.rates[k, :n].tolist(),
-            accelerations=samples.accelerations[k, :n].tolist(),
-            effort=reference.efforts[k].tolist())
-        for k, time in enumerate(reference.times_ns)]
+    points = joint_points(reference.times_ns, samples.coordinates[:, :n], samples.rates[:, :n],
+                          samples.accelerations[:, :n], reference.efforts)
     return JointTrajectory(joint_names=list(joint_names), points=points)
+
+
+def joint_points(times_ns: NDArray[np.int64], positions: Array, velocities: Array,
+                 accelerations: Array, efforts: Array) -> list[JointTrajectoryPoint]:
+    """Return the points of a joint trajectory, from arrays of shape (k,) [ns] and (k, n)."""
+    rows = zip(*map(_rows, (positions, velocities, accelerations, efforts)), strict=True)
+    return _timed(times_ns, [
+        JointTrajectoryPoint(positions=position, velocities=velocity, accelerations=acceleration,
+                             effort=effort)
+        for position, velocity, acceleration, effort in rows])
+
+
+def _rows(values: Array) -> list[array[float]]:
+    """Return rows as messages keep them."""
+    return [array('d', row) for row in values.tolist()]
+
+
+def _timed(times_ns: NDArray[np.int64], points: list[Any]) -> list[Any]:
+    """Return points with their times: set in what they have, as to make it takes longer."""
+    for point, time in zip(points, times_ns.tolist(), strict=True):
+        since = point.time_from_start
+        since.sec, since.nanosec = divmod(time, 10**9)
+    return points
 
 
 def flexible_trajectory(plan: Plan, reference: SampledPlan, joints: JointTrajectory,
@@ -298,8 +318,7 @@ def flexible_trajectory(plan: Plan, reference: SampledPlan, joints: JointTraject
     samples = reference.samples
     message = FlexibleTrajectory(
         joint_trajectory=joints, modal_names=list(plan.arm.passive_names),
-        points=[_flexible_point(plan.arm.n_joints, samples, k, time)
-                for k, time in enumerate(reference.times_ns)],
+        points=_flexible_points(plan.arm.n_joints, samples, reference.times_ns),
         tip_path=[point_message(place) for place in samples.tip],
         payload_mass=plan.task.payload_mass)
     message.header.frame_id = frame
@@ -314,14 +333,16 @@ def report_trajectory(report: PlanReport, plan: Plan, reference: SampledPlan,
     return flexible_trajectory(plan, reference, joints, settings.base_frame)
 
 
-def _flexible_point(n: int, samples: Samples, k: int, time: int) -> FlexiblePoint:
-    return FlexiblePoint(
-        time_from_start=duration_message(time),
-        modal_displacements=samples.coordinates[k, n:].tolist(),
-        modal_rates=samples.rates[k, n:].tolist(),
-        position_costates=samples.position_costates[k].tolist(),
-        velocity_costates=samples.velocity_costates[k].tolist(),
-        torque_costates=samples.torque_costates[k].tolist())
+def _flexible_points(n: int, samples: Samples,
+                     times_ns: NDArray[np.int64]) -> list[FlexiblePoint]:
+    columns = (samples.coordinates[:, n:], samples.rates[:, n:], samples.position_costates,
+               samples.velocity_costates, samples.torque_costates)
+    return _timed(times_ns, [
+        FlexiblePoint(modal_displacements=displacements, modal_rates=rates,
+                      position_costates=positions, velocity_costates=velocities,
+                      torque_costates=torques)
+        for displacements, rates, positions, velocities, torques in zip(
+            *map(_rows, columns), strict=True)])
 
 
 def reference_state(plan: Plan, samples: Samples, k: int, names: Sequence[str],

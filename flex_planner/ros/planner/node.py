@@ -5,6 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import replace
 import sys
+import time
 from typing import Any
 
 from flex_planner.arms.arm import Arm
@@ -48,6 +49,7 @@ from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 
 _STOP_TIMEOUT = 0.5
+_LOG_PERIOD = 1.0  # [s], of plans that replace others, many a second
 _SWITCH_INTERVAL = 5e-4  # [s], the solver hands over to callbacks that soon where it can
 
 
@@ -115,7 +117,7 @@ class PlannerNode(Node):  # type: ignore[misc]
             Replanner(self._topics.running, self._now_ns, self._listen_for_bending(arm)))
         prepare_robustness(arm)
         self._queue = RequestQueue(self._settings.queue_length, self._settings.max_waiting_time)
-        self._record = Record()
+        self._record, self._logs_next = Record(), 0.0
         self._diagnostics = Diagnostics(self, self._queue, self._record, self._topics.streamer,
                                         self._topics.joints, arm.name, self._controller)
         self._endpoints = self._create_endpoints()
@@ -199,6 +201,12 @@ class PlannerNode(Node):  # type: ignore[misc]
         return ArmBending(self.resolve_topic_name(topic), names, self._arm_state.angles,
                           estimates.take)
 
+    def _is_due(self) -> bool:
+        """Return whether it is a second since that was asked last and so: to log takes long."""
+        now, due = time.monotonic(), self._logs_next
+        self._logs_next = now + _LOG_PERIOD if now >= due else due
+        return now >= due
+
     def _now_ns(self) -> int:
         return int(self.get_clock().now().nanoseconds)
 
@@ -206,6 +214,8 @@ class PlannerNode(Node):  # type: ignore[misc]
         report = outcome.report
         waited = duration_seconds(report.waiting_time)
         seconds = duration_seconds(report.planning_time) - waited
+        if outcome.publishable and outcome.replaces and not self._is_due():
+            return
         if outcome.publishable:
             search = outcome.search
             found = f'maximum payload {search.payload:.6g} kg, ' if search else ''

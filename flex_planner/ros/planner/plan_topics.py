@@ -59,8 +59,7 @@ class PlanTopics:
         if outcome.replaces:
             return self.running.take(outcome.replaces).replaced_by(outcome, now_ns)
         assert outcome.reference is not None
-        return Track.of(outcome.reference, outcome.trajectory.joint_trajectory,
-                        outcome.start_ns or now_ns)
+        return Track.of(outcome.reference, outcome.start_ns or now_ns)
 
     def trajectory(self, outcome: Outcome, track: Track) -> JointTrajectory:
         """

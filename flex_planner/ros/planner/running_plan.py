@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from dataclasses import dataclass
 import threading
 
@@ -12,12 +11,12 @@ from flex_planner.base.validation import Array
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.sampling import SampledPlan
 from flex_planner.ros.messages.measured_states import WINDOW_NS
-from flex_planner.ros.messages.plans import duration_message
+from flex_planner.ros.messages.plans import joint_points
 from flex_planner.ros.messages.times import time_message
 from flex_planner.ros.planner.outcome import Outcome
 import numpy as np
 from numpy.typing import NDArray
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from trajectory_msgs.msg import JointTrajectory
 
 # from the last point of the plan that is replaced to the first of the new one: as near as numbers
 # allow, as the torque may jump there
@@ -42,8 +41,6 @@ class Track:
         Joints [rad], then modes [m].
     torques, efforts : numpy.ndarray, shape (k, n)
         Planned, and for the controller [N m].
-    points : list of JointTrajectoryPoint
-        For the controller.
 
     """
 
@@ -54,16 +51,14 @@ class Track:
     accelerations: Array
     torques: Array
     efforts: Array
-    points: list[JointTrajectoryPoint]
 
     @classmethod
-    def of(cls, reference: SampledPlan, trajectory: JointTrajectory, begin_ns: int) -> Track:
+    def of(cls, reference: SampledPlan, begin_ns: int) -> Track:
         """Return that of a plan which begins at a time [ns]."""
         samples = reference.samples
         return cls(begin_ns=begin_ns, times_ns=reference.times_ns, torques=samples.torques,
                    coordinates=samples.coordinates, rates=samples.rates,
-                   accelerations=samples.accelerations, efforts=reference.efforts,
-                   points=list(trajectory.points))
+                   accelerations=samples.accelerations, efforts=reference.efforts)
 
     def part(self, first_ns: int, last_ns: int | None = None) -> Track:
         """Return what lies between times of the clock, from the point before the first [ns]."""
@@ -74,27 +69,23 @@ class Track:
 
     def then(self, *others: Track) -> Track:
         """Return this one and others after it."""
-        points, times = list(self.points), [self.times_ns]
-        for other in others:
-            shift = other.begin_ns - self.begin_ns
-            times.append(other.times_ns + shift)
-            points += map(_at, other.points, times[-1].tolist())
+        times = [one.times_ns + (one.begin_ns - self.begin_ns) for one in (self, *others)]
         arrays = {name: np.vstack([getattr(one, name) for one in (self, *others)])
                   for name in _ARRAYS}
-        return Track(begin_ns=self.begin_ns, points=points, times_ns=np.concatenate(times),
-                     **arrays)
+        return Track(begin_ns=self.begin_ns, times_ns=np.concatenate(times), **arrays)
 
     def trajectory(self, names: list[str]) -> JointTrajectory:
         """Return it as a message that is stamped with its begin."""
-        message = JointTrajectory(joint_names=names, points=self.points)
+        n = self.efforts.shape[1]
+        message = JointTrajectory(joint_names=names, points=joint_points(
+            self.times_ns, self.coordinates[:, :n], self.rates[:, :n], self.accelerations[:, :n],
+            self.efforts))
         message.header.stamp = time_message(self.begin_ns)
         return message
 
     def _taken(self, which: slice, begin_ns: int) -> Track:
-        shift = begin_ns - self.begin_ns
-        times = self.times_ns[which] - shift
-        points = list(map(_at, self.points[which], times.tolist()))
-        return Track(begin_ns=begin_ns, times_ns=times, points=points,
+        times = self.times_ns[which] - (begin_ns - self.begin_ns)
+        return Track(begin_ns=begin_ns, times_ns=times,
                      **{name: getattr(self, name)[which] for name in _ARRAYS})
 
 
@@ -124,21 +115,17 @@ class RunningPlan:
     def replaced_by(self, outcome: Outcome, now_ns: int) -> Track:
         """Return the track of a plan that replaces this one from now on [ns]."""
         assert outcome.reference is not None
-        new = Track.of(outcome.reference, outcome.trajectory.joint_trajectory, outcome.start_ns)
+        new = Track.of(outcome.reference, outcome.start_ns)
         old = self.track.part(now_ns - _HISTORY_NS, outcome.start_ns - _APART_NS)
         return old.then(self._last(new), new)
 
     def _last(self, new: Track) -> Track:
         """Return the plan just before the new one begins, with its own efforts."""
-        at_ns, n, track = new.begin_ns - _APART_NS, self.plan.arm.n_joints, self.track
+        at_ns, track = new.begin_ns - _APART_NS, self.track
         sample = self.plan.sample(max(at_ns - self.begin_ns, 0) * 1e-9)
         effort = np.array([np.interp(at_ns - track.begin_ns, track.times_ns, column)
                            for column in track.efforts.T])
-        values = sample.coordinates, sample.rates, sample.accelerations
-        positions, velocities, accelerations = (rows[0, :n].tolist() for rows in values)
-        point = JointTrajectoryPoint(positions=positions, velocities=velocities,
-                                     accelerations=accelerations, effort=effort.tolist())
-        return Track(begin_ns=at_ns, times_ns=np.zeros(1, dtype=np.int64), points=[point],
+        return Track(begin_ns=at_ns, times_ns=np.zeros(1, dtype=np.int64),
                      coordinates=sample.coordinates, rates=sample.rates, efforts=effort[None],
                      accelerations=sample.accelerations, torques=sample.torques)
 
@@ -179,10 +166,3 @@ class RunningPlans:
                 else f'the plan that was published last is {newest.plan_id}')
         raise InvalidTaskError(f'replaces is {shown_value(plan_id)}, but {what}: only that can be '
                                'replaced')
-
-
-def _at(point: JointTrajectoryPoint, time_ns: int) -> JointTrajectoryPoint:
-    """Return the same point at another time [ns]."""
-    moved = copy.copy(point)  # arrays are shared: nobody changes them
-    moved.time_from_start = duration_message(time_ns)
-    return moved

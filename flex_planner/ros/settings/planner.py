@@ -144,6 +144,9 @@ class PlannerSettings:
     replan_lead: float = parameter_field(
         0.1, 'How long after the planner begins to work on it a plan begins that replaces another '
         'one, where its request has no start_time [s].', lowest=1e-3, highest=10.0)
+    replan_sampling_step: float = parameter_field(
+        0.02, 'As sampling_step, of plans that replace another one: fewer points are ready '
+        'earlier; at least sampling_step is used [s].', lowest=2.5e-4, highest=1.0)
     replan_torque_tolerance: float = parameter_field(
         0.1, 'As torque_tolerance, of plans that replace another one: fewer points are ready '
         'earlier; at least torque_tolerance is used [N m].', lowest=1e-6, highest=1e6)
@@ -224,8 +227,10 @@ class PlannerSettings:
 
     def replan_sampling(self) -> SamplingSettings:
         """Return those of the sampling of plans that replace another one."""
-        return replace(self.sampling(), start_hold=0.0, torque_tolerance=max(
-            self.torque_tolerance, self.replan_torque_tolerance))
+        return replace(
+            self.sampling(), start_hold=0.0,
+            longest_step=max(self.sampling_step, self.replan_sampling_step),
+            torque_tolerance=max(self.torque_tolerance, self.replan_torque_tolerance))
 
     def with_controller(self, controller: JointController) -> PlannerSettings:
         """Return the settings for another joint controller."""

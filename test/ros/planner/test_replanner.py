@@ -11,7 +11,6 @@ from flex_planner.base.progress import Monitor
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.sampling import sample_plan, SamplingSettings
 from flex_planner.ros.messages.measured_states import AngleTrack, state_from_estimate
-from flex_planner.ros.messages.plans import joint_trajectory
 from flex_planner.ros.messages.request_error import RequestError
 from flex_planner.ros.messages.times import time_message, time_ns
 from flex_planner.ros.planner.arm_bending import ArmBending
@@ -46,7 +45,7 @@ def settings(plan: Plan) -> PlannerSettings:
 @pytest.fixture(scope='module')
 def first(plan: Plan) -> RunningPlan:
     reference = sample_plan(plan, SamplingSettings())
-    track = Track.of(reference, joint_trajectory(reference, JOINTS), BEGIN)
+    track = Track.of(reference, BEGIN)
     return RunningPlan(plan_id='first', plan=plan, begin_ns=BEGIN, track=track)
 
 
