@@ -72,11 +72,9 @@ class Simulator(Client):
         return self._log.read_text()
 
     def tip(self) -> Any:
-        """Return where the tip is said to be from now on [m]; older words may be on their way."""
-        now = self.node.get_clock().now()
-        self.wait('tip', lambda: bool(
-            self.tips and Time.from_msg(self.tips[-1].header.stamp) >= now))
-        return self.tips[-1].point.x, self.tips[-1].point.y
+        """Return where the tip is said to be from now on [m]."""
+        point = self.next_of(self.tips).point
+        return point.x, point.y
 
 
 @pytest.fixture(scope='module')

@@ -35,6 +35,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.task import Future
+from rclpy.time import Time
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 MANY = QoSProfile(depth=1000)  # requests on their way; beyond 10, others would be lost
@@ -124,6 +125,13 @@ class Client:
             assert time.monotonic() < end, (
                 f'waited for {what}: not within {limit:g} s{self.last_words()}')
             self._executor.spin_once(timeout_sec=0.02)
+
+    def next_of(self, messages: list[Any]) -> Any:
+        """Return what a topic says of a moment from now on; older words may be on their way."""
+        now = self.node.get_clock().now()
+        self.wait('what is said from now on', lambda: bool(
+            messages and Time.from_msg(messages[-1].header.stamp) >= now))
+        return messages[-1]
 
     def last_words(self) -> str:
         """Return what helps to understand why something did not come in time."""
