@@ -12,7 +12,6 @@ from flex_planner.optimal_control.motion_problem import MotionProblem, task_para
 from flex_planner.optimal_control.task import Task
 from flex_planner.optimal_control.totals import integrate_totals
 from flex_planner.paper.cases import paper_arm, point_to_point
-from flex_planner.planning.strategies import limit_barrier as module
 from flex_planner.planning.strategies.extremals import no_target
 from flex_planner.planning.strategies.free_parameters import DURATION, PAYLOAD
 from flex_planner.planning.strategies.initial_guesses import cold_start
@@ -22,7 +21,6 @@ from flex_planner.planning.strategies.interior_point import (
     pass_barrier_from_rigid,
 )
 from flex_planner.planning.strategies.limit_barrier import is_cheap, reach_limit
-from flex_planner.planning.strategies.strategy import Attempt
 import numpy as np
 import pytest
 
@@ -127,27 +125,6 @@ def test_light_clamped_arm_starts_a_little_below_what_the_barrier_reached() -> N
     found = reach_limit(PAYLOAD, clamped(50.0), Solver().coarse(), no_target)
     assert found is not None and found.result.converged
     assert 5.3 < found.value < 5.689
-
-
-def test_less_than_was_reached_is_tried_in_turn_each_with_a_share_of_the_work(
-        monkeypatch: pytest.MonkeyPatch) -> None:
-    problem, tried = problem_of(point_to_point(paper_arm(np.inf), 1.0)), list[float]()
-
-    def fail_above(near: MotionProblem, solver: Solver) -> Attempt | None:
-        tried.append(near.task.payload_mass)
-        assert solver.monitor.iterations_left(100) == 80
-        solver.monitor.step(1.0, 1000)
-        if tried[-1] < 5.4:
-            return pass_barrier(near, solver)
-        line = near.straight_line(10, solver.settings.rule)
-        return Attempt(result=CollocationResult.failed(line, 'made up'))
-
-    monkeypatch.setattr(module, 'pass_barrier', fail_above)
-    monkeypatch.setattr(PAYLOAD, 'solve_beyond', lambda *arguments: None)
-    found = reach_limit(PAYLOAD, problem, Solver().coarse(), lambda value: 1e-2)
-    assert found is not None and found.result.converged
-    np.testing.assert_allclose(np.array(tried) / tried[0], [1.0, 0.99, 0.95, 0.9])
-    assert found.value == tried[-1]
 
 
 def test_motors_without_limits_have_no_limit_to_reach() -> None:
