@@ -347,7 +347,7 @@ def streamer_of(monkeypatch: pytest.MonkeyPatch, node: FakeNode,
 
 def track_of(reference: SampledPlan) -> Track:
     """Return what is published of a plan."""
-    return Track.of(reference, joint_trajectory(reference, ['joint1', 'joint2']), 0)
+    return Track.of(reference, 0)
 
 
 @pytest.mark.parametrize('dead', [FakeProcess(BrokenPipe()), FakeProcess(io.BytesIO(), 1)])
