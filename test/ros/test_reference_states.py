@@ -17,7 +17,6 @@ from typing import NamedTuple
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from factories import PlanFactory
 from flex_planner.planning.sampling import sample_plan, SampledPlan, SamplingSettings
-from flex_planner.ros.messages.plans import joint_trajectory
 from flex_planner.ros.planner.running_plan import Track
 from flex_planner.ros.planner.streamer import Streamer
 from flex_planner.ros.reference_states import ReferenceStates, Stream, StreamedPlan
