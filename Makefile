@@ -43,13 +43,14 @@ paper: setup
 test: lint
 	$(call run_tests,not thorough)
 
+# in the order of the files: one that is long but a single test would otherwise come last, by itself
 test-thorough: setup
-	$(call run_tests,thorough)
+	$(call run_tests,thorough,--no-loadscope-reorder)
 
-# run_tests MARKS: first what runs beside others, then what does not, also if the first fails
+# run_tests MARKS,OPTIONS: first what runs beside others, then what does not, also if the first fails
 define run_tests
 @failed=0; \
-tools/run python -m pytest -n auto --dist loadfile -m '$(1) and not alone' || failed=1; \
+tools/run python -m pytest -n auto --dist loadfile $(2) -m '$(1) and not alone' || failed=1; \
 tools/run python -m pytest -m '$(1) and alone' || failed=1; \
 exit $$failed
 endef
