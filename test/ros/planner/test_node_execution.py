@@ -243,29 +243,13 @@ def check_refusals(folder: Path, wrong: list[tuple[dict[str, Any], str]]) -> Non
         assert 'Traceback' not in log
 
 
-def test_planner_that_ends_while_the_arm_moves_ends_in_good_order(arena: Arena) -> None:
-    arena.behave('hang')
-    arena.plan_goal(publish=True)
-    arena.heard('accepted')
-    assert arena.stop() == 0
-    assert 'Traceback' not in arena.log()
-
-
-def _recorded(path: str) -> int:
-    """Return the error code in a recording of an execution."""
-    types = MessageTypes.load([definition_folder('flex_planner_interfaces')])
-    reports = [entry.message for entry in read_recording(path, types)
-               if entry.topic.type_name.endswith('PlanReport')]
-    assert len(reports) == 1
-    return int(reports[0].error_code)
-
-
 def test_plan_that_is_replaced_in_motion_ends_at_once_and_another_goes_on(arena: Arena) -> None:
     arena.behave('hang')
     accepted = arena.listen(JointTrajectory, f'{CONTROLLER}/accepted', 10)
     first = arena.plan_goal(publish=True, duration=20.0)
     arena.wait('the plan on the topic', lambda: bool(arena.published))
-    arena.wait('its identifier', lambda: bool(first.feedback[-1][1].plan_id))
+    arena.wait('its identifier', lambda: bool(
+        first.feedback and first.feedback[-1][1].plan_id))
     newest = first.feedback[-1][1].plan_id
     lead = arena.node.get_clock().now().nanoseconds + 3 * 10**9
     second = arena.plan_goal(publish=True, replaces=newest, duration=0.0, payload_mass=0.0,
@@ -282,3 +266,20 @@ def test_plan_that_is_replaced_in_motion_ends_at_once_and_another_goes_on(arena:
     report = arena.report(replaces=newest, duration=0.0, payload_mass=0.0, effort_weights=[],
                           space=2, goal_point=Point(x=0.5, y=0.4), publish=True)
     assert report.error_code == PlanReport.INVALID_TASK  # nothing is carried out any more
+
+
+def test_planner_that_ends_while_the_arm_moves_ends_in_good_order(arena: Arena) -> None:
+    arena.behave('hang')
+    arena.plan_goal(publish=True)
+    arena.heard('accepted')
+    assert arena.stop() == 0
+    assert 'Traceback' not in arena.log()
+
+
+def _recorded(path: str) -> int:
+    """Return the error code in a recording of an execution."""
+    types = MessageTypes.load([definition_folder('flex_planner_interfaces')])
+    reports = [entry.message for entry in read_recording(path, types)
+               if entry.topic.type_name.endswith('PlanReport')]
+    assert len(reports) == 1
+    return int(reports[0].error_code)
