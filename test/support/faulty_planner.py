@@ -7,9 +7,9 @@ from typing import Any
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.sampling import SampledPlan
-from flex_planner.ros.planner import node, request_planner
+from flex_planner.ros.planner import node, plan_topics, request_planner
 
-plan_kind, motion_markers = request_planner.plan_kind, node.motion_markers
+plan_kind, motion_markers = request_planner.plan_kind, plan_topics.motion_markers
 
 
 def faulty_plan(task: Task, number: int, **options: Any) -> Plan:
@@ -28,5 +28,5 @@ def faulty_markers(arm: Any, reference: SampledPlan, frame: str, *rest: Any) -> 
 
 if __name__ == '__main__':
     request_planner.plan_kind = faulty_plan
-    node.motion_markers = faulty_markers
+    plan_topics.motion_markers = faulty_markers
     node.main()

@@ -95,6 +95,10 @@ class PlanTopics:
         if track is None or not outcome.start_ns:  # which begins now
             track = self.track(outcome)
         begin_ns = (outcome.start_ns or track.begin_ns) + round(reference.start_hold * 1e9)
+        markers: MarkerArray | None = None  # before anything is published, should they fail
+        if not outcome.replaces or self._markers.get_subscription_count():
+            markers = motion_markers(plan.arm, reference, settings.base_frame,
+                                     plan.task.path_constraints, plan.via_times)
         if outcome.gains is not None:  # first: a controller has them when it begins
             self._gains.publish(feedback_message(outcome.gains, plan, settings.joint_names,
                                                  settings.base_frame))
@@ -104,9 +108,8 @@ class PlanTopics:
         self._record(joints, settings)
         self.joints.publish(joints)
         self._flexible.publish(outcome.trajectory)
-        if not outcome.replaces or self._markers.get_subscription_count():
-            self._markers.publish(motion_markers(plan.arm, reference, settings.base_frame,
-                                                 plan.task.path_constraints, plan.via_times))
+        if markers is not None:
+            self._markers.publish(markers)
         if outcome.replaces:
             track = track.part(self._now_ns())
         elif not outcome.start_ns:
