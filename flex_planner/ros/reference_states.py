@@ -36,6 +36,8 @@ import rclpy
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 
+# by which stamps might run backwards from one plan to another: two clocks are read in turn
+_APART_NS = 20_000_000
 _BLOCK = 100  # states are interpolated that many at a time
 _DEPTH = 10
 _AFTER_YOU, _LAST_RESORT = 0.3, 1.5  # [s], for the planner to leave first; to leave by force
@@ -140,7 +142,8 @@ class Stream:
         self._changed = threading.Condition()
         self._next: StreamedPlan | None = None
         self._closed = False
-        self._last_ns = 0  # when the last state was due, by the monotonic clock
+        # when the last state was due, by the monotonic clock, and its stamp
+        self._last_ns = self._last_stamp_ns = 0
         self._passed, self._clock_ns = ElapsedTime(), 0  # of /clock
         self._thread = threading.Thread(target=self._run, name='reference states', daemon=True)
         self._thread.start()
@@ -191,12 +194,13 @@ class Stream:
         """
         for time_ns, message in zip(states.times_ns, states.messages(), strict=True):
             due_ns = states.plan.began_ns + int(time_ns)
-            if due_ns <= self._last_ns:
+            stamp_ns = states.plan.stamp_ns + int(time_ns)
+            if due_ns <= self._last_ns or 0 <= self._last_stamp_ns - stamp_ns < _APART_NS:
                 continue
             if self._wait(due_ns):
                 return
             self._publish(message)
-            self._last_ns = due_ns
+            self._last_ns, self._last_stamp_ns = due_ns, stamp_ns
 
     def _play_by_clock(self, states: ReferenceStates) -> None:
         """Publish states at their times of ``/clock``; where that jumps, the motion goes on."""
