@@ -384,3 +384,17 @@ def test_failure_tells_how_the_process_ended(monkeypatch: pytest.MonkeyPatch, co
 def test_process_that_streams_ends_with_a_planner_that_is_killed(tmp_path: Path) -> None:
     with Planner(tmp_path, 'korayem_rigid', 'mortal', record=False) as planner:
         check_that_the_stream_ends(planner, signal.SIGKILL, -9)
+
+
+def test_plan_that_replaces_another_is_not_stamped_before_it(plan_of: PlanFactory) -> None:
+    reference = sample_plan(plan_of('ei50'), SamplingSettings())
+    heard: list[JointState] = []
+    stream, began = Stream(heard.append), time.monotonic_ns()
+    first = replace(streamed(reference, 200.0), began_ns=began)
+    stream.start(first)
+    wait_for(heard, 20)
+    # its clock was read a moment later than that of the first one
+    stream.start(replace(first, stamp_ns=first.stamp_ns - 5_500_000))
+    wait_for(heard, 40)
+    stream.close(PATIENCE)
+    assert (np.diff(stamps_of(heard)) > 0).all()
