@@ -10,7 +10,7 @@ from flex_planner.base.errors import InvalidTaskError, NoEquilibriumError
 from flex_planner.base.progress import Monitor
 from flex_planner.control.joint_controller import JointController
 from flex_planner.control.linear_feedback import LinearFeedback, pd_feedback
-from flex_planner.planning.execution import Execution, UNSTABLE_GROWTH
+from flex_planner.planning.execution import Execution
 from flex_planner.planning.feedback.differing_arm import (
     course_of,
     Difference,
@@ -18,6 +18,7 @@ from flex_planner.planning.feedback.differing_arm import (
     Response,
 )
 from flex_planner.planning.feedback.find_gains import RESOLUTION
+from flex_planner.planning.feedback.gains import Record
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.robust.differing_arms import has_all_modes
 from flex_planner.planning.uncertainty import ASSUMED, Uncertainty
@@ -25,7 +26,7 @@ import numpy as np
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Residuals:
+class Residuals(Record):
     """
     What is left of a motion on several arms.
 
@@ -46,18 +47,6 @@ class Residuals:
     controller: JointController
     uncertainty: Uncertainty
     differences: tuple[Difference, ...]
-    responses: tuple[Response, ...]
-
-    @property
-    def stable(self) -> bool:
-        """Return whether no arm shakes at the goal or runs away."""
-        return all(one.growth <= UNSTABLE_GROWTH and np.isfinite(one.residual)
-                   for one in self.responses)
-
-    @property
-    def worst(self) -> float:
-        """Return the largest motion of the tip after the arrival; infinite if not stable [m]."""
-        return max(one.residual for one in self.responses) if self.stable else float(np.inf)
 
 
 def list_differences(plan: Plan, uncertainty: Uncertainty) -> tuple[Difference, ...]:

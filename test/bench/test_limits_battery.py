@@ -15,8 +15,8 @@ from flex_planner.planning.plan import Plan
 import numpy as np
 import pytest
 
-# what IPOPT finds, by `bench.limits_battery`, and how much dearer a plan may be
-_WORSE = 1.5e-3
+# what IPOPT finds, by `bench.limits_battery`, and how much dearer a plan may be; one is dearer
+_WORSE, _KNOWN_WORSE = 1e-3, {41: 1.5e-3}
 _KINDS_THAT_BREAK_LIMITS = [(7, 0.0615903), (42, 0.0493899)]
 _TOUCHED_LIMITS = [(28, 0.0141108), (73, 0.130643)]
 _SLOW = [(41, 0.143889), (54, 0.0287053)]
@@ -52,7 +52,7 @@ def test_limits_that_are_only_touched_do_not_stop_the_interior_point_method(
 @pytest.mark.parametrize(('seed', 'cost'), _SLOW)
 def test_meshes_are_cut_until_a_motion_within_limits_is_found(seed: int, cost: float) -> None:
     plan, slacks = plan_rigid(seed)
-    assert plan.solved and plan.cost < (1 + _WORSE) * cost
+    assert plan.solved and plan.cost < (1 + _KNOWN_WORSE.get(seed, _WORSE)) * cost
     assert slacks.min() > 0
 
 

@@ -132,11 +132,12 @@ def free_duration(problem: MotionProblem, result: CollocationResult,
     shorter = wanted > DURATION.price(problem, result.solution)
     freed = _free_at(problem, result, wanted, solver)
     coarse = solver.coarse()
-    extremals = _lengthen(problem, result, coarse)
     if problem.layout.torques:
         extremals = _approach_price(problem, result, wanted, coarse)
     elif shorter:
         extremals = continue_in_price(DURATION, problem, result, coarse)
+    else:
+        extremals = _lengthen(problem, result, coarse)
     for extremal in extremals if freed is None else ():
         if extremal.interrupted:
             return problem, extremal.result
