@@ -165,9 +165,14 @@ class ArmSimulator(Node):  # type: ignore[misc]
         return ''
 
     def _passed_of(self, trajectory: JointTrajectory) -> float:
-        """Return for how long a trajectory lasts by its stamp, below 0 if it begins later [s]."""
+        """
+        Return for how long a trajectory lasts by its stamp, below 0 if it begins later [s].
+
+        By the time of the arm, as its states are stamped, which may be behind the clock.
+
+        """
         stamp = time_ns(trajectory.header.stamp)
-        return (self.get_clock().now().nanoseconds - stamp) * 1e-9 if stamp else 0.0
+        return (time_ns(self._stamp()) - stamp) * 1e-9 if stamp else 0.0
 
     def _on_timer(self) -> None:
         """Bring the arm up to now."""

@@ -14,10 +14,11 @@ from flex_planner.optimal_control.task import Task
 from flex_planner.ros.messages.measured_starts import ArmStateError
 from flex_planner.ros.messages.measured_states import AngleTrack
 from flex_planner.ros.planner.measured_joints import JointReading, MeasuredJoints
+from flex_planner.ros.runtime.polled_topic import Polled
 from flex_planner.ros.settings.planner import PlannerSettings
 from flex_planner_interfaces.msg import PlanReport
 import numpy as np
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import NameValidationException
 from rclpy.node import Node
@@ -28,14 +29,6 @@ _POLLING_PERIOD = 0.05  # [s]
 _PATIENCE_STEP = 0.02  # [s]
 # what comes in a period, also from several publishers of 1 kHz; heard from any kind of publisher
 _QOS = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
-
-
-class _Polled(MutuallyExclusiveCallbackGroup):  # type: ignore[misc]
-    """Keeps a subscription from the executor, which 1000 messages per second would keep busy."""
-
-    def can_execute(self, entity: object) -> bool:
-        """Return that the executor has nothing to do with it."""
-        return False
 
 
 class Latest:
@@ -58,7 +51,7 @@ class Latest:
         self._subscription = node.create_subscription(
             kind, topic, lambda message: None,
             QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT),
-            callback_group=_Polled())
+            callback_group=Polled())
 
     def take(self) -> Any:
         """Return it, None if there was none; from any thread."""
@@ -101,7 +94,7 @@ class ArmState:
         try:
             self._joints = MeasuredJoints(settings.joint_names, node.resolve_topic_name(topic))
             self._subscription = node.create_subscription(
-                JointState, topic, self._hear, _QOS, callback_group=_Polled())
+                JointState, topic, self._hear, _QOS, callback_group=Polled())
         except (NameValidationException, RuntimeError) as error:
             raise InvalidValueError('joint_states_topic', topic,
                                     f'the name of a topic: {error}') from error

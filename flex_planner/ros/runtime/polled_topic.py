@@ -12,7 +12,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 _QOS = QoSProfile(depth=2000, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
-class _Polled(MutuallyExclusiveCallbackGroup):  # type: ignore[misc]
+class Polled(MutuallyExclusiveCallbackGroup):  # type: ignore[misc]
     """Keeps a subscription from the executor, which 1000 messages per second would keep busy."""
 
     def can_execute(self, entity: object) -> bool:
@@ -38,7 +38,7 @@ class PolledTopic:
     def __init__(self, node: Node, kind: Any, topic: str) -> None:
         self.name, self._kind, self._clock = node.resolve_topic_name(topic), kind, node.get_clock()
         self._subscription = node.create_subscription(
-            kind, topic, lambda _: None, _QOS, callback_group=_Polled(), raw=True)
+            kind, topic, lambda _: None, _QOS, callback_group=Polled(), raw=True)
 
     def take(self) -> list[tuple[int, bytes]]:
         """Return what has come since the last time, with the time of its receipt [ns]."""
