@@ -79,6 +79,7 @@ class Endpoint:
         self._goals: dict[bytes, tuple[ServerGoalHandle, PendingRequest]] = {}
         self._audiences: dict[PendingRequest, tuple[int, Audience]] = {}
         self._readers = service_readers(node, name), action_readers(node, name)
+        self._context = node.context
         service, self._action = kinds
         # in the group that all else is in, a request that waits would hold up the others
         group = ReentrantCallbackGroup()
@@ -125,7 +126,12 @@ class Endpoint:
         del self._goals[_key(goal)], self._audiences[pending]
         result = self._action.Result()
         self._fill(result, goal.request, outcome)
-        _end(goal, outcome.report.error_code)
+        try:
+            _end(goal, outcome.report.error_code)
+        except RuntimeError:
+            if self._context.ok():
+                raise
+            # a signal has ended ROS meanwhile, and with it whoever would hear of the end
         return result
 
     def _on_cancel(self, goal: ServerGoalHandle) -> CancelResponse:
