@@ -28,6 +28,7 @@ from flex_planner.planning.strategies.homotopies import drop_weights
 from flex_planner.planning.strategies.interior_point import applies
 from flex_planner.planning.strategies.payload_within_limits import reach_largest_payload
 from flex_planner.planning.strategies.reached_limit import ReachedLimit
+import numpy as np
 
 # slack of a limit that bends a motion, in its scale
 _TOUCHED = 0.01
@@ -82,7 +83,7 @@ def carry_within_limits(problem: MotionProblem, solver: Solver, accuracy: float,
         certified = certify_reached(PAYLOAD, problem, one, accuracy, solver)
         if certified is not None:
             return _conclude(free, *certified, accuracy)
-    if first is None or not first.solved:
+    if first is None or not (first.solved and np.isfinite(free.local_upper)):
         return None
     return carry_more(problem.task, first, solver, accuracy, free)
 

@@ -21,6 +21,7 @@ from flex_planner.collocation.interior_point import (
 )
 from flex_planner.collocation.solution import CollocationSolution
 import numpy as np
+from numpy.typing import NDArray
 
 # mu falls by this factor from mesh to mesh
 _FALL = 0.01
@@ -132,7 +133,7 @@ def _find_cuts(problem: BarrierProblem, met: BarrierOutcome, slacks: Slacks,
 
 
 def cut_mesh(problem: BarrierProblem, solution: CollocationSolution, y: Array,
-             cut: Array) -> tuple[CollocationSolution, Array]:
+             cut: NDArray[np.bool_]) -> tuple[CollocationSolution, Array]:
     """
     Return z and y on a mesh with some intervals cut in two.
 
