@@ -30,14 +30,13 @@ from flex_planner.planning.execution import (
 )
 from flex_planner.planning.feedback.differing_arm import (
     course_of,
-    Difference,
     DifferingArm,
+    list_differences,
     Response,
     without_friction,
 )
 from flex_planner.planning.feedback.gains import FeedbackGains, Record
 from flex_planner.planning.plan import Plan
-from flex_planner.planning.robust.differing_arms import has_all_modes
 import numpy as np
 
 # encoders of 16 bits
@@ -81,17 +80,6 @@ class GainSettings:
         number('encoder_resolution', self.encoder_resolution, at_least=1e-9, at_most=1, unit='rad')
         for name in ('stiffness_error', 'payload_error'):
             number(name, getattr(self, name), at_least=0, at_most=MAX_ERROR)
-
-    def differences(self, plan: Plan) -> tuple[Difference, ...]:
-        """Return what is looked at: the model, the corners of the box, more modes; worst last."""
-        stiffness = self.stiffness_error if plan.arm.n_passive else 0.0
-        payload = self.payload_error if (plan.task.payload_mass
-                                         or plan.task.payload_inertia) else 0.0
-        corners = [Difference(stiffness=a * stiffness, payload=b * payload)
-                   for a in (1, -1) for b in (-1, 1)]
-        if plan.arm.n_passive and not has_all_modes(plan.arm):
-            corners += [Difference(more_modes=True), replace(corners[-1], more_modes=True)]
-        return tuple(dict.fromkeys([Difference(), *corners]))
 
 
 def find_feedback_gains(plan: Plan, settings: GainSettings | None = None,
@@ -137,7 +125,8 @@ class _Search:
                  monitor: Monitor) -> None:
         self._plan, self._settings, self._controller = plan, settings, controller
         self._monitor, self._rate = monitor, controller.rate
-        self._differences = settings.differences(plan)
+        self._differences = list_differences(plan, settings.stiffness_error,
+                                             settings.payload_error)
         # of roundings, and of a noise of half a step
         self._noise = settings.encoder_resolution * float(np.sqrt(1 / 12 + 1 / 4))
         parameters = without_friction(plan.problem.parameters)
