@@ -161,9 +161,11 @@ class DifferingArm:
         return float(np.log(np.abs(values).max()) / law.period)
 
     def respond(self, law: LinearFeedback, monitor: Monitor | None = None, *,
-                bending: bool = False) -> Response:
+                bending: bool = False, growth: float | None = None) -> Response:
         """
         Return what becomes of the plan under a law, and in the second after it, by simulation.
+
+        Its growth is found unless it is known.
 
         Raises
         ------
@@ -171,7 +173,8 @@ class DifferingArm:
             If the monitor stopped it.
 
         """
-        growth, execution, arm = self.growth(law), self.execution, self._under(law)
+        growth = self.growth(law) if growth is None else growth
+        execution, arm = self.execution, self._under(law)
         motion = arm.follow(self.course, execution.start, monitor)
         if not np.isfinite(motion.states).all():
             return Response(growth=growth)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from flex_planner.base.errors import InvalidTaskError, NoEquilibriumError
 from flex_planner.base.progress import Monitor
@@ -154,7 +155,7 @@ class _Search:
 
     def _add_state(self, found: FeedbackGains) -> FeedbackGains:
         """Look for a regulator with its observer, and one that estimates a torque, too."""
-        gains = self._regulators()
+        gains = self._regulators
         try:
             observers = [self._model.observe(self._noise, error) for error in _ERRORS]
             wandering = [self._model.observe(self._noise, error, wander)
@@ -212,11 +213,11 @@ class _Search:
         growth = arm.growth(law)
         if growth > UNSTABLE_GROWTH:
             return Response(growth=growth)
-        return arm.respond(law, self._monitor)
+        return arm.respond(law, self._monitor, growth=growth)
 
     def _add_joints(self, found: FeedbackGains) -> FeedbackGains:
         """Look for gains on the joints alone: those next to regulators, and those given."""
-        coupled = [self._model.project(gain, _ERRORS[2]) for gain in self._regulators()]
+        coupled = [self._model.project(gain, _ERRORS[2]) for gain in self._regulators]
         best = self._firmest([joint_feedback(gain, self._rate) for gain in coupled])
         if best is not None:
             found = replace(found, coupled_joints=coupled[best[0]],
@@ -232,6 +233,7 @@ class _Search:
         return replace(found, joints=choices[which],
                        records={**found.records, 'joints': record})
 
+    @cached_property
     def _regulators(self) -> list[Array]:
         """Return gains on the state, the firmest first; none where there are none."""
         try:
