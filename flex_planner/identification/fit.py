@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
 from flex_planner.identification.experiments import Experiment
+from flex_planner.identification.intervals import half_widths
 from flex_planner.identification.log_errors import LogErrors, Unknowns
 from flex_planner.identification.loop_model import LoopModel
 import numpy as np
@@ -23,9 +24,6 @@ TOLERANCE, COARSE = 1e-9, 1e-5
 MOST_RMS = 2.0
 """Of the errors over the noise, beyond which the model is not the plant."""
 _MOST_EVALUATIONS = 40
-_NORMAL_95, _SINGULAR = 1.96, 1e-14
-# samples that errors of a wrong model are alike for
-_BLOCK = 100
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -126,17 +124,7 @@ def predict_half_widths(model: LoopModel, experiments: Sequence[Experiment], val
     """Return half of the intervals of 95 % that logs would lead to, if the model is the plant."""
     problem = LogErrors(model, experiments, values, free, monitor)
     jacobian = problem.evaluate(problem.first)[1]
-    return _plain_widths(jacobian)[:len(problem.free)]
-
-
-def _plain_widths(jacobian: Array) -> Array:
-    """Return half of the intervals; infinite where the errors say nothing."""
-    scale = np.linalg.norm(jacobian, axis=0)
-    seen = scale > 0
-    inverse = np.linalg.pinv(_normal(jacobian[:, seen] / scale[seen]), rcond=_SINGULAR)
-    widths = np.full(scale.size, np.inf)
-    widths[seen] = _NORMAL_95 * np.sqrt(np.diag(inverse)) / scale[seen]
-    return widths
+    return half_widths(np.zeros(len(jacobian)), jacobian, 1.0)[:len(problem.free)]
 
 
 def _summarize(problem: LogErrors, unknowns: Array, converged: bool) -> Fit:
@@ -146,14 +134,8 @@ def _summarize(problem: LogErrors, unknowns: Array, converged: bool) -> Fit:
     count = len(problem.free)
     freedom = max(errors.size - unknowns.size, 1)
     variance = float(errors @ errors) / freedom
-    scale = np.linalg.norm(jacobian, axis=0)
-    scale[scale == 0] = 1.0  # nothing says anything of it: its interval is infinite below
-    inverse = np.linalg.pinv(_normal(jacobian / scale), rcond=_SINGULAR)
-    plain = np.diag(inverse) * (variance if problem.is_input else max(variance, 1.0))
-    blocked = np.diag(inverse @ _scores(problem, errors, jacobian / scale) @ inverse)
-    unseen = np.linalg.norm(jacobian, axis=0) == 0
-    widths = _NORMAL_95 * np.sqrt(np.maximum(plain, blocked)) / scale
-    widths[unseen] = np.inf
+    widths = half_widths(errors, jacobian, variance if problem.is_input else max(variance, 1.0),
+                         problem.blocks())
     parts = [errors[problem.rows(i)].reshape(one.measured.shape)
              for i, one in enumerate(problem.experiments)]
     return Fit(found=found, free=tuple(problem.free), half_widths=widths[:count],
@@ -163,20 +145,3 @@ def _summarize(problem: LogErrors, unknowns: Array, converged: bool) -> Fit:
                fit_percent=np.array([one.fit_percent(part) for one, part in zip(
                    problem.experiments, parts, strict=True)]),
                evaluations=problem.evaluations, converged=converged)
-
-
-def _normal(jacobian: Array) -> Array:
-    product: Array = jacobian.T @ jacobian
-    return product
-
-
-def _scores(problem: LogErrors, errors: Array, jacobian: Array) -> Array:
-    """Return the spread of the gradient over blocks of samples, whose errors may be alike."""
-    spread = np.zeros((jacobian.shape[1],) * 2)
-    gradients = jacobian * errors[:, None]
-    for i, one in enumerate(problem.experiments):
-        block = gradients[problem.rows(i)]
-        length = _BLOCK * one.measured.shape[1]
-        sums = np.add.reduceat(block, np.arange(0, len(block), length), axis=0)
-        spread += sums.T @ sums
-    return spread

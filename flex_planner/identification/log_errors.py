@@ -14,6 +14,8 @@ from flex_planner.identification.plant_parameters import list_parameters, Quanti
 import numpy as np
 
 _RUN_AWAY = 1e6
+# for how long errors of a wrong model are alike [s]
+_BLOCK = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -160,6 +162,15 @@ class LogErrors:
         """Return which errors are those of a log."""
         ends = np.cumsum([0, *(one.measured.size for one in self.experiments)])
         return slice(int(ends[index]), int(ends[index + 1]))
+
+    def blocks(self) -> list[int]:
+        """Return where blocks of errors begin that are alike where the model is wrong."""
+        found = []
+        for i, one in enumerate(self.experiments):
+            samples = round(_BLOCK / (np.median(np.diff(one.places)) * one.law.period))
+            rows = self.rows(i)
+            found += range(rows.start, rows.stop, max(samples, 1) * one.measured.shape[1])
+        return found
 
     def columns_away(self, index: int) -> slice:
         """Return which columns are those of the state at the start of a log that moves."""
