@@ -47,11 +47,14 @@ test: lint
 test-thorough: setup
 	$(call run_tests,thorough,--no-loadscope-reorder)
 
+# where all tests are that do not run beside others; to read the others' files would take long
+ALONE := test/ros test/system
+
 # run_tests MARKS,OPTIONS: first what runs beside others, then what does not, also if the first fails
 define run_tests
 @failed=0; \
 tools/run python -m pytest -n auto --dist loadfile $(2) -m '$(1) and not alone' || failed=1; \
-tools/run python -m pytest -m '$(1) and alone' || failed=1; \
+tools/run python -m pytest $(ALONE) -m '$(1) and alone' || failed=1; \
 exit $$failed
 endef
 
