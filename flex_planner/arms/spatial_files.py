@@ -270,8 +270,8 @@ class _Overlay:
         away = float(np.linalg.norm(np.subtract(said.center_of_mass, link.body.center_of_mass)))
         self._notes.append(
             f'link {link.name}: as {_AS[what]} its centre of mass is '
-            f'{round(away, 6) * 1e3:.3g} mm from that of its <inertial>, and its principal moments are {_moments(said)} kg m^2 '
-            f'instead of {_moments(link.body)}')
+            f'{round(away, 6) * 1e3:.3g} mm from that of its <inertial>, and its principal '
+            f'moments are {_moments(said)} kg m^2 instead of {_moments(link.body)}')
 
     def _with_merged(self, link: ChainLink, made: SpatialLink) -> SpatialLink:
         """Return a flexible link with what is fixed to it, at the end that is nearer."""
