@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from flex_planner.arms.planar_only import require_planar
 from flex_planner.base.errors import InvalidTaskError, NoEquilibriumError
 from flex_planner.base.progress import Monitor
 from flex_planner.control.joint_controller import JointController
@@ -52,12 +51,12 @@ class Residuals(Record):
 def list_differences(plan: Plan, uncertainty: Uncertainty) -> tuple[Difference, ...]:
     """Return what is looked at, see `Residuals`; what the arm or the task lacks is left out."""
     given = plan.problem.parameters
-    stiffness = uncertainty.stiffness if plan.arm.n_passive else 0.0
+    stiffness = uncertainty.stiffness if plan.arm.n_modes else 0.0
     payload = (uncertainty.payload_error(float(given.payload_mass))
                if given.payload_mass or given.payload_inertia else 0.0)
     errors = [(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1), (1, -1), (1, 1), (-1, -1), (-1, 1)]
     found = [Difference(stiffness=a * stiffness, payload=b * payload) for a, b in errors]
-    if plan.arm.n_passive and not has_all_modes(plan.arm):
+    if plan.arm.n_modes and not has_all_modes(plan.arm):
         found += [Difference(more_modes=True), replace(found[-1], more_modes=True)]
     return tuple(dict.fromkeys(found))
 
@@ -75,7 +74,7 @@ def find_residuals(plan: Plan, controller: JointController, *,
     Parameters
     ----------
     plan : Plan
-        Solved, of a planar arm, ending at rest.
+        Solved, ending at rest.
     controller : JointController
         Its gains, rate, and how it holds efforts.
     uncertainty : Uncertainty
@@ -91,13 +90,10 @@ def find_residuals(plan: Plan, controller: JointController, *,
     ------
     InvalidTaskError
         If the plan is not solved, or does not end at rest.
-    PlanarOnlyError
-        If the arm is a spatial one.
     StoppedError
         If the monitor stopped it.
 
     """
-    require_planar(plan.arm, 'residuals on other arms')
     if not plan.solved or not plan.task.ends_at_rest:
         raise InvalidTaskError('residuals on other arms are those of a plan that is solved and '
                                f'ends at rest: {plan.message}')

@@ -84,12 +84,12 @@ class GainSettings:
 
     def differences(self, plan: Plan) -> tuple[Difference, ...]:
         """Return what is looked at: the model, the corners of the box, more modes; worst last."""
-        stiffness = self.stiffness_error if plan.arm.n_passive else 0.0
+        stiffness = self.stiffness_error if plan.arm.n_modes else 0.0
         payload = self.payload_error if (plan.task.payload_mass
                                          or plan.task.payload_inertia) else 0.0
         corners = [Difference(stiffness=a * stiffness, payload=b * payload)
                    for a in (1, -1) for b in (-1, 1)]
-        if plan.arm.n_passive and not has_all_modes(plan.arm):
+        if plan.arm.n_modes and not has_all_modes(plan.arm):
             corners += [Difference(more_modes=True), replace(corners[-1], more_modes=True)]
         return tuple(dict.fromkeys([Difference(), *corners]))
 
