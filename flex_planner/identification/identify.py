@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from flex_planner.arms.arm import Arm
-from flex_planner.arms.planar_only import require_planar
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array, integer, number
@@ -46,6 +45,7 @@ from flex_planner.identification.joint_log import JointLog
 from flex_planner.identification.loop_model import LoopModel
 from flex_planner.identification.moving_starts import find_moving_starts
 from flex_planner.identification.plant_parameters import (
+    check_identifiable,
     free_parameters,
     list_parameters,
     parameters_of,
@@ -94,17 +94,15 @@ def identify(arm: Arm, logs: Sequence[JointLog], *, payload_mass: float = 0.0,
 
     Raises
     ------
-    PlanarOnlyError
-        If the arm is a spatial one.
     InvalidValueError
-        If a value breaks its bound, or a log is of another arm.
+        If a value breaks its bound, a joint slides, or a log is of another arm.
     LogError
         If a log does not say what its method needs.
     StoppedError
         If the monitor stopped it.
 
     """
-    require_planar(arm, 'identification')
+    check_identifiable(arm)
     monitor = monitor or Monitor()
     integer('number of logs', len(logs), at_least=1, at_most=MOST_LOGS)
     mass = number('payload_mass', payload_mass, at_least=0, at_most=MAX_PAYLOAD, unit='kg')

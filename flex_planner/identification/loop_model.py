@@ -13,7 +13,11 @@ from flex_planner.base.validation import Array
 from flex_planner.dynamics.cache_key import cache_key
 from flex_planner.dynamics.compiled_functions import load_functions
 from flex_planner.identification.loop_sizes import LAGS, LoopSizes
-from flex_planner.identification.plant_parameters import mode_weights
+from flex_planner.identification.plant_parameters import (
+    mode_weights,
+    with_damping,
+    with_rigidity,
+)
 from flex_planner.identification.simulated_log import DriveLaw, SimulatedLog
 import numpy as np
 
@@ -32,9 +36,9 @@ def bare_arm(arm: Arm) -> Arm:
     without which they would not be valid.
 
     """
-    links = tuple(replace(link, damping_ratio=tuple(w / 2 for w in mode_weights(link)) or 0.0,
-                          flexural_rigidity=1.0 if link.modes else link.flexural_rigidity)
-                  for link in arm.links)
+    links: Any = tuple(
+        with_damping(with_rigidity(link, 1.0), [weight / 2 for weight in mode_weights(link)])
+        if link.modes else link for link in arm.links)
     joints = tuple(replace(
         joint, motor=Motor(rotor_inertia=1.0 if joint.is_elastic else 0.0),
         viscous_friction=0.0, coulomb_friction=1.0, coulomb_speed=1.0) for joint in arm.joints)

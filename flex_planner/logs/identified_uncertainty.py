@@ -7,7 +7,6 @@ from typing import Any
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import find_arm_file
-from flex_planner.arms.planar_only import require_planar
 from flex_planner.base.text_files import say_file
 from flex_planner.base.yaml_files import read_yaml, YamlFileError
 from flex_planner.identification.experiments import LogError
@@ -40,8 +39,6 @@ def find_uncertainty(name: str, arm: Arm) -> Uncertainty:
     ------
     LogError
         If there is such a file, and it cannot be read, or is of other values.
-    PlanarOnlyError
-        If there is one, but the arm is a spatial one.
 
     """
     path = identification_file(find_arm_file(name))
@@ -66,11 +63,8 @@ def read_uncertainty(path: Path, arm: Arm) -> Uncertainty:
     ------
     LogError
         If it cannot be read, or is of other rigidities.
-    PlanarOnlyError
-        If the arm is a spatial one, of which there is no identification.
 
     """
-    require_planar(arm, 'identification')
     try:
         content: Any = read_yaml(path)[1]
         entries = {one['name']: one for one in content['parameters']}
@@ -102,7 +96,7 @@ def _share(entry: dict[str, Any]) -> float:
 
 def _check(path: Path, arm: Arm, one: Parameter, entry: dict[str, Any]) -> None:
     """Raise LogError if a rigidity of the arm is not the one that was found."""
-    found, has = float(entry['value']), arm.links[one.index].flexural_rigidity
+    found, has = float(entry['value']), float(arm.flexural_rigidities()[one.index])
     if abs(found - has) > _SAME * found:
         raise LogError(f'{say_file(path)} is of another arm: {one.name} was found to be '
                        f'{found:g} {one.unit}, but the arm file says {has:g}; identify again, '

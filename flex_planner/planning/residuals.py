@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from flex_planner.arms.planar_only import require_planar
 from flex_planner.base.errors import InvalidTaskError, NoEquilibriumError
 from flex_planner.base.progress import Monitor
 from flex_planner.control.joint_controller import JointController
@@ -66,7 +65,7 @@ def find_residuals(plan: Plan, controller: JointController, *,
     Parameters
     ----------
     plan : Plan
-        Solved, of a planar arm, ending at rest.
+        Solved, ending at rest.
     controller : JointController
         Its gains, rate, and how it holds efforts.
     uncertainty : Uncertainty
@@ -82,13 +81,10 @@ def find_residuals(plan: Plan, controller: JointController, *,
     ------
     InvalidTaskError
         If the plan is not solved, or does not end at rest.
-    PlanarOnlyError
-        If the arm is a spatial one.
     StoppedError
         If the monitor stopped it.
 
     """
-    require_planar(plan.arm, 'residuals on other arms')
     if not plan.solved or not plan.task.ends_at_rest:
         raise InvalidTaskError('residuals on other arms are those of a plan that is solved and '
                                f'ends at rest: {plan.message}')

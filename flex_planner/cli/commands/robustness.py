@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import sys
 
-from flex_planner.arms.planar_only import require_planar
 from flex_planner.base.paths import file_stem
 from flex_planner.base.progress import Monitor
 from flex_planner.base.text_files import say_file, write_text
@@ -57,7 +56,6 @@ def _run(options: argparse.Namespace) -> int:
     request = Request.of(options)
     check_folder(options.output)
     arm = request.task.arm
-    require_planar(arm, 'residuals on other arms')
     known = (read_uncertainty(options.identification, arm) if options.identification
              else request.uncertainty)
     with translate_errors():

@@ -69,11 +69,11 @@ def list_differences(plan: Plan, stiffness: float, payload: float,
 
     """
     given = plan.problem.parameters
-    stiffness = stiffness if plan.arm.n_passive else 0.0
+    stiffness = stiffness if plan.arm.n_modes else 0.0
     payload = payload if given.payload_mass or given.payload_inertia else 0.0
     found = [Difference(), *(Difference(stiffness=a * stiffness, payload=b * payload)
                              for a, b in signs)]
-    if plan.arm.n_passive and not has_all_modes(plan.arm):
+    if plan.arm.n_modes and not has_all_modes(plan.arm):
         found += [Difference(more_modes=True), replace(found[-1], more_modes=True)]
     return tuple(dict.fromkeys(found))
 

@@ -277,7 +277,8 @@ def test_parameters_decide_where_the_request_does_not(worker: RequestPlanner,
 
 def test_search_from_more_than_the_maximum_finds_nothing(worker: RequestPlanner,
                                                          settings: PlannerSettings) -> None:
-    outcome = search(worker, replace(settings, search='fast'), payload_mass=7.0)
+    outcome = search(worker, replace(settings, search='fast', allowed_planning_time=200.0),
+                     payload_mass=7.0)
     check_failure(outcome, PlanReport.NOT_FOUND, 'no motion with 7 kg in 1 s was found')
 
 
