@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+import math
 import sys
 import time
 from typing import Any, NamedTuple
@@ -70,6 +71,13 @@ def panda(elastic: int = 4) -> Arm:
     return load_arm('panda_elastic') if elastic == 4 else with_springs('panda_elastic', 8000.0)
 
 
+def without_limits(arm: Arm) -> Arm:
+    """Return an arm whose joints turn as far and as fast as their motors make them."""
+    return replace(arm, joints=tuple(replace(
+        joint, lower_limit=-math.inf, upper_limit=math.inf,
+        motor=replace(joint.motor, max_speed=math.inf)) for joint in arm.joints))
+
+
 _UR5 = [0, -1.2, 1.2, -1.5, -1.5, 0.0], [1.0, -0.8, 0.9, -1.0, -1.2, 0.5]
 _3R = [0, -0.3, 0.9], [1.2, -0.6, 0.4]
 _PANDA = [0, -0.785, 0, -2.356, 0, 1.571, 0.785]
@@ -86,8 +94,12 @@ CASES: dict[str, Case] = {
                                     1.0),
     'Panda, joints 1 to 4 elastic, near': Case(panda, _PANDA, _NEAR, 0.8, 1.0, 1.0),
     'Panda, joints 1 to 4 elastic, far': Case(panda, _PANDA, _FAR, 1.2, 1.0, 1.0),
+    'Panda, joints 1 to 4 elastic, far, without joint limits': Case(
+        lambda: without_limits(panda()), _PANDA, _FAR, 1.2, 1.0, 1.0),
     'Panda, all joints elastic, near': Case(lambda: panda(7), _PANDA, _NEAR, 0.8, 1.0, 1.0),
     'Panda, all joints elastic, far': Case(lambda: panda(7), _PANDA, _FAR, 1.2, 1.0, 1.0),
+    'Panda, all joints elastic, far, without joint limits': Case(
+        lambda: without_limits(panda(7)), _PANDA, _FAR, 1.2, 1.0, 1.0),
     'SCARA': Case(lambda: load_arm('scara_elastic'), [-0.7, 1.05, -0.05, 0],
                   [0.9, 1.4, -0.15, 1.57], 0.6, 2.0),
     'gantry': Case(lambda: load_arm('gantry_beam'), [0.5, 0.5], [2.0, 1.2], 1.5, 2.0),
