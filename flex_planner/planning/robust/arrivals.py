@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from flex_planner.arms.arm import Arm
-from flex_planner.arms.kinematics import link_deflections
+from flex_planner.arms.kinematics import link_bends, tip_jacobian, twist_levers
+from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
+from flex_planner.control.extent import peak_to_peak
 from flex_planner.control.joint_controller import JointController
 from flex_planner.control.joint_reference import JointReference
 from flex_planner.control.linearisation import hold_inputs, linearise_dynamics
@@ -44,17 +46,15 @@ class Ringing:
     ----------
     rest : numpy.ndarray, shape (2 n_t,)
         The state that the controller leads it to.
-    deflections : numpy.ndarray, shape (k instants, 2 n_t)
-        From a state less `rest` to the deflections of k points of the links in the second after
-        it; those of one point follow one another.
-    instants : int
-        How many there are: updates of the controller.
+    deflections : tuple of numpy.ndarray, shape (k, 1 to 3, instants, 2 n_t)
+        From a state less `rest` to the deflections of k points in the second after it, at updates
+        of the controller: of links, along a line or in a plane, of the stretched arm's tip by
+        elastic joints, and of the tip in space of an arm there.
 
     """
 
     rest: Array
-    deflections: Array
-    instants: int
+    deflections: tuple[Array, ...]
 
     @classmethod
     def of(cls, execution: Execution, goal: Array, hold: Array) -> Ringing:
@@ -68,20 +68,25 @@ class Ringing:
 
         """
         rest, period = _rest_and_period(execution, goal, hold)
-        rows, power = _deflections(execution.dynamics.arm)[:, None], period
+        parts = _deflections(execution.dynamics.arm, rest)
+        sizes, power = [len(part) * part.shape[1] for part in parts], period
+        rows = np.vstack([part.reshape(-1, rest.size) for part in parts])[:, None]
         count = int(np.ceil(WATCHED / execution.controller.period - 1e-6)) + 1
         while rows.shape[1] < count:  # twice as many instants each time
             rows = np.concatenate([rows, rows @ power], axis=1)
             power = power @ power
-        rows = rows[:, :count]
-        return cls(rest=rest, deflections=rows.reshape(-1, rest.size), instants=count)
+        split = np.split(rows[:, :count], np.cumsum(sizes)[:-1])
+        return cls(rest=rest, deflections=tuple(
+            found.reshape(*part.shape[:2], count, rest.size)
+            for found, part in zip(split, parts, strict=True)))
 
     def residual(self, away: Array) -> float:
         """Return the largest peak-to-peak deflection from a state less the rest (2 n_t,) [m]."""
         if not np.isfinite(away).all():
             return np.inf
-        deflections = (self.deflections @ away).reshape(-1, self.instants)
-        return float(np.nan_to_num(np.ptp(deflections, axis=1), nan=np.inf).max())
+        extents = [peak_to_peak((part @ away).transpose(2, 0, 1))
+                   for part in self.deflections]
+        return float(np.nan_to_num(extents, nan=np.inf).max())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -148,13 +153,24 @@ def _rest_and_period(execution: Execution, goal: Array, hold: Array) -> tuple[Ar
     return state, free - forced @ feedback
 
 
-def _deflections(arm: Arm) -> Array:
-    """Return what makes deflections of a state: of links, and beyond twisted joints."""
-    n, size = arm.n_joints, arm.n_passive
-    beyond = np.cumsum([link.length for link in reversed(arm.links)])[::-1]
-    twisted = np.eye(size)[:len(arm.elastic_joints)] * beyond[list(arm.elastic_joints), None]
-    passive = np.vstack([*(link_deflections(arm, i, np.eye(size))[::_STRIDE]
-                           for i, link in enumerate(arm.links) if link.modes), twisted])
-    shown = np.zeros((len(passive), 2 * arm.n_coordinates))
-    shown[:, n:arm.n_coordinates] = passive
-    return shown
+def _deflections(arm: Arm, rest: Array) -> list[Array]:
+    """
+    Return what makes deflections of a state, shape (k, 1 to 3, 2 n_t) each.
+
+    Of links; beyond elastic joints; and of a spatial arm, whose links may twist, of its tip.
+
+    """
+    n, n_t, size = arm.n_joints, arm.n_coordinates, arm.n_passive
+    parts = [_of_modes(arm, i) for i, link in enumerate(arm.links) if link.modes]
+    if arm.elastic_joints:
+        twisted = np.eye(len(arm.elastic_joints), size) * twist_levers(arm)[:, None]
+        parts.append(twisted[:, None])
+    if isinstance(arm, SpatialArm):
+        parts.append(tip_jacobian(arm, rest[:n_t])[None, :, n:])
+    return [np.pad(part, ((0, 0), (0, 0), (n, n_t))) for part in parts]
+
+
+def _of_modes(arm: Arm, index: int) -> Array:
+    """Return the deflections of a link's stations by the passive coordinates, (k, 1 or 2, m)."""
+    modal = np.eye(arm.n_coordinates)[arm.modal_slices[index], arm.n_joints:]
+    return link_bends(arm, index, modal)[::_STRIDE]
