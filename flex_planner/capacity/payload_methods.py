@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.progress import StoppedError
 from flex_planner.capacity.bracket import bracket_width
@@ -144,7 +145,7 @@ def _carry_within_model(problem: MotionProblem, solver: Solver, accuracy: float,
 def _switches_often(problem: MotionProblem, solver: Solver, accuracy: float) -> bool:
     """Return whether Newton's method fails where the barrier leads to the largest payload."""
     arm = problem.model.arm
-    if not (limits_of_model(arm) and is_cheap(PAYLOAD, problem)):
+    if isinstance(arm, SpatialArm) or not (limits_of_model(arm) and is_cheap(PAYLOAD, problem)):
         return False
     if not any(link.mode_shapes().tip_deflection.any() for link in arm.links if link.modes):
         return False

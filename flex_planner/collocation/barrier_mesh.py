@@ -105,19 +105,19 @@ def _settle(problem: BarrierProblem, guess: CollocationSolution, y: Array,
     return replace(more, iterations=met.iterations + more.iterations)
 
 
-def _find_unsettled(met: BarrierOutcome, free: int, count: int) -> Array:
+def _find_unsettled(met: BarrierOutcome, free: int, count: int) -> NDArray[np.bool_]:
     """Return the intervals whose multipliers go to and fro, shape (N,); none if all does."""
     if not met.correction <= _NEARLY:
         return np.zeros(met.solution.intervals, dtype=bool)
     middle = free + (met.y.shape[-1] - free) // 2
     products = met.y[..., middle - count:middle] * met.y[..., -count:]
     off = np.abs(np.log(products / met.mu)).max(axis=(1, 2)) > _OFF
-    unsettled: Array = off & (met.solution.steps > 0)
+    unsettled: NDArray[np.bool_] = off & (met.solution.steps > 0)
     return unsettled
 
 
 def _find_cuts(problem: BarrierProblem, met: BarrierOutcome, slacks: Slacks,
-               count: int) -> Array:
+               count: int) -> NDArray[np.bool_]:
     """Return which intervals are to be cut in two, shape (N,)."""
     solution, y = met.solution, met.y
     intervals, stages, size = solution.stages.shape
@@ -128,7 +128,7 @@ def _find_cuts(problem: BarrierProblem, met: BarrierOutcome, slacks: Slacks,
     sigma, lam = y[..., middle - count:middle], y[..., -count:]
     steep = np.abs(np.diff(np.log(sigma), axis=1)).max(axis=1) > _STEEPEST
     matters = lam.max(axis=1) > _MATTERS * lam.max(axis=(0, 1))
-    cuts: Array = (passed | (steep & matters).any(axis=1)) & (solution.steps > 0)
+    cuts: NDArray[np.bool_] = (passed | (steep & matters).any(axis=1)) & (solution.steps > 0)
     return cuts
 
 
