@@ -16,6 +16,8 @@ import numpy as np
 _RUN_AWAY = 1e6
 # for how long errors of a wrong model are alike [s]
 _BLOCK = 0.1
+# for how long errors in closed loop are, where intervals hold the truth as often as they say [s]
+_ALONE = 0.01
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -165,12 +167,23 @@ class LogErrors:
 
     def blocks(self) -> list[int]:
         """Return where blocks of errors begin that are alike where the model is wrong."""
-        found = []
+        found = list[int]()
         for i, one in enumerate(self.experiments):
-            samples = round(_BLOCK / (np.median(np.diff(one.places)) * one.law.period))
-            rows = self.rows(i)
-            found += range(rows.start, rows.stop, max(samples, 1) * one.measured.shape[1])
+            rows, samples = self.rows(i), max(round(_BLOCK / one.step), 1)
+            found += range(rows.start, rows.stop, samples * one.measured.shape[1])
         return found
+
+    @property
+    def crowding(self) -> float:
+        """
+        Return how many samples say no more than one, for intervals.
+
+        In closed loop the noise of encoders moves the arm, too, by way of the drive: it shakes
+        dry friction loose, and errors are alike for a while.
+
+        """
+        return max(max(_ALONE / one.step, 1.0) if one.method is Method.CLOSED_LOOP else 1.0
+                   for one in self.experiments)
 
     def columns_away(self, index: int) -> slice:
         """Return which columns are those of the state at the start of a log that moves."""
