@@ -133,7 +133,7 @@ def single_link(every: int, away: Sequence[float] = ()) -> Case:
 
 def _swing(size: float, seconds: float = 0.5) -> JointReference:
     """Return a motion of a polynomial of fifth order, with the torque of a stiff arm."""
-    times = np.linspace(0, seconds, 101)
+    times: Array = np.linspace(0, seconds, 101, dtype=np.float64)
     s = times / seconds
     angle = np.polynomial.Polynomial([0, 0, 0, 10, -15, 6])
     position, speed, acceleration = (

@@ -30,12 +30,12 @@ def record_motion(arm: Arm, payload: float, drive: Drive, reference: JointRefere
     dynamics = ArmDynamics.of(arm)
     physical = PhysicalParameters.of_arm(arm, payload_mass=payload).physical
     advance = dynamics.held_step(physical)
-    state = np.zeros(2 * arm.n_coordinates)
+    state: Array = np.zeros(2 * arm.n_coordinates)
     state[:n] = reference.positions[0] - shift
     if away is not None:
         state[n:] = away
     lag, share = divmod(delay / period, 1)
-    past = [np.zeros(n)] * (int(lag) + 2)
+    past: list[Array] = [np.zeros(n)] * (int(lag) + 2)
     keeps = np.exp(-2 * np.pi * drive.speed_filter * period) if drive.speed_filter else 0.0
 
     def read() -> Array:
