@@ -9,7 +9,6 @@ from flex_planner.arms.inverse_kinematics import workspace
 from flex_planner.arms.kinematics import frame_angles
 from flex_planner.arms.planar_only import PlanarOnlyError
 from flex_planner.dynamics.rigid_inertia import RigidInertia
-from flex_planner.dynamics.unbent_arm import mass_matrix
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.holding import knows_holding
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
@@ -35,7 +34,6 @@ def task() -> Task:
 @pytest.mark.parametrize('make', [
     lambda: workspace(ARM),
     lambda: frame_angles(ARM, np.zeros(4)),
-    lambda: mass_matrix(ARM, np.zeros(2), 1.0, 0.0),
     lambda: RigidInertia.of(ARM, 1.0, 0.0),
 ])
 def test_spatial_arms_are_refused(make: Callable[[], Any]) -> None:
