@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 from flex_planner.base.progress import StoppedError
 from flex_planner.base.validation import Array
-from flex_planner.collocation import CollocationSolution, Solver
+from flex_planner.collocation import CollocationResult, CollocationSolution, Solver
 from flex_planner.collocation.interior_point import BarrierOutcome
 from flex_planner.optimal_control.constrained_motion import (
     ConstrainedMotion,
@@ -39,6 +39,7 @@ from flex_planner.planning.strategies.strategy import Attempt
 from flex_planner.planning.strategies.within_limits import (
     approach_limits,
     solve_again,
+    solve_smoothly,
     solve_within_limits,
 )
 import numpy as np
@@ -156,7 +157,25 @@ def plan_from_barrier(problem: MotionProblem, slacks: PathSlacks, met: BarrierOu
         If the monitor stopped it.
 
     """
-    limited, result = solve_within_limits(problem, slacks, met, solver, coarse=True)
+    return _plan(*solve_within_limits(problem, slacks, met, solver, coarse=True), solver)
+
+
+def plan_smoothly(problem: MotionProblem, slacks: PathSlacks, met: BarrierOutcome,
+                  solver: Solver) -> Plan | None:
+    """
+    Return the plan of a motion with a barrier as it is, the motors' limits in it, or None.
+
+    Raises
+    ------
+    StoppedError
+        If the monitor stopped it.
+
+    """
+    return _plan(*solve_smoothly(problem, slacks, met, solver), solver)
+
+
+def _plan(limited: ConstrainedMotion, result: CollocationResult, solver: Solver) -> Plan | None:
+    """Return the plan of a motion within limits if it is solved and certified, or None."""
     if not result.converged:
         solver.monitor.check()
         return None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from flex_planner.base.errors import InvalidTaskError, NoEquilibriumError
 from flex_planner.base.progress import Monitor
@@ -11,17 +11,21 @@ from flex_planner.control.joint_controller import JointController
 from flex_planner.control.linear_feedback import LinearFeedback, pd_feedback
 from flex_planner.planning.execution import Execution
 from flex_planner.planning.feedback.differing_arm import (
+    CORNERS,
     course_of,
     Difference,
     DifferingArm,
+    list_differences,
     Response,
 )
 from flex_planner.planning.feedback.find_gains import RESOLUTION
 from flex_planner.planning.feedback.gains import Record
 from flex_planner.planning.plan import Plan
-from flex_planner.planning.robust.differing_arms import has_all_modes
 from flex_planner.planning.uncertainty import ASSUMED, Uncertainty
 import numpy as np
+
+# signs of errors of stiffness and payload
+_ONE_BY_ONE = (-1, 0), (1, 0), (0, -1), (0, 1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,19 +50,6 @@ class Residuals(Record):
     controller: JointController
     uncertainty: Uncertainty
     differences: tuple[Difference, ...]
-
-
-def list_differences(plan: Plan, uncertainty: Uncertainty) -> tuple[Difference, ...]:
-    """Return what is looked at, see `Residuals`; what the arm or the task lacks is left out."""
-    given = plan.problem.parameters
-    stiffness = uncertainty.stiffness if plan.arm.n_modes else 0.0
-    payload = (uncertainty.payload_error(float(given.payload_mass))
-               if given.payload_mass or given.payload_inertia else 0.0)
-    errors = [(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1), (1, -1), (1, 1), (-1, -1), (-1, 1)]
-    found = [Difference(stiffness=a * stiffness, payload=b * payload) for a, b in errors]
-    if plan.arm.n_modes and not has_all_modes(plan.arm):
-        found += [Difference(more_modes=True), replace(found[-1], more_modes=True)]
-    return tuple(dict.fromkeys(found))
 
 
 def find_residuals(plan: Plan, controller: JointController, *,
@@ -97,7 +88,8 @@ def find_residuals(plan: Plan, controller: JointController, *,
     if not plan.solved or not plan.task.ends_at_rest:
         raise InvalidTaskError('residuals on other arms are those of a plan that is solved and '
                                f'ends at rest: {plan.message}')
-    differences = list_differences(plan, uncertainty)
+    payload = uncertainty.payload_error(float(plan.problem.parameters.payload_mass))
+    differences = list_differences(plan, uncertainty.stiffness, payload, (*_ONE_BY_ONE, *CORNERS))
     used = law or pd_feedback(controller.gains, controller.rate)
     return Residuals(
         controller=controller, uncertainty=uncertainty, differences=differences,

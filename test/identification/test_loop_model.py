@@ -15,7 +15,7 @@ from flex_planner.arms.spatial_link import SpatialLink
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.dynamics.physical_parameters import PhysicalParameters
 from flex_planner.dynamics.statics import equilibrium
-from flex_planner.identification.loop_model import DriveLaw, LoopModel, steps_per_part
+from flex_planner.identification.loop_model import LoopModel, steps_per_part
 from flex_planner.identification.plant_parameters import (
     arm_with,
     check_identifiable,
@@ -24,6 +24,7 @@ from flex_planner.identification.plant_parameters import (
     parameters_of,
     Quantity,
 )
+from flex_planner.identification.simulated_log import DriveLaw
 from light_model import LightModel
 import numpy as np
 import pytest
@@ -75,6 +76,23 @@ def test_derivatives_are_those_of_finite_differences(
     log = model.simulate(at[-1:], followed, LAW, VALUES, steps_per_part(1e-3, 300.0))
     found = np.hstack([log.angle_slopes[..., place], log.guide_slopes[..., place]])
     assert found == pytest.approx(expected, abs=1e-5 * np.abs(expected).max() + 1e-9)
+
+
+@pytest.mark.parametrize('place', range(3))
+def test_derivatives_by_a_start_in_motion_are_those_of_finite_differences(
+        model: LoopModel, place: int) -> None:
+    followed, away = np.full((300, 3), START), np.array([1e-3, 0.1, 0.05])
+    parts = steps_per_part(1e-3, 300.0)
+
+    def at(apart: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        log = model.simulate(np.array([START]), followed, LAW, VALUES, parts, apart)
+        return (np.hstack([log.angles, log.guide]),
+                np.concatenate([log.angle_slopes, log.guide_slopes], axis=1))
+
+    step = STEP * np.eye(3)[place]
+    expected = (at(away + step)[0] - at(away - step)[0]) / (2 * STEP)
+    found = at(away)[1][..., len(VALUES) + 1 + place]
+    assert found == pytest.approx(expected, abs=1e-5 * np.abs(expected).max())
 
 
 def test_parameters_are_as_many_as_the_vector_has() -> None:
