@@ -8,6 +8,7 @@ from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import link_deflections
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
+from flex_planner.control.held_periods import HeldPeriods
 from flex_planner.control.joint_controller import JointController
 from flex_planner.control.joint_reference import JointReference
 from flex_planner.control.linearisation import hold_inputs, linearise_dynamics
@@ -44,17 +45,17 @@ class Ringing:
     ----------
     rest : numpy.ndarray, shape (2 n_t,)
         The state that the controller leads it to.
-    deflections : numpy.ndarray, shape (k instants, 2 n_t)
-        From a state less `rest` to the deflections of k points of the links in the second after
-        it; those of one point follow one another.
-    instants : int
-        How many there are: updates of the controller.
+    passive : numpy.ndarray, shape (n_f, instants, 2 n_t)
+        From a state less `rest` to the coordinates without a motor in the second after it, at
+        updates of the controller.
+    shapes : numpy.ndarray, shape (k, n_f)
+        From these coordinates to the deflections of points of the links.
 
     """
 
     rest: Array
-    deflections: Array
-    instants: int
+    passive: Array
+    shapes: Array
 
     @classmethod
     def of(cls, execution: Execution, goal: Array, hold: Array) -> Ringing:
@@ -67,20 +68,20 @@ class Ringing:
             If the arm buckles there.
 
         """
-        rest, period = _rest_and_period(execution, goal, hold)
-        rows, power = _deflections(execution.dynamics.arm)[:, None], period
+        arm = execution.dynamics.arm
+        rest, power = _rest_and_period(execution, goal, hold)
+        rows = np.eye(rest.size)[arm.n_joints:arm.n_coordinates, None]
         count = int(np.ceil(WATCHED / execution.controller.period - 1e-6)) + 1
         while rows.shape[1] < count:  # twice as many instants each time
             rows = np.concatenate([rows, rows @ power], axis=1)
             power = power @ power
-        rows = rows[:, :count]
-        return cls(rest=rest, deflections=rows.reshape(-1, rest.size), instants=count)
+        return cls(rest=rest, passive=rows[:, :count], shapes=_deflections(arm))
 
     def residual(self, away: Array) -> float:
         """Return the largest peak-to-peak deflection from a state less the rest (2 n_t,) [m]."""
         if not np.isfinite(away).all():
             return np.inf
-        deflections = (self.deflections @ away).reshape(-1, self.instants)
+        deflections = self.shapes @ (self.passive @ away)
         return float(np.nan_to_num(np.ptp(deflections, axis=1), nan=np.inf).max())
 
 
@@ -106,7 +107,7 @@ class Arrival:
     states: Array
 
     @classmethod
-    def of(cls, execution: Execution, ringing: Ringing, reference: JointReference,
+    def of(cls, execution: Execution, ringing: Ringing, trajectory: HeldPeriods,
            monitor: Monitor | None = None) -> Arrival:
         """
         Return how an arm arrives that follows a trajectory.
@@ -117,7 +118,7 @@ class Arrival:
             If the monitor stopped it.
 
         """
-        motion = execution.arm.follow(reference, execution.start, execution.duration, monitor)
+        motion = trajectory.follow(execution.arm, execution.start, monitor)
         return cls(execution=execution, ringing=ringing, times=motion.times,
                    states=motion.states)
 
@@ -149,12 +150,9 @@ def _rest_and_period(execution: Execution, goal: Array, hold: Array) -> tuple[Ar
 
 
 def _deflections(arm: Arm) -> Array:
-    """Return what makes deflections of a state: of links, and beyond twisted joints."""
-    n, size = arm.n_joints, arm.n_passive
+    """Return what makes deflections of passive coordinates: of links, and beyond twisted joints."""
+    size = arm.n_passive
     beyond = np.cumsum([link.length for link in reversed(arm.links)])[::-1]
     twisted = np.eye(size)[:len(arm.elastic_joints)] * beyond[list(arm.elastic_joints), None]
-    passive = np.vstack([*(link_deflections(arm, i, np.eye(size))[::_STRIDE]
-                           for i, link in enumerate(arm.links) if link.modes), twisted])
-    shown = np.zeros((len(passive), 2 * arm.n_coordinates))
-    shown[:, n:arm.n_coordinates] = passive
-    return shown
+    return np.vstack([*(link_deflections(arm, i, np.eye(size))[::_STRIDE]
+                        for i, link in enumerate(arm.links) if link.modes), twisted])

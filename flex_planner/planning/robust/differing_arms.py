@@ -15,8 +15,8 @@ import numpy as np
 
 MORE_MODES = 2
 # by how much the phase at arrival of the slow vibrations may differ between arms next to one
-# another: those that are weighed, and those that are looked at in the end [rad]
-_WEIGHED, _LOOKED_AT = np.pi, np.pi / 2
+# another that are weighed [rad]; as many stiffnesses between are looked at in the end, too
+_WEIGHED = np.pi
 _MOST_LEVELS = 12
 
 
@@ -75,13 +75,13 @@ def weighed_errors(robustness: Robustness, nominal: Execution, *, finely: bool =
     nominal : Execution
         By the arm of the model.
     finely : bool
-        Whether to take them so close that the worst is not missed by much.
+        Whether to take as many stiffnesses between, so that the worst is not missed by much.
 
     """
     given = nominal.parameters
     payload = robustness.payload_error if given.payload_mass or given.payload_inertia else 0.0
     drift = _slow_frequency(nominal) * nominal.duration * robustness.stiffness_error / 2
-    levels = min(int(np.ceil(drift / (_LOOKED_AT if finely else _WEIGHED))), _MOST_LEVELS)
+    levels = min(int(np.ceil(drift / _WEIGHED)), _MOST_LEVELS) * (2 if finely else 1)
     shares = np.arange(-levels, levels + 1) / max(levels, 1)
     if levels:
         shares = shares[shares != 0]

@@ -6,6 +6,7 @@ from flex_planner.base.errors import NoEquilibriumError
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
 from flex_planner.control.default_gains import default_gains
+from flex_planner.control.held_periods import HeldPeriods
 from flex_planner.control.joint_controller import JointController
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.planning.execution import Execution
@@ -73,7 +74,7 @@ class DifferingArms:
 
 class CarriedOut:
     """
-    A plan that arms carry out; arrivals are kept.
+    A plan that arms carry out; arrivals and residuals are kept.
 
     Parameters
     ----------
@@ -88,8 +89,10 @@ class CarriedOut:
 
     def __init__(self, plan: Plan, arms: DifferingArms, monitor: Monitor) -> None:
         self._arms, self._monitor = arms, monitor
-        self._reference = tabulate_reference(plan, arms.controller)
+        self._trajectory = HeldPeriods(tabulate_reference(plan, arms.controller),
+                                       arms.controller, arms.nominal.duration)
         self._arrivals = dict[Errors, Arrival | None]()
+        self._residuals = dict[Errors, float]()
 
     def arrival(self, errors: Errors) -> Arrival | None:
         """Return how the arm with these errors arrives; None if it buckles."""
@@ -97,13 +100,15 @@ class CarriedOut:
             self._monitor.check()
             arm = self._arms.arm(errors)
             self._arrivals[errors] = None if arm is None else Arrival.of(
-                *arm, self._reference, self._monitor)
+                *arm, self._trajectory, self._monitor)
         return self._arrivals[errors]
 
     def residual(self, errors: Errors) -> float:
         """Return the residual of that arm; infinite if it buckles or runs away [m]."""
-        arrival = self.arrival(errors)
-        return np.inf if arrival is None else arrival.residual
+        if errors not in self._residuals:
+            arrival = self.arrival(errors)
+            self._residuals[errors] = np.inf if arrival is None else arrival.residual
+        return self._residuals[errors]
 
     def residuals(self, errors: Array) -> Array:
         """Return those of arms with errors (k, 2), shape (k,) [m]."""
