@@ -27,7 +27,7 @@ import numpy as np
 
 _SOURCE = Path(__file__).with_name('held_periods.c')
 _OPTIONS = ('-O2', '-fno-math-errno')
-_TOLERANCES = 1e-6, 1e-9
+_TOLERANCES = 1e-5, 1e-8
 # in a period: the arm must have run away
 _MOST_STEPS = 256
 _address, _number, _real = ctypes.c_void_p, ctypes.c_longlong, ctypes.c_double
@@ -82,14 +82,14 @@ class HeldPeriods:
             return arm.follow(self._reference, state, self._until, monitor)
         if monitor is not None:
             monitor.check()
-        states = np.full((self._times.size, state.size), np.nan)
+        states = np.full((self._times.size, 2 * arm.dynamics.arm.n_coordinates), np.nan)
         states[0] = state
         physical, constants = (np.ascontiguousarray(values, dtype=np.float64) for values in (
             arm.parameters.physical, arm.constants))
         job = _Periods(
-            rate=rate, joints=arm.dynamics.arm.n_joints, size=state.size, count=len(self._rows),
-            most_steps=_MOST_STEPS, length=arm.controller.period, rtol=_TOLERANCES[0],
-            atol=_TOLERANCES[1], reference=self._rows.ctypes.data,
+            rate=rate, joints=arm.dynamics.arm.n_joints, size=states.shape[1],
+            count=len(self._rows), most_steps=_MOST_STEPS, length=arm.controller.period,
+            rtol=_TOLERANCES[0], atol=_TOLERANCES[1], reference=self._rows.ctypes.data,
             controller=constants.ctypes.data, physical=physical.ctypes.data,
             states=states.ctypes.data)
         crossed = library.cross_periods(ctypes.byref(job))

@@ -49,7 +49,8 @@ class ConstrainedMotion(MotionProblem):
     def __init__(self, motion: MotionProblem, slacks: PathSlacks, mu: float,
                  floor: Array | None = None) -> None:
         super().__init__(motion.model, motion.task, motion.parameters,
-                         via_times=motion.junctions if motion.junctions.size else None)
+                         via_times=motion.junctions if motion.junctions.size else None,
+                         ends=motion.ends)
         self.slacks, self.mu = slacks, mu
         self.conditions = smooth_rates(self.conditions, mu)
         self.floor: Array = np.zeros(slacks.count) if floor is None else floor

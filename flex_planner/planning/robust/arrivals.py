@@ -150,7 +150,7 @@ def _rest_and_period(execution: Execution, goal: Array, hold: Array) -> tuple[Ar
 
 
 def _deflections(arm: Arm) -> Array:
-    """Return what makes deflections of passive coordinates: of links, and beyond twisted joints."""
+    """Return what makes deflections of passive coordinates: of links, beyond twisted joints."""
     size = arm.n_passive
     beyond = np.cumsum([link.length for link in reversed(arm.links)])[::-1]
     twisted = np.eye(size)[:len(arm.elastic_joints)] * beyond[list(arm.elastic_joints), None]

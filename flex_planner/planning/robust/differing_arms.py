@@ -47,9 +47,11 @@ def differing_parameters(given: PhysicalParameters, stiffness: float,
 
 
 def other_execution(nominal: Execution, dynamics: ArmDynamics,
-                    parameters: PhysicalParameters) -> Execution:
+                    parameters: PhysicalParameters, rest: Array | None = None) -> Execution:
     """
     Return the same trajectory carried out by another arm.
+
+    Where the first one would be at rest at the start (n_t,) is found if it is not given.
 
     Raises
     ------
@@ -58,7 +60,14 @@ def other_execution(nominal: Execution, dynamics: ArmDynamics,
 
     """
     return replace(nominal, dynamics=dynamics, parameters=parameters,
-                   start=_other_start(nominal, dynamics, parameters))
+                   start=_other_start(nominal, dynamics, parameters,
+                                      rest_at_start(nominal) if rest is None else rest))
+
+
+def rest_at_start(execution: Execution) -> Array:
+    """Return the coordinates (n_t,) of an arm at rest with the joint angles of its start."""
+    angles = execution.start[:execution.dynamics.arm.n_joints]
+    return equilibrium(execution.dynamics, angles, execution.parameters)[0]
 
 
 def weighed_errors(robustness: Robustness, nominal: Execution, *, finely: bool = False) -> Array:
@@ -101,12 +110,11 @@ def _slow_frequency(nominal: Execution) -> float:
     return float(frequency.max(initial=0.0))
 
 
-def _other_start(nominal: Execution, dynamics: ArmDynamics,
-                 parameters: PhysicalParameters) -> Array:
+def _other_start(nominal: Execution, dynamics: ArmDynamics, parameters: PhysicalParameters,
+                 rest: Array) -> Array:
     """Return where another arm starts: as far from its rest as the one that was planned for."""
     planned, arm = nominal.dynamics.arm, dynamics.arm
     angles = nominal.start[:planned.n_joints]
-    rest, _ = equilibrium(nominal.dynamics, angles, nominal.parameters)
     other, _ = equilibrium(dynamics, angles, parameters)
     start = np.concatenate([other, np.zeros_like(other)])
     away = nominal.start - np.concatenate([rest, np.zeros_like(rest)])

@@ -15,6 +15,7 @@ from flex_planner.planning.robust.arrivals import Arrival, Ringing, tabulate_ref
 from flex_planner.planning.robust.differing_arms import (
     differing_parameters,
     other_execution,
+    rest_at_start,
     weighed_errors,
 )
 from flex_planner.planning.robust.objective import Robustness
@@ -54,6 +55,7 @@ class DifferingArms:
             gains=default_gains(plan.model))
         self.nominal = Execution.of(plan, self.controller)
         self._dynamics = dynamics or self.nominal.dynamics
+        self._rest = rest_at_start(self.nominal)
         self._goal = plan.problem.goal[:plan.arm.n_joints]
         self._hold = plan.problem.holding_torque
         self.weighed = weighed_errors(robustness, self.nominal)
@@ -65,7 +67,8 @@ class DifferingArms:
         if errors not in self._arms:
             parameters = differing_parameters(self.nominal.parameters, *errors)
             try:
-                execution = other_execution(self.nominal, self._dynamics, parameters)
+                execution = other_execution(self.nominal, self._dynamics, parameters,
+                                            self._rest)
                 self._arms[errors] = execution, Ringing.of(execution, self._goal, self._hold)
             except NoEquilibriumError:
                 self._arms[errors] = None
