@@ -62,6 +62,8 @@ _BETWEEN = 17
 _LOWER = 0.3
 # of the smallest slacks, below which multipliers grow no more than linearly at the end
 _FLOOR = 0.3
+# floors below one another, of a motion that passes its limits
+_MOST_FLOORS = 8
 
 
 def approach_limits(problem: MotionProblem, slacks: PathSlacks, near: CollocationSolution,
@@ -132,8 +134,7 @@ def solve_within_limits(problem: MotionProblem, slacks: PathSlacks, met: Barrier
         # where the interior point goes to and fro, Newton's method may still settle
         result = _finish(limited, finer.solution, solver)
         if result.converged and not _keeps(limited, result.solution):
-            limited = limited.floored(result.solution, _FLOOR)
-            result = _finish(limited, result.solution, solver)
+            limited, result = _lower_floor(limited, result, solver)
         if result.converged and not coarse:
             limited, result = _lower(limited, result, _LAST[0] * rate, solver)
         limited, result = _at_best_times(limited, result, solver)
@@ -208,6 +209,24 @@ def _finish(limited: ConstrainedMotion, near: CollocationSolution,
     if result.converged or result.status in INTERRUPTED:
         return result
     return quick.with_settings(exact=True).solve(limited, near)
+
+
+def _lower_floor(limited: ConstrainedMotion, soft: CollocationResult,
+                 solver: Solver) -> tuple[ConstrainedMotion, CollocationResult]:
+    """Return the motion that keeps its limits, from one whose slacks are below their floor."""
+    lower = limited.floored(soft.solution, _FLOOR)
+    result = _finish(lower, soft.solution, solver)
+    for _ in range(_MOST_FLOORS):
+        if result.status in INTERRUPTED or (
+                result.converged and _keeps(lower, result.solution)):
+            break
+        # step by step, which is slower than at once
+        lower = ConstrainedMotion(limited, limited.slacks, limited.mu, _FLOOR * limited.floor)
+        result = _finish(lower, soft.solution, solver)
+        if not result.converged:
+            break
+        limited, soft = lower, result
+    return lower, result
 
 
 def _lower(limited: ConstrainedMotion, result: CollocationResult, least: float,
