@@ -29,10 +29,11 @@ def main() -> None:
                                payload_mass=1.0, effort_weights=[1 / 8, 1 / 8])
     jumping = plan_path(task)
     start = np.abs(jumping.sample([0.0]).torques[0]).max()
-    print(f'least effort: the torque jumps by {start:.2f} N m at the start, J = {jumping.cost:.4f}')
+    print(f'least effort: the torque jumps by {start:.2f} N m at the start, '
+          f'J = {jumping.cost:.4f}')
 
     priced = replace(task, torque_rate_weight=task.effort_weights * TURN**2)
-    bounded = replace(priced, max_torque_rate=LARGEST)
+    bounded = replace(priced, max_torque_rate=np.full(2, LARGEST))
     slower = Objectives(max_joint_speeds=[1.0, 1.2])
     for name, smooth, objectives in (('a price', priced, None), ('bounds', bounded, None),
                                      ('slower joints', bounded, slower)):

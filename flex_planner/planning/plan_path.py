@@ -37,7 +37,6 @@ from flex_planner.planning.proofs import (
 from flex_planner.planning.robust.make_robust import make_robust
 from flex_planner.planning.smooth_torques import (
     plan_without_jumps,
-    refuse_torque_rates,
     STIFF_LINKS,
     without_torque_rates,
 )
@@ -117,8 +116,6 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
         return _impossible(refused, prove_not_held(error, task.payload_mass))
     if objectives is not None:
         objectives.check(task)
-        if objectives.robustness is not None:
-            refuse_torque_rates(task, 'motions that forgive errors of the model (max_residual)')
     proof = find_proof(problem)
     if proof is not None:
         return _impossible(problem, proof)

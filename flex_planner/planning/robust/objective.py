@@ -62,8 +62,9 @@ class Robustness:
         Raises
         ------
         InvalidTaskError
-            If the links are rigid, the motion does not end at rest, it has via points, or the
-            payload, of which alone an error is given, has no mass.
+            If the links are rigid, the motion does not end at rest, it has via points, rates of
+            torques have a price or a bound, or the payload, of which alone an error is given, has
+            no mass.
         PlanarOnlyError
             If the arm is a spatial one.
 
@@ -77,6 +78,10 @@ class Robustness:
         if task.via_points:
             raise InvalidTaskError('max_residual is given, but the motion has via points: motions '
                                    'that forgive errors of the model are not found through them')
+        for name in ('torque_rate_weight', 'max_torque_rate'):
+            if getattr(task, name).size:
+                raise InvalidTaskError(f'{name} is given, but must be left out of motions that '
+                                       'forgive errors of the model (max_residual)')
         if not self.stiffness_error and not (task.payload_mass or task.payload_inertia):
             raise InvalidTaskError('payload_error is given, but there is no payload: give '
                                    'stiffness_error')
