@@ -47,11 +47,15 @@ test: lint
 test-thorough: setup
 	$(call run_tests,thorough,--no-loadscope-reorder)
 
-# run_tests MARKS,OPTIONS: first what runs beside others, then what does not, also if the first fails
+# where the tests are that start other processes; to read the files of all others would take long
+ALONE := test/ros test/system
+
+# run_tests MARKS,OPTIONS: first what runs beside any number of others, then what starts processes of
+# its own, two files at a time; the second also if the first fails
 define run_tests
 @failed=0; \
 tools/run python -m pytest -n auto --dist loadfile $(2) -m '$(1) and not alone' || failed=1; \
-tools/run python -m pytest -m '$(1) and alone' || failed=1; \
+tools/run python -m pytest -n 2 --dist loadfile $(2) $(ALONE) -m '$(1) and alone' || failed=1; \
 exit $$failed
 endef
 

@@ -12,7 +12,7 @@ import subprocess
 import sys
 from typing import Any
 
-from bench import battery, earlier, growth, model, payload, soak, solver
+from bench import battery, earlier, growth, model, payload, soak, solver, spatial
 import numpy as np
 
 DOCS = Path(__file__).parents[1] / 'docs'
@@ -154,6 +154,22 @@ time counts helper processes that have ended.
 """
 
 
+SPATIAL = """
+## Arms in space
+
+Motions from cold with the compiled functions at hand; `python -m bench.spatial` has the arms, the
+ends and the weights. CPU time, and the time that was set as a bar beforehand where there is one.
+*Far* goals are those on whose way motors saturate or joints meet their limits.
+
+{table}
+"""
+
+
+def measured_spatial() -> dict[str, object]:
+    """Measure motions of arms in space."""
+    return {'spatial': spatial.measure()}
+
+
 def measured_battery() -> dict[str, object]:
     """Measure motions of published arms."""
     return {'battery': battery.measure()}
@@ -236,7 +252,7 @@ def text(figures: dict[str, Any]) -> str:
         cold_1=cold_1, warm_1=warm_1, cold_2=cold_2, warm_2=warm_2, limit=growth.TIME_LIMIT,
         growth=growth.table([growth.Growth(**row) for row in figures['growth']])) + (
         clamped_text(figures) + payload_text(figures) + earlier_text(figures)
-        + battery_text(figures) + soak_text(figures))
+        + battery_text(figures) + spatial_text(figures) + soak_text(figures))
 
 
 def earlier_text(figures: dict[str, Any]) -> str:
@@ -251,6 +267,13 @@ def battery_text(figures: dict[str, Any]) -> str:
     if 'battery' not in figures:
         return ''
     return BATTERY.format(limit=battery.LIMITS[-1], table=battery.table(figures['battery']))
+
+
+def spatial_text(figures: dict[str, Any]) -> str:
+    """Return the part on arms in space, once it was measured."""
+    if 'spatial' not in figures:
+        return ''
+    return SPATIAL.format(table=spatial.table(figures['spatial']))
 
 
 def clamped_text(figures: dict[str, Any]) -> str:
@@ -288,7 +311,7 @@ def main() -> None:
     figures = json.loads(kept.read_text()) if kept.exists() else {}
     parts = {'model': measured_model, 'solver': measured_solver, 'clamped': measured_clamped,
              'payload': measured_payload, 'earlier': measured_earlier, 'speed': measured_speed,
-             'battery': measured_battery, 'soak': measured_soak}
+             'battery': measured_battery, 'spatial': measured_spatial, 'soak': measured_soak}
     for name in sys.argv[1:] or parts:
         figures |= parts[name]()
     figures['versions'] = versions()

@@ -36,7 +36,7 @@ settings.register_profile('repository', deadline=None, derandomize=True)
 settings.load_profile('repository')
 
 
-# tests in these folders have other processes, and some of them are timed
+# tests in these folders start other processes, so that no more than two files run at a time
 ALONE = {'ros', 'system'}
 # the ids of files, tests and cases that `make test` leaves out
 THOROUGH = FOLDER / 'thorough.txt'

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from flex_planner.arms.link import MAX_MODES
 from flex_planner.arms.mechanism import FlexibleBody
 from flex_planner.arms.quantities import check_quantity
-from flex_planner.arms.spatial_body import as_matrix, as_point, SpatialBody, spread
+from flex_planner.arms.spatial_body import as_matrix, as_point, clean, SpatialBody, spread
 from flex_planner.base.errors import InvalidSizeError, InvalidValueError
 from flex_planner.base.validation import Array, integer, number
 import numpy as np
@@ -102,3 +102,17 @@ class ElementModes:
     def with_rigidity(self, factor: float) -> ElementModes:
         """Return the same link with its stiffness multiplied."""
         return replace(self, factor=factor * self.factor)
+
+
+def turn_body(body: FlexibleBody, axes: Array) -> FlexibleBody:
+    """Return integrals in other axes, the columns of a rotation (3, 3) in those that they have."""
+    if np.array_equal(axes, np.eye(3)):
+        return body
+    vectors = {name: clean(axes.T @ getattr(body, name)) for name in (
+        'first_moment', 'displacement', 'moment', 'tip', 'tip_displacement', 'tip_turn', 'spin')}
+    matrices = {name: clean(axes.T @ getattr(body, name) @ axes)
+                for name in ('inertia', 'inertia_slope', 'inertia_bend')}
+    bent = {name: np.einsum('ab,ajk->bjk', axes, getattr(body, name))
+            for name in ('shortening', 'tip_shortening')}
+    return replace(body, cross_moment=clean(body.cross_moment @ axes), **vectors, **matrices,
+                   **bent)

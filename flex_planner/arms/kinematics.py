@@ -12,6 +12,7 @@ from __future__ import annotations
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.planar_only import require_planar
 from flex_planner.arms.spatial_arm import SpatialArm
+from flex_planner.arms.spatial_joint import slides
 from flex_planner.arms.spatial_kinematics import spatial_link_points, tip_frame, tip_moves
 from flex_planner.base.validation import Array
 import numpy as np
@@ -111,6 +112,53 @@ def link_deflections(arm: Arm, index: int, vectors: Array) -> Array:
     shapes = link.mode_shapes().shape(np.linspace(0, link.length, _STATIONS, dtype=np.float64))
     deflections: Array = shapes @ vectors[part.start - n:part.stop - n]
     return deflections
+
+
+def link_bends(arm: Arm, index: int, modal: Array, stations: int = _STATIONS) -> Array:
+    """
+    Return the deflections of a link's stations, with their signs.
+
+    Parameters
+    ----------
+    arm : Arm
+        Its links twist without moving their points.
+    index : int
+        Of the link, from 0.
+    modal : numpy.ndarray, shape (modes, k)
+        Columns are displacements of its modes.
+    stations : int
+        Evenly spaced points, both ends included.
+
+    Returns
+    -------
+    numpy.ndarray, shape (stations, 1 or 2, k)
+        In the plane, or across the link in two planes [m].
+
+    """
+    link = arm.links[index]
+    if isinstance(arm, SpatialArm):
+        shapes = arm.links[index].bend_shapes(np.linspace(0, 1, stations, dtype=np.float64))
+    else:
+        places = np.linspace(0, link.length, stations, dtype=np.float64)
+        shapes = link.mode_shapes().shape(places)[:, None]
+    bends: Array = shapes @ modal
+    return bends
+
+
+def twist_levers(arm: Arm) -> Array:
+    """
+    Return by how much a unit of each elastic joint's twist moves the stretched arm's tip at most.
+
+    Returns
+    -------
+    numpy.ndarray, shape (n_elastic,)
+        Lengths of the links beyond it; 1 of a joint that slides [m/rad], [m/m].
+
+    """
+    beyond = np.cumsum([link.length for link in reversed(arm.links)])[::-1]
+    elastic = list(arm.elastic_joints)
+    levers: Array = np.where([slides(arm.joints[i]) for i in elastic], 1.0, beyond[elastic])
+    return levers
 
 
 def bent_distances(arm: Arm, index: int, modal: Array, stations: int) -> Array:

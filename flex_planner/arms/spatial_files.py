@@ -19,6 +19,7 @@ from flex_planner.arms.beam_fields import is_beam, read_beam, read_body
 from flex_planner.arms.element_files import read_elements
 from flex_planner.arms.joint import COULOMB_SPEED, Motor
 from flex_planner.arms.spatial_arm import SpatialArm
+from flex_planner.arms.spatial_beam import SpatialBeam
 from flex_planner.arms.spatial_body import (
     as_matrix,
     as_point,
@@ -41,6 +42,7 @@ import numpy as np
 SPATIAL = 'spatial'
 ROBOT_DESCRIPTION = 'robot_description'
 _GRAVITY = (0.0, 0.0, -9.81)
+_AS = {'beam': 'a beam', 'elements': 'elements'}
 # of masses that are compared
 _ALIKE = 1e-3
 
@@ -169,14 +171,14 @@ def _of_urdf(top: YamlSection, folder: Path, description: str) -> dict[str, Any]
         chain = find_chain(urdf, base, tip, held)
     except InvalidValueError as error:
         raise type(error)(top.name(error.field), error.value, error.bound) from None
-    return _Overlay(top, urdf, chain).fields()
+    return _Overlay(top, folder, urdf, chain).fields()
 
 
 class _Overlay:
     """A chain of a URDF file with what an arm file says of its links and joints."""
 
-    def __init__(self, top: YamlSection, urdf: Urdf, chain: UrdfChain) -> None:
-        self._top, self._urdf, self._chain = top, urdf, chain
+    def __init__(self, top: YamlSection, folder: Path, urdf: Urdf, chain: UrdfChain) -> None:
+        self._top, self._folder, self._urdf, self._chain = top, folder, urdf, chain
         self._notes = [*urdf.notes, *chain.notes]
 
     def fields(self) -> dict[str, Any]:
@@ -229,41 +231,47 @@ class _Overlay:
         return made
 
     def _link(self, link: ChainLink, section: YamlSection | None) -> SpatialLink:
-        """Return a link: rigid as the URDF has it, or the beam that the file says."""
+        """Return a link: rigid as the URDF has it, or bending as the file says."""
         if section is None:
             return SpatialLink(end=link.end, body=whole_body(link))
-        if section.has('elements'):
-            raise InvalidValueError(section.name('elements'), 'given', 'left out with a URDF: '
-                                    'links of finite elements are read in arms without one')
-        length = math.hypot(*link.end)
-        if not length:
-            raise InvalidValueError(section.path, 'a beam', 'left out: the next joint is where '
-                                    'that of the link is, so there is nothing to bend')
+        if not any(link.end):
+            raise InvalidValueError(section.path, 'a link that bends', 'left out: the next joint '
+                                    'is where that of the link is, so there is nothing to bend')
         base, tip = (read_body(section.section(key)) if section.has(key) else SpatialBody()
                      for key in ('base_body', 'tip_body'))
-        rest = link.body.mass - base.mass - tip.mass
+        if section.has('elements'):
+            elements = read_elements(section.section('elements'), link.end, self._folder)
+            made: SpatialLink = section.build(SpatialLink, end=link.end, body=base,
+                                              elements=elements, tip_body=tip)
+        else:
+            beam = self._beam(link, section, base.mass + tip.mass)
+            made = SpatialLink(end=link.end, body=base, beam=beam, tip_body=tip)
+        self._compare(link, made)
+        return self._with_merged(link, made)
+
+    @staticmethod
+    def _beam(link: ChainLink, section: YamlSection, bodies: float) -> SpatialBeam:
+        """Return a beam, by default with the mass that bodies at its ends leave of the link."""
+        rest = link.body.mass - bodies
         given = any(section.has(key) for key in ('mass', 'linear_density', 'density'))
         if not given and not rest > 0:
             raise InvalidValueError(
                 section.name('mass'), None, f'given: the URDF has {link.body.mass:g} kg for the '
-                f'link, base_body and tip_body have {base.mass + tip.mass:g} kg')
-        beam = read_beam(section, length, max(rest, 0.0))
-        made = SpatialLink(end=link.end, body=base, beam=beam, tip_body=tip)
-        self._compare(link, made)
-        return self._with_merged(link, made)
+                f'link, base_body and tip_body have {bodies:g} kg')
+        return read_beam(section, math.hypot(*link.end), max(rest, 0.0))
 
     def _compare(self, link: ChainLink, made: SpatialLink) -> None:
         """Note what the file has instead of the link's <inertial>."""
-        said = _inertial(made)
+        said, what = _inertial(made), 'elements' if made.elements else 'beam'
         if abs(said.mass - link.body.mass) > _ALIKE * max(said.mass, link.body.mass):
             self._notes.append(
-                f'link {link.name}: beam, base_body and tip_body have {said.mass:.4g} kg and '
+                f'link {link.name}: {what}, base_body and tip_body have {said.mass:.4g} kg and '
                 f'stand for the {link.body.mass:.4g} kg of its <inertial>')
         away = float(np.linalg.norm(np.subtract(said.center_of_mass, link.body.center_of_mass)))
         self._notes.append(
-            f'link {link.name}: as a beam its centre of mass is {round(away, 6) * 1e3:.3g} mm '
-            f'from that of its <inertial>, and its principal moments are {_moments(said)} kg m^2 '
-            f'instead of {_moments(link.body)}')
+            f'link {link.name}: as {_AS[what]} its centre of mass is '
+            f'{round(away, 6) * 1e3:.3g} mm from that of its <inertial>, and its principal '
+            f'moments are {_moments(said)} kg m^2 instead of {_moments(link.body)}')
 
     def _with_merged(self, link: ChainLink, made: SpatialLink) -> SpatialLink:
         """Return a flexible link with what is fixed to it, at the end that is nearer."""
@@ -272,7 +280,7 @@ class _Overlay:
                 continue
             far = np.linalg.norm(np.subtract(place, link.end)) < np.linalg.norm(place)
             self._notes.append(f'link {name} is fixed to the {"end" if far else "base"} of the '
-                               f'beam {link.name}')
+                               f'{"elements" if made.elements else "beam"} {link.name}')
             moved = place_body(body, -np.array(link.end) if far else np.zeros(3), np.eye(3))
             made = (replace(made, tip_body=join_bodies(made.tip_body, moved)) if far
                     else replace(made, body=join_bodies(made.body, moved)))
@@ -302,16 +310,15 @@ def _limited(motor: Motor, joint: UrdfJoint) -> Motor:
 
 def _inertial(link: SpatialLink) -> SpatialBody:
     """Return a link as one rigid body in its frame, unbent."""
-    assert link.beam is not None
-    rod, turn = link.beam.flexible_body(link.length), link.axes()
+    rod, turn = link.flexible_body(), link.axes()
     center = turn @ (rod.first_moment / rod.mass)
     about = turn @ rod.inertia @ turn.T
     away = float(center @ center) * np.eye(3) - np.outer(center, center)
     own = about - rod.mass * away
-    beam = SpatialBody(mass=rod.mass, center_of_mass=as_point(center),
-                       inertia=as_matrix((own + own.T) / 2))
+    bends = SpatialBody(mass=rod.mass, center_of_mass=as_point(center),
+                        inertia=as_matrix((own + own.T) / 2))
     end = place_body(link.tip_body, np.array(link.end), np.eye(3))
-    return join_bodies(beam, link.body, end)
+    return join_bodies(bends, link.body, end)
 
 
 def _moments(body: SpatialBody) -> str:

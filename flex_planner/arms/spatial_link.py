@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 import math
 
-from flex_planner.arms.element_modes import ElementModes
+from flex_planner.arms.element_modes import ElementModes, turn_body
 from flex_planner.arms.link import MAX_MODES
 from flex_planner.arms.mechanism import FlexibleBody
 from flex_planner.arms.spatial_beam import SpatialBeam
@@ -134,9 +134,10 @@ class SpatialLink:
 
     def axes(self) -> Array:
         """
-        Return the axes of the beam in the frame of the link, columns of a rotation (3, 3).
+        Return the axes of what bends in the frame of the link, columns of a rotation (3, 3).
 
-        The first is along it; the other two are those across which its planes are named.
+        The first is along it; the other two are those across which a beam's planes are named. Of a
+        link of elements they are those that a beam in its place has by default.
 
         Raises
         ------
@@ -144,6 +145,8 @@ class SpatialLink:
             If the beam's `across` is along it.
 
         """
+        if self.elements is not None:
+            return self._axes_of_line(None)
         return np.eye(3) if self.beam is None else self._axes_of_line(self.beam.across)
 
     def _axes_of_line(self, given: Point | None) -> Array:
@@ -184,7 +187,7 @@ class SpatialLink:
     def flexible_body(self) -> FlexibleBody:
         """Return the integrals over what bends, in the axes `axes`."""
         if self.elements is not None:
-            return self.elements.flexible_body()
+            return turn_body(self.elements.flexible_body(), self.axes())
         if self.beam is None:
             raise InvalidValueError('beam', None, 'given: a rigid link does not bend')
         return self.beam.flexible_body(self.length)
@@ -192,15 +195,14 @@ class SpatialLink:
     def shapes(self, shares: Array) -> Array:
         """Return how modes move points at shares (k,) of the link in `axes`, (k, 3, modes)."""
         if self.elements is not None:
-            return self.elements.displace(shares)
+            turned: Array = self.axes().T @ self.elements.displace(shares)
+            return turned
         if self.beam is None:
             return np.zeros((shares.size, 3, 0))
         return self.beam.displace(self.length, shares * self.length)
 
     def bend_shapes(self, shares: Array) -> Array:
         """Return how modes move points at shares (k,) of the length across, (k, 2, modes)."""
-        if self.elements is not None:
-            return (self._axes_of_line(None).T @ self.shapes(shares))[:, 1:]
         return self.shapes(shares)[:, 1:]
 
     def moment_shapes(self, shares: Array) -> Array:

@@ -12,27 +12,32 @@ from dataclasses import replace
 
 from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.progress import StoppedError
+from flex_planner.capacity.bracket import bracket_width
 from flex_planner.capacity.extrapolation import Neighbours
 from flex_planner.capacity.known_starts import plan_near
 from flex_planner.capacity.limit_search import LimitSearch
 from flex_planner.capacity.payload_outcome import describe, with_bound
 from flex_planner.capacity.results import MaxPayload, PayloadFront, PayloadMethod, say_lost_weights
-from flex_planner.capacity.within_limits import carry_within_limits
+from flex_planner.capacity.within_limits import carry_within_limits, is_touched
 from flex_planner.collocation import Solver
 from flex_planner.optimal_control.holding import holding_limit
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import MAX_PAYLOAD
 from flex_planner.optimal_control.totals import integrate_totals
+from flex_planner.planning.bending import find_largest_bending, LARGEST
 from flex_planner.planning.kinds.clusters import MOST_KINDS
 from flex_planner.planning.kinds.effort import SearchEffort
 from flex_planner.planning.kinds.kinds_strategy import as_guess
+from flex_planner.planning.kinds.search import find_kinds
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_problem import INTERRUPTED_STATUS, plan_problem, STOP_STATUS
 from flex_planner.planning.proofs import is_payload_bounded
 from flex_planner.planning.strategies.catalogue import BARRIER, QUICK
 from flex_planner.planning.strategies.extremals import Extremal, SearchStart
 from flex_planner.planning.strategies.free_parameters import PAYLOAD
-from flex_planner.planning.within_model import bound_by_limits
+from flex_planner.planning.strategies.homotopies import drop_weights
+from flex_planner.planning.strategies.limit_barrier import is_beyond_newton, is_cheap
+from flex_planner.planning.within_model import bound_bending, bound_by_limits
 import numpy as np
 
 # of the payload that the motors can just hold, kept clear of rounding
@@ -41,6 +46,8 @@ _HELD = 1 - 1e-9
 _REACHED = 1e-3
 # Newton iterations of a first try with that payload
 _FIRST_TRY = 15
+# kinds of the rigid arm that are lifted
+_LIFTED = 2
 
 
 def search_directly(problem: MotionProblem, solver: Solver, accuracy: float,
@@ -50,8 +57,9 @@ def search_directly(problem: MotionProblem, solver: Solver, accuracy: float,
     search = LimitSearch(PAYLOAD, problem, solver, accuracy, effort)
     try:
         held = None if start is not None else (
-            _hold_at_once(problem, solver) or _carry_the_most(problem, solver))
-        if held is not None and not held.held:
+            _carry_within_model(problem, solver, accuracy, effort)
+            or _hold_at_once(problem, solver) or _carry_the_most(problem, solver))
+        if held is not None and not (held.held or held.within_limits):
             return with_bound(held, problem)
         found = held or _follow(search, problem, solver, start, accuracy)
     except StoppedError as error:
@@ -96,6 +104,51 @@ def _follow(search: LimitSearch, problem: MotionProblem, solver: Solver,
             f'{found.payload:.6g} kg can be carried; {best.value:.6g} kg were found by direct '
             f'collocation on two meshes ({best.sentence}), but not certified'))
     return found
+
+
+def _carry_within_model(problem: MotionProblem, solver: Solver, accuracy: float,
+                        effort: SearchEffort) -> MaxPayload | None:
+    """
+    Return the outcome by the interior-point method alone where an exact one is out of reach.
+
+    Where links bend too far with less than the motors can carry, motions with much more are none
+    of the arm, and hard to find: their weight pulls along the links. Where clamped links ring, the
+    torques of the largest payload switch too often. None where neither is so, or nothing is found.
+
+    """
+    bent, bounded = _bends_too_far(problem), bound_bending(problem)
+    if bounded is None or not (bent or _switches_often(problem, solver, accuracy)):
+        return None
+    starts = effort.starts if effort.explores else 0
+    kinds = find_kinds(drop_weights(bounded), PAYLOAD.unknown, starts, solver)
+    found = carry_within_limits(bounded, solver, accuracy, MaxPayload(
+        task=problem.task, method=PayloadMethod.DIRECT, status=PlanStatus.NOT_FOUND, message='',
+        kinds=tuple(kinds[:MOST_KINDS]), starts=starts), [
+            as_guess(bounded, kind, solver) for kind in kinds[:_LIFTED]])
+    if found is None or found.plan is None or not found.solved:
+        return None
+    return found if not bent or is_touched(found.plan) else None
+
+
+def _switches_often(problem: MotionProblem, solver: Solver, accuracy: float) -> bool:
+    """Return whether Newton's method fails where the barrier leads to the largest payload."""
+    links = [link.mode_shapes() for link in problem.model.arm.links if link.modes]
+    clamped = any(shapes.tip_deflection.any() for shapes in links)
+    if not clamped or not is_cheap(PAYLOAD, problem):
+        return False
+    return is_beyond_newton(PAYLOAD, drop_weights(problem), solver,
+                            lambda value: bracket_width(accuracy, value))
+
+
+def _bends_too_far(problem: MotionProblem) -> bool:
+    """Return whether the links bend further than their model holds by what the motors hold."""
+    limit = holding_limit(problem.model, problem.task, problem.parameters)[0]
+    try:
+        heaviest = PAYLOAD.with_value(problem, min(limit * _HELD, MAX_PAYLOAD))
+    except FlexPlannerError:  # the links give way first
+        return True
+    goal = heaviest.goal[None, :problem.model.arm.n_coordinates]
+    return find_largest_bending(problem.model.arm, goal).share > LARGEST
 
 
 def _hold_at_once(problem: MotionProblem, solver: Solver) -> MaxPayload | None:

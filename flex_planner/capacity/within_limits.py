@@ -10,7 +10,7 @@ shorter and shorter ones, each from the motion before.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
 from flex_planner.base.errors import FlexPlannerError
@@ -24,11 +24,19 @@ from flex_planner.optimal_control.task import MAX_DURATION, Task
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.plan_problem import STOP_STATUS
-from flex_planner.planning.plan_within_limits import plan_from
+from flex_planner.planning.plan_within_limits import (
+    plan_from,
+    plan_from_barrier,
+    plan_smoothly,
+)
 from flex_planner.planning.strategies.free_parameters import FreeParameter, PAYLOAD
 from flex_planner.planning.strategies.homotopies import drop_weights
 from flex_planner.planning.strategies.interior_point import applies
-from flex_planner.planning.strategies.payload_within_limits import reach_largest_payload
+from flex_planner.planning.strategies.payload_within_limits import (
+    reach_largest_payload,
+    refine_limit,
+)
+from flex_planner.planning.strategies.reached_limit import ReachedLimit
 import numpy as np
 
 # shares by which a value is eased from what was reached, until a motion is certified: the first
@@ -36,6 +44,8 @@ import numpy as np
 _EASED = (0.0005, 0.001, 0.003, 0.01, 0.03, 0.1)
 # costates of a payload that is nearly endless in price, as those of a least effort
 _COSTATES = 1e-3
+# slack of a limit that bends a motion, in its scale
+_TOUCHED = 0.01
 # of a motion so near the limit
 _MOST_INTERVALS = 600
 # first durations by that of the free motion, and the most tries
@@ -43,7 +53,8 @@ _LONGER, _MOST_TRIES = (1.05, 1.2, 1.5, 2.0, 4.0), 30
 
 
 def carry_within_limits(problem: MotionProblem, solver: Solver, accuracy: float,
-                        free: MaxPayload) -> MaxPayload | None:
+                        free: MaxPayload, starts: Iterable[CollocationSolution] = (),
+                        ) -> MaxPayload | None:
     """
     Return the largest payload within the limits on the way.
 
@@ -57,6 +68,9 @@ def carry_within_limits(problem: MotionProblem, solver: Solver, accuracy: float,
         To which the limit is wanted [kg].
     free : MaxPayload
         The outcome without them, whose motion leaves them.
+    starts : iterable of CollocationSolution
+        Motions to start from, besides a straight line, where a plan with the payload of the task
+        is not to be waited for.
 
     Returns
     -------
@@ -72,25 +86,40 @@ def carry_within_limits(problem: MotionProblem, solver: Solver, accuracy: float,
     slacks = slacks_of(problem)
     if slacks is None or not applies(problem, solver):
         return None
-    slacks = relieve_ends(problem, slacks)
+    slacks, first, known = relieve_ends(problem, slacks), None, [*starts]
     solver.monitor.phase = 'largest payload within the limits'
-    first = plan_path(problem.task, model=problem.model, solver=solver, search='fast')
-    solver.monitor.check()
-    reached = [found for near in known_motions(first) if (found := reach_largest_payload(
-        drop_weights(problem), slacks, solver, near)) is not None]
-    for payload, gap, motion in sorted(reached, key=lambda one: -one[0]):
-        certified = certify_near(PAYLOAD, problem, payload, motion, accuracy, solver)
-        if certified is None:
-            continue
-        lighter, plan = certified
-        near = payload + gap - lighter <= accuracy
-        return replace(
-            free, status=PlanStatus.SOLVED if near else PlanStatus.NOT_CONVERGED, plan=plan,
-            payload=lighter, local_upper=payload + gap, within_limits=True, message=(
-                f'{lighter:.6g} kg can be carried within the limits on the way, and a motion with '
-                f'more than {lighter:.6g} kg was not certified, though about {payload:.6g} kg '
-                'seem possible'))
-    return carry_more(problem.task, first, solver, accuracy, free) if first.solved else None
+    nears: Iterable[CollocationSolution | None] = (*known, None)
+    if not known:
+        first = plan_path(problem.task, model=problem.model, solver=solver, search='fast')
+        solver.monitor.check()
+        nears = known_motions(first)
+    reached = [found for near in nears if (found := reach_largest_payload(
+        drop_weights(problem), slacks, solver, near, accuracy)) is not None]
+    for one in sorted(reached, key=lambda one: -one.value):
+        certified = certify_reached(PAYLOAD, problem, one, accuracy, solver)
+        if certified is not None:
+            return _conclude(free, *certified, accuracy)
+    if first is None or not first.solved:
+        return None
+    return carry_more(problem.task, first, solver, accuracy, free)
+
+
+def is_touched(plan: Plan) -> bool:
+    """Return whether a limit on the way bends the motion of a plan."""
+    return any(one.slack < _TOUCHED for one in plan.constraints)
+
+
+def _conclude(free: MaxPayload, reached: ReachedLimit, payload: float, plan: Plan,
+              accuracy: float) -> MaxPayload:
+    """Return the outcome with a certified payload near the one that was reached."""
+    upper = reached.value + reached.gap
+    where = ' within the limits on the way' if is_touched(plan) else ''
+    return replace(
+        free, status=(PlanStatus.SOLVED if upper - payload <= accuracy
+                      else PlanStatus.NOT_CONVERGED), plan=plan,
+        payload=payload, local_upper=upper, within_limits=True, message=(
+            f'{payload:.6g} kg can be carried{where}, and a motion with more than '
+            f'{payload:.6g} kg was not certified, though about {upper:.6g} kg seem possible'))
 
 
 def hurry_within_limits(task: Task, solver: Solver, accuracy: float,
@@ -184,6 +213,60 @@ def carry_more(task: Task, plan: Plan, solver: Solver, accuracy: float,
                  f'{failed:.6g} kg was found from there, which does not show that there is none'))
 
 
+def certify_reached(parameter: FreeParameter, problem: MotionProblem, reached: ReachedLimit,
+                    accuracy: float,
+                    solver: Solver) -> tuple[ReachedLimit, float, Plan] | None:
+    """
+    Return what was reached, and that or a value a little easier with its plan; None without.
+
+    Parameters
+    ----------
+    parameter, problem, accuracy, solver
+        As of `certify_near`.
+    reached : ReachedLimit
+        Where the barrier's end is known a plan begins with its slacks and multipliers, on its
+        mesh; where torques switch too often for one, the motion is as the barrier has it.
+
+    Raises
+    ------
+    StoppedError
+        If the monitor stopped it.
+
+    """
+    def plan_at(limit: MotionProblem, slacks: PathSlacks) -> Plan | None:
+        return plan_from_barrier(limit, slacks, reached.lower_price(limit), solver)
+
+    def certify(*shares: float) -> tuple[float, Plan] | None:
+        return certify_eased(parameter, problem, reached.value, plan_at, shares)
+
+    if reached.met is None:
+        found = certify_near(parameter, problem, reached.value, reached.motion, accuracy, solver)
+    else:
+        found = certify(accuracy / (3 * reached.value))
+        smooth = None if found else _certify_smooth(problem, reached, solver)
+        if smooth is not None:
+            return smooth
+        found = found or certify(*_EASED)
+    return None if found is None else (reached, *found)
+
+
+def _certify_smooth(problem: MotionProblem, reached: ReachedLimit,
+                    solver: Solver) -> tuple[ReachedLimit, float, Plan] | None:
+    """Return payload and plan of the motion as the barrier has it on a finer mesh, or None."""
+    slacks = None if problem.layout.torques else slacks_of(problem)
+    if slacks is None:
+        return None
+    finer = refine_limit(drop_weights(problem), relieve_ends(problem, slacks), reached, solver)
+    if finer is None:
+        return None
+
+    def plan_there(limit: MotionProblem, slacks: PathSlacks) -> Plan | None:
+        return plan_smoothly(limit, slacks, finer.unloaded(), solver)
+
+    found = certify_eased(PAYLOAD, problem, finer.value, plan_there, (0.0,))
+    return None if found is None else (finer, *found)
+
+
 def certify_near(parameter: FreeParameter, problem: MotionProblem, value: float,
                  motion: CollocationSolution, accuracy: float,
                  solver: Solver) -> tuple[float, Plan] | None:
@@ -221,24 +304,26 @@ def certify_near(parameter: FreeParameter, problem: MotionProblem, value: float,
         return plan_from(limit, slacks, near.stretched(limit.task.duration / motion.mesh[-1]),
                          quick)
 
-    return certify_eased(parameter, problem, value, plan_at, accuracy)
+    return certify_eased(parameter, problem, value, plan_at, (accuracy / (3 * value), *_EASED))
 
 
 def certify_eased(parameter: FreeParameter, problem: MotionProblem, value: float,
                   plan_at: Callable[[MotionProblem, PathSlacks], Plan | None],
-                  accuracy: float) -> tuple[float, Plan] | None:
+                  shares: Iterable[float]) -> tuple[float, Plan] | None:
     """
     Return the first of some values, easier and easier, with a plan; None without one.
 
     Parameters
     ----------
-    parameter, problem, value, accuracy
+    parameter, problem, value
         As of `certify_near`.
     plan_at : callable
         From the problem with a value and its slacks to a certified plan, or None.
+    shares : iterable of float
+        By which the value is eased, one after the other.
 
     """
-    for share in (accuracy / (3 * value), *_EASED):
+    for share in shares:
         eased = parameter.ease(value, share)
         if parameter is PAYLOAD and eased < problem.task.payload_mass:
             return None

@@ -16,25 +16,20 @@ from dataclasses import replace
 from flex_planner.capacity.results import LimitResult, MaxPayload, MinDuration
 from flex_planner.capacity.within_limits import (
     carry_more,
-    certify_eased,
-    certify_near,
+    certify_reached,
     hurry_within_limits,
     known_motions,
 )
 from flex_planner.collocation import CollocationSolution, Solver
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
-from flex_planner.optimal_control.path_constraints import PathSlacks
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_path import plan_path
-from flex_planner.planning.plan_within_limits import plan_from_barrier
 from flex_planner.planning.smooth_torques import add_torques
 from flex_planner.planning.strategies.free_parameters import DURATION, FreeParameter, PAYLOAD
 from flex_planner.planning.strategies.interior_point import applies
-from flex_planner.planning.strategies.limit_without_jumps import (
-    reach_limit_without_jumps,
-    ReachedLimit,
-)
+from flex_planner.planning.strategies.limit_without_jumps import reach_limit_without_jumps
+from flex_planner.planning.strategies.reached_limit import ReachedLimit
 import numpy as np
 
 # of the shortest duration of torques that may jump, from which a search sets out
@@ -149,22 +144,10 @@ def _certify_best(parameter: FreeParameter, problem: MotionProblem,
     """Return the motion nearest to the limit near which one is certified, and that one."""
     best = sorted(reached, key=lambda one: one.value, reverse=parameter is PAYLOAD)
     for one in best:
-        certified = _certify(parameter, problem, one, solver, accuracy)
+        certified = certify_reached(parameter, problem, one, accuracy, solver)
         if certified is not None:
-            return one, *certified
+            return certified
     return None
-
-
-def _certify(parameter: FreeParameter, problem: MotionProblem, reached: ReachedLimit,
-             solver: Solver, accuracy: float) -> tuple[float, Plan] | None:
-    """Return a value a little easier than what was reached, and its certified plan."""
-    if reached.met is None:
-        return certify_near(parameter, problem, reached.value, reached.motion, accuracy, solver)
-
-    def plan_at(limit: MotionProblem, slacks: PathSlacks) -> Plan | None:
-        return plan_from_barrier(limit, slacks, reached.lower_price(limit), solver)
-
-    return certify_eased(parameter, problem, reached.value, plan_at, accuracy)
 
 
 def _with_known_limits(task: Task, free: LimitResult, plan: Plan) -> Task:

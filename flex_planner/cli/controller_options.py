@@ -1,4 +1,4 @@
-"""Options that say which joint controller a trajectory is for."""
+"""Options that say which joint controller a trajectory is for, and how sure the model is."""
 
 from __future__ import annotations
 
@@ -18,7 +18,9 @@ from flex_planner.control.joint_controller import (
     MIN_RATE,
 )
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
+from flex_planner.planning.feedback.find_gains import RESOLUTION
 from flex_planner.planning.sampling import MAX_PERIOD, SamplingSettings
+from flex_planner.planning.uncertainty import Uncertainty
 
 
 def add_controller(parser: argparse.ArgumentParser) -> None:
@@ -43,6 +45,41 @@ def add_controller(parser: argparse.ArgumentParser) -> None:
     add('--start-hold', type=number_argument, default=0.0, metavar='S',
         help='time before the motion in which the arm is held, so that the controller can lead '
         'it to the start [s] (default: 0)')
+
+
+def add_encoders(parser: argparse.ArgumentParser) -> None:
+    """Add the resolution of the encoders."""
+    parser.add_argument(
+        '--encoder-resolution', type=number_argument, default=RESOLUTION, metavar='RAD',
+        help='of the encoders of the joints [rad] (default: %(default).2g, 16 bits)')
+
+
+def add_errors(parser: argparse.ArgumentParser) -> None:
+    """Add the options of errors that the model may have."""
+    for name, what in (('stiffness', 'stiffness of links'), ('payload', 'payload')):
+        parser.add_argument(
+            f'--{name}-error', type=number_argument, metavar='SHARE',
+            help=f'by which share the {what} may be off, 0 to 0.5 (default: as identified, else '
+            '0.1)')
+
+
+def given_uncertainty(options: argparse.Namespace, known: Uncertainty) -> Uncertainty:
+    """
+    Return the errors that options give, those that are known where they do not.
+
+    Raises
+    ------
+    InvalidValueError
+        If one breaks its bound.
+
+    """
+    given = {name: value for name in ('stiffness', 'payload')
+             if (value := getattr(options, f'{name}_error')) is not None}
+    if not given:
+        return known
+    return replace(known, **given,
+                   payload_mass=None if 'payload' in given else known.payload_mass,
+                   source='as given' if len(given) == 2 else f'in part {known.source}')
 
 
 def sampling_settings(options: argparse.Namespace, arm: Arm) -> SamplingSettings:

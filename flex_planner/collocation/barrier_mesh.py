@@ -85,7 +85,7 @@ def follow_barrier(problem: BarrierProblem, guess: CollocationSolution, y: Array
             if solution.intervals + int(cut.sum()) > most_intervals:
                 return replace(met, converged=False, message=(
                     f'the mesh would need more than {most_intervals} intervals'))
-            solution, y = _cut(problem, solution, y, cut)
+            solution, y = cut_mesh(problem, solution, y, cut)
         if mu <= schedule.last or not met.converged:
             return met
         mu = max(schedule.last, _FALL * mu)
@@ -131,9 +131,23 @@ def _find_cuts(problem: BarrierProblem, met: BarrierOutcome, slacks: Slacks,
     return cuts
 
 
-def _cut(problem: BarrierProblem, solution: CollocationSolution, y: Array,
-         cut: Array) -> tuple[CollocationSolution, Array]:
-    """Return z and y on a mesh with some intervals cut in two."""
+def cut_mesh(problem: BarrierProblem, solution: CollocationSolution, y: Array,
+             cut: Array) -> tuple[CollocationSolution, Array]:
+    """
+    Return z and y on a mesh with some intervals cut in two.
+
+    Parameters
+    ----------
+    problem : BarrierProblem
+        Says which entries of y may have any sign.
+    solution : CollocationSolution
+        On N intervals.
+    y : numpy.ndarray, shape (N, s, n_y)
+        The other unknowns.
+    cut : numpy.ndarray of bool, shape (N,)
+        Which are cut.
+
+    """
     middles = ((solution.mesh[:-1] + solution.mesh[1:]) / 2)[cut]
     finer = solution.on_mesh(np.sort(np.concatenate([solution.mesh, middles])))
     before, after = solution.stage_times().ravel(), finer.stage_times().ravel()

@@ -1,4 +1,4 @@
-"""The extent of points in the plane or in space."""
+"""The extent of points on a line, in the plane or in space."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def peak_to_peak(points: Array) -> float:
 
     Parameters
     ----------
-    points : numpy.ndarray, shape (k, ..., 2 or 3)
+    points : numpy.ndarray, shape (k, ..., 1, 2 or 3)
         Of each moving point k places; the largest of all counts.
 
     Returns
@@ -26,6 +26,8 @@ def peak_to_peak(points: Array) -> float:
         in space 2048 of them, by less than 1 in 500.
 
     """
+    if points.shape[-1] == 1:
+        return float(np.ptp(points, axis=0).max())
     directions = _directions(points.shape[-1])
     blocks = 1 + points.size * len(directions) // _MOST_AT_ONCE
     return max(float(np.ptp(points @ block.T, axis=0).max())

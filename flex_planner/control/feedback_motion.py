@@ -18,7 +18,7 @@ import numpy as np
 _LONGEST_STEP = 1e-3
 # the motion of the tip after an arrival is the same to five digits with smaller ones
 _TOLERANCES = 1e-5, 1e-7
-_TOGETHER, _MOST_STEPS = 256, 64
+_TOGETHER, _MOST_STEPS = 512, 64
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -101,7 +101,7 @@ class FeedbackArm:
         """
         watch, count = monitor or Monitor(), len(course.angles)
         size, n = state.size, self.law.joints
-        law = self.law.padded(size + n).entries
+        law, motors = self.law.padded(size + n).entries, self._motors
         rows = np.full((count + 1, 2 * (size + n)), np.nan)
         rows[0] = 0.0
         rows[0, :size] = state
@@ -110,7 +110,7 @@ class FeedbackArm:
         while first < count and steps <= _MOST_STEPS:
             watch.check()
             last = min(first + max(_TOGETHER // steps, 1), count)
-            found = self._cross(course, rows[first], slice(first, last), law, steps)
+            found = self._cross(course, rows[first], slice(first, last), (law, motors), steps)
             if found is None:
                 steps *= 2
             else:
@@ -119,7 +119,7 @@ class FeedbackArm:
         return FeedbackMotion(states=rows[:, :size],
                               laws=rows[:, size:size + self.law.order], torques=rows[1:, -n:])
 
-    def _cross(self, course: Course, row: Array, periods: slice, law: Array,
+    def _cross(self, course: Course, row: Array, periods: slice, law: tuple[Array, Array],
                steps: int) -> Array | None:
         """Return what follows each of some periods, None if their steps are too long."""
         size = 2 * self.dynamics.arm.n_coordinates
@@ -128,7 +128,7 @@ class FeedbackArm:
         timing[:, 0], timing[::steps, 1] = self.law.period / steps, 1.0
         with np.errstate(over='ignore', invalid='ignore'):
             after, fifth, third = self.dynamics.feedback_steps(
-                row, np.repeat(reference, steps, axis=0), timing, law, self._motors,
+                row, np.repeat(reference, steps, axis=0), timing, *law,
                 self.parameters.physical)
             states = np.vstack([row[:size], after[:, :size]])
             errors = step_errors(states, fifth, third, _TOLERANCES)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from flex_planner.arms.joint_units import units_of
-from flex_planner.arms.kinematics import link_deflections, tip_jacobian
+from flex_planner.arms.kinematics import link_deflections, tip_jacobian, twist_levers
 from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.base.errors import InvalidTaskError, NoEquilibriumError
 from flex_planner.base.validation import Array
@@ -162,10 +162,9 @@ def residual_vibration(dynamics: ArmDynamics, state: Array, rest: Array,
     rate = np.linalg.solve(vectors, np.linalg.solve(mass[:, n:], momenta))
     amplitude = np.hypot(displacement, rate / frequencies)
     twisting = np.abs(vectors[:len(arm.elastic_joints)]) @ amplitude
-    beyond = np.cumsum([link.length for link in reversed(arm.links)])[::-1]
     away = [*(np.abs(link_deflections(arm, link, vectors)) @ amplitude
               for link in range(n) if arm.links[link].modes),
-            twisting * beyond[list(arm.elastic_joints)]]
+            twisting * twist_levers(arm)]
     if isinstance(arm, SpatialArm):
         moved = np.linalg.norm(tip_jacobian(arm, rest)[:, n:] @ vectors, axis=0)
         away.append(np.array([moved @ amplitude]))

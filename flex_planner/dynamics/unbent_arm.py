@@ -9,8 +9,12 @@ Neither gravity nor damping is in it.
 
 from __future__ import annotations
 
-from flex_planner.arms.arm import Arm, Link
-from flex_planner.arms.planar_only import require_planar
+from dataclasses import dataclass
+
+from flex_planner.arms.arm import Arm
+from flex_planner.arms.mechanism import FlexibleBody, Mechanism, RigidBody
+from flex_planner.arms.mechanism_of_arm import mechanism_of
+from flex_planner.arms.spatial_kinematics import LinkFrames, walk_links
 from flex_planner.base.validation import Array
 import numpy as np
 
@@ -25,7 +29,7 @@ def mass_matrix(arm: Arm, positions: Array, payload_mass: float,
     arm : Arm
         n joints, n_t coordinates.
     positions : numpy.ndarray, shape (n,)
-        Joint angles [rad].
+        Joint angles [rad]; ways of joints that slide [m].
     payload_mass, payload_inertia : float
         At the tip [kg, kg m^2].
 
@@ -34,67 +38,88 @@ def mass_matrix(arm: Arm, positions: Array, payload_mass: float,
     numpy.ndarray, shape (n_t, n_t)
         M of eq. (3) at zero modal displacements.
 
-    Raises
-    ------
-    PlanarOnlyError
-        If the arm is a spatial one.
-
     """
-    require_planar(arm, 'estimates of straight arms')
-    n_t = arm.n_coordinates
-    mass: Array = np.zeros((n_t, n_t))
-    base: Array = np.zeros((2, n_t))  # rows over rates: velocity where the link begins
-    turning: Array = np.zeros(n_t)  # rate of its frame
-    slope: Array = np.zeros(n_t)
-    for i, (link, modal) in enumerate(zip(arm.links, arm.modal_slices, strict=True)):
-        mass[i, i] += arm.joints[i].motor.reflected_inertia
-        turning = turning + slope
-        turning[i] += 1
-        if i in arm.elastic_joints:
-            turning[arm.n_joints + arm.elastic_joints.index(i)] += 1
-        angle = positions[:i + 1].sum()
-        along, across = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-        mass += _link_mass(link, modal, base, across @ base, turning)
-        # of a rigid link whose centre of mass is beside its axis
-        aside = link.first_moment[1] * np.outer(along @ base, turning)
-        mass -= aside + aside.T
-        mass += arm.nodes[i].inertia * np.outer(turning, turning)
-        shapes = link.mode_shapes()
-        deflection, slope = np.zeros(n_t), np.zeros(n_t)
-        deflection[modal], slope[modal] = shapes.tip_deflection, shapes.tip_slope
-        base = base + np.outer(across, link.length * turning + deflection)
-        end, spin = arm.end_body(i), turning + slope
-        mass += end.mass * base.T @ base + end.inertia * np.outer(spin, spin)
-    return mass + _payload_mass(arm, positions.sum(), base, turning + slope, payload_mass,
-                                payload_inertia)
+    mechanism, n_t = mechanism_of(arm), arm.n_coordinates
+    mass = np.diag([*(link.rotor for link in mechanism.links), *np.zeros(arm.n_passive)])
+    point = _Point(place=np.zeros(3), velocity=np.zeros((3, n_t)), turning=np.zeros((3, n_t)))
+    unbent = np.concatenate([positions, np.zeros(arm.n_passive)])
+    at = arm.n_joints + len(arm.elastic_joints)
+    for i, frames in enumerate(walk_links(mechanism, unbent)):
+        link, modes = frames.link, slice(at, at + frames.link.beam.count)
+        at = modes.stop
+        point = point.moved_by_joint(frames, _columns(mechanism, i))
+        mass += point.mass(frames.rotation, link.base)
+        mass += point.flexible_mass(frames.rotation, link.beam, modes)
+        point = point.at_tip(frames, modes)
+        mass += point.mass(frames.tip_rotation, link.end)
+    carried = _payload(mechanism, payload_mass, payload_inertia)
+    return mass + point.mass(frames.tip_rotation, carried)
 
 
-def _payload_mass(arm: Arm, angle: float, tip: Array, turning: Array, mass: float,
-                  inertia: float) -> Array:
-    """Return the part of a payload whose centre of mass may be off the tip."""
-    along, across = arm.payload_com
-    c, s = np.cos(angle), np.sin(angle)
-    moves = tip + np.outer([-s * along - c * across, c * along - s * across], turning)
-    part: Array = mass * moves.T @ moves + inertia * np.outer(turning, turning)
-    return part
+def _columns(mechanism: Mechanism, index: int) -> list[int]:
+    """Return the coordinates that move a joint: its own, and its twist."""
+    elastic = mechanism.elastic
+    twist = [len(mechanism.links) + elastic.index(index)] if index in elastic else []
+    return [index, *twist]
 
 
-def _link_mass(link: Link, modal: slice, base: Array, lift: Array, turning: Array) -> Array:
-    """
-    Return the part of one link, eq. (21).
+def _payload(mechanism: Mechanism, mass: float, inertia: float) -> RigidBody:
+    """Return a payload in the frame of the tip."""
+    com = mechanism.payload_com
+    turns = np.zeros(3)
+    turns[list(mechanism.payload_axes)] = inertia
+    spread = com @ com * np.eye(3) - np.outer(com, com)
+    return RigidBody(mass=mass, first_moment=mass * com, inertia=mass * spread + np.diag(turns))
 
-    Rows over the coordinates' rates: `base` and `lift` are the velocity of the link's base, in the
-    plane and across the link, `turning` is the rate of its frame.
 
-    """
-    rho, shapes = link.linear_density, link.mode_shapes()
-    area, moment = np.zeros_like(turning), np.zeros_like(turning)
-    area[modal], moment[modal] = rho * shapes.area, rho * shapes.moment
-    mixed = np.outer(lift, link.first_moment[0] * turning + area) + np.outer(turning, moment)
-    part: Array = (link.mass * base.T @ base + mixed + mixed.T
-                   + link.rotary_inertia * np.outer(turning, turning))
-    part[modal, modal] += rho * shapes.gram
-    return part
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Point:
+    """A point of the arm: what rates of coordinates make of it and its frame, (3, n_t) each."""
+
+    place: Array
+    velocity: Array
+    turning: Array
+
+    def moved_to(self, place: Array) -> _Point:
+        """Return another point of the same body."""
+        carried = np.cross(self.turning, place - self.place, axis=0)
+        return _Point(place=place, velocity=self.velocity + carried, turning=self.turning)
+
+    def moved_by_joint(self, frames: LinkFrames, columns: list[int]) -> _Point:
+        """Return the origin of a link, which its joint moves."""
+        at = self.moved_to(frames.joint_position).moved_to(frames.position)
+        part = at.velocity if frames.link.slides else at.turning
+        part = part.copy()
+        part[:, columns] += frames.axis[:, None]
+        if frames.link.slides:
+            return _Point(place=at.place, velocity=part, turning=at.turning)
+        return _Point(place=at.place, velocity=at.velocity, turning=part)
+
+    def at_tip(self, frames: LinkFrames, modes: slice) -> _Point:
+        """Return the end of a link, which its modes move."""
+        beam, at = frames.link.beam, self.moved_to(frames.tip_position)
+        velocity, turning = at.velocity.copy(), at.turning.copy()
+        velocity[:, modes] += frames.rotation @ beam.tip_displacement
+        turning[:, modes] += frames.rotation @ beam.tip_turn
+        return _Point(place=at.place, velocity=velocity, turning=turning)
+
+    def mass(self, axes: Array, body: RigidBody | FlexibleBody) -> Array:
+        """Return the part of a body whose frame is here, with axes (3, 3), unbent."""
+        velocity, turning = axes.T @ self.velocity, axes.T @ self.turning
+        mixed = velocity.T @ np.cross(turning, body.first_moment, axis=0)
+        part: Array = (body.mass * velocity.T @ velocity + mixed + mixed.T
+                       + turning.T @ body.inertia @ turning)
+        return part
+
+    def flexible_mass(self, axes: Array, body: FlexibleBody, modes: slice) -> Array:
+        """Return the part of a link that bends."""
+        part = self.mass(axes, body)
+        coupled = (self.velocity.T @ axes @ body.displacement
+                   + self.turning.T @ axes @ body.moment)
+        part[:, modes] += coupled
+        part[modes] += coupled.T
+        part[modes, modes] += body.gram
+        return part
 
 
 def bending_stiffness(arm: Arm) -> Array:
@@ -103,9 +128,10 @@ def bending_stiffness(arm: Arm) -> Array:
     for place, i in enumerate(arm.elastic_joints, arm.n_joints):
         elasticity = arm.joints[i].elasticity
         stiffness[place, place] = elasticity.stiffness if elasticity else 0.0
-    for link, modal in zip(arm.links, arm.modal_slices, strict=True):
+    for link, made, modal in zip(arm.links, mechanism_of(arm).links, arm.modal_slices,
+                                 strict=True):
         if link.modes:
-            stiffness[modal, modal] = link.flexural_rigidity * link.mode_shapes().stiffness
+            stiffness[modal, modal] = link.flexural_rigidity * made.beam.stiffness
     return stiffness
 
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from flex_planner.base.validation import number
 from flex_planner.control.joint_controller import EffortHold, Gains, MAX_RATE, MIN_RATE
-from flex_planner.identification.loop_model import DriveLaw
 from flex_planner.identification.loop_sizes import LAGS
+from flex_planner.identification.simulated_log import DriveLaw
 import numpy as np
 
 

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from flex_planner.arms.arm import Arm
-from flex_planner.arms.planar_only import require_planar
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import integer, number
 from flex_planner.control.joint_reference import JointReference
@@ -23,6 +22,7 @@ from flex_planner.identification.identification import WEAK_SHARE
 from flex_planner.identification.joint_log import JointLog
 from flex_planner.identification.loop_model import LoopModel
 from flex_planner.identification.plant_parameters import (
+    check_identifiable,
     free_parameters,
     list_parameters,
     Parameter,
@@ -92,15 +92,13 @@ def predict_identification(arm: Arm, references: Sequence[JointReference], drive
 
     Raises
     ------
-    PlanarOnlyError
-        If the arm is a spatial one.
     InvalidValueError
-        If a value breaks its bound.
+        If a value breaks its bound, or a joint slides.
     StoppedError
         If the monitor stopped it.
 
     """
-    require_planar(arm, 'identification')
+    check_identifiable(arm)
     integer('number of motions', len(references), at_least=1, at_most=_MOST_MOTIONS)
     mass = number('payload_mass', payload_mass, at_least=0, at_most=MAX_PAYLOAD, unit='kg')
     number('settling', settling, at_least=0, at_most=60, unit='s')

@@ -17,8 +17,9 @@ from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.validation import Array
 from flex_planner.identification.drive import Drive
 from flex_planner.identification.joint_log import JointLog
-from flex_planner.identification.loop_model import DriveLaw, LoopModel, SimulatedLog
+from flex_planner.identification.loop_model import LoopModel
 from flex_planner.identification.loop_sizes import LAGS
+from flex_planner.identification.simulated_log import DriveLaw, SimulatedLog
 import numpy as np
 
 LEAST_TORQUE_RATE = 400.0
@@ -76,6 +77,8 @@ class Experiment:
         By how much later than the log says the motion is taken to begin [s].
     start_error : float
         By how much it may have begun earlier or later than that [s].
+    moves : bool
+        Whether the arm is not taken to be at rest when it begins.
 
     """
 
@@ -89,12 +92,14 @@ class Experiment:
     noise: Array
     late: float = 0.0
     start_error: float = 0.0
+    moves: bool = False
 
     def errors(self, simulated: SimulatedLog, late: float = 0.0) -> tuple[Array, Array]:
         """
         Return errors over the noise, (m, n), and their derivatives, (m, n, columns + 1).
 
-        The last derivative is by the time `late` by which the motion began later [s].
+        Columns are those of the simulation; the last derivative is by the time `late` by which the
+        motion began later [s].
 
         """
         if self.method is Method.INPUT_ERROR:

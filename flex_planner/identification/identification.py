@@ -34,6 +34,7 @@ class Finding(Enum):
     AT_BOUND = 'at_bound'
     NOT_CONVERGED = 'not_converged'
     FRICTION = 'angles_do_not_fit'
+    BEGAN_IN_MOTION = 'began_in_motion'
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

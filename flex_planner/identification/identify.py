@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from flex_planner.arms.arm import Arm
-from flex_planner.arms.planar_only import require_planar
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array, integer, number
@@ -27,7 +26,14 @@ from flex_planner.identification.experiments import (
     LogError,
     Method,
 )
-from flex_planner.identification.fit import COARSE, Fit, fit_parameters, judge_parameters
+from flex_planner.identification.fit import (
+    COARSE,
+    Fit,
+    fit_parameters,
+    judge_parameters,
+    MOST_RMS,
+    TOLERANCE,
+)
 from flex_planner.identification.identification import (
     Estimate,
     Finding,
@@ -37,7 +43,9 @@ from flex_planner.identification.identification import (
 )
 from flex_planner.identification.joint_log import JointLog
 from flex_planner.identification.loop_model import LoopModel
+from flex_planner.identification.moving_starts import find_moving_starts
 from flex_planner.identification.plant_parameters import (
+    check_identifiable,
     free_parameters,
     list_parameters,
     parameters_of,
@@ -47,13 +55,13 @@ from flex_planner.optimal_control.task import MAX_PAYLOAD
 import numpy as np
 
 MOST_LOGS = 20
-# rms of the errors over the noise, beyond which the model is not the plant
-MOST_RMS = 2.0
 # of the angles that torques explain, below which friction or something else is another [%]
 LEAST_FIT = 95.0
 _MODES_MATTER, _AT_BOUND, _NO_WORSE = 0.02, 1e-6, 1.02
 # of the squared errors with more modes, for the values to be those
 _MUCH_BETTER = 0.5
+# one log that began in motion makes others look so until it is taken for that
+_MOST_REFITS = 2
 ALL = frozenset(Quantity)
 
 
@@ -86,17 +94,15 @@ def identify(arm: Arm, logs: Sequence[JointLog], *, payload_mass: float = 0.0,
 
     Raises
     ------
-    PlanarOnlyError
-        If the arm is a spatial one.
     InvalidValueError
-        If a value breaks its bound, or a log is of another arm.
+        If a value breaks its bound, a joint slides, or a log is of another arm.
     LogError
         If a log does not say what its method needs.
     StoppedError
         If the monitor stopped it.
 
     """
-    require_planar(arm, 'identification')
+    check_identifiable(arm)
     monitor = monitor or Monitor()
     integer('number of logs', len(logs), at_least=1, at_most=MOST_LOGS)
     mass = number('payload_mass', payload_mass, at_least=0, at_most=MAX_PAYLOAD, unit='kg')
@@ -109,6 +115,7 @@ def identify(arm: Arm, logs: Sequence[JointLog], *, payload_mass: float = 0.0,
     search = _Search(arm, logs, drive, inertia, free, monitor)
     start = parameters_of(arm, mass, drive.delay if drive else 0.0)
     used, experiments, fit = search.choose(start, method)
+    experiments, fit = search.settle(search.model, experiments, fit)
     richer = search.fit_richer(used, fit, more_modes)
     single = tuple(fit_parameters(search.model, [one], fit.values, fit.free, monitor,
                                   tolerance=COARSE)
@@ -178,6 +185,18 @@ class _Search:
             return Method.OUTPUT_ERROR, *better
         return Method.INPUT_ERROR, experiments, fit
 
+    def settle(self, model: LoopModel, experiments: list[Experiment], fit: Fit, *,
+               tolerance: float = TOLERANCE) -> tuple[list[Experiment], Fit]:
+        """Return a fit in which the state at the start of logs that began in motion is free."""
+        for _ in range(_MOST_REFITS):
+            moving = find_moving_starts(model, experiments, fit, self.monitor)
+            if moving == fit.moving:
+                break
+            experiments = [replace(one, moves=i in moving) for i, one in enumerate(experiments)]
+            fit = fit_parameters(model, experiments, fit.values, fit.free, self.monitor,
+                                 tolerance=tolerance)
+        return experiments, fit
+
     def fit_richer(self, method: Method, fit: Fit, more: int) -> Fit | None:
         """Return a fit with more modes; None where there are none."""
         links = tuple(link.with_more_modes(more) if link.modes else link
@@ -187,8 +206,9 @@ class _Search:
             return None
         model = LoopModel(self.richer, self.inertia)
         experiments = self.experiments(method, fit.values)
-        return fit_parameters(model, experiments, fit.values, fit.free, self.monitor,
-                              tolerance=COARSE)
+        richer = fit_parameters(model, experiments, fit.values, fit.free, self.monitor,
+                                tolerance=COARSE)
+        return self.settle(model, experiments, richer, tolerance=COARSE)[1]
 
     def judge(self, experiments: Sequence[Experiment], single: Sequence[Fit]) -> Array:
         """Return how much of each log fits to the others explain, at least."""
@@ -219,7 +239,7 @@ def _estimates(arm: Arm, start: Array, fit: Fit, others: Sequence[Fit], *,
 def _warnings(search: _Search, used: Method, fit: Fit, richer: Fit | None, best: Fit,
               single: Sequence[Fit], wanted: Method | None) -> list[Warned]:
     """Return what is to be known before the values are used."""
-    found = _misfit(best)
+    found = [*_misfit(best), *_moving(search, best)]
     if used is Method.INPUT_ERROR and wanted is None:
         found.append(Warned(code=Finding.FRICTION, text=(
             f'the torques explain less than {LEAST_FIT:g} % of the angles, so what the model must '
@@ -253,6 +273,14 @@ def _misfit(best: Fit) -> list[Warned]:
             f'the model explains only {best.fit_percent.min():.3g} % of a joint: intervals are '
             'withheld. Look for friction, cogging or elasticity that the arm file cannot say'))]
     return []
+
+
+def _moving(search: _Search, best: Fit) -> list[Warned]:
+    """Return which logs began in motion."""
+    names = [search.logs[i].name for i in best.moving]
+    return [Warned(code=Finding.BEGAN_IN_MOTION, text=(
+        f'{", ".join(names)}: the arm still moved when the motion began. How it did was found, '
+        'too, which makes intervals wider; wait longer before a motion'))] if names else []
 
 
 def _modes(search: _Search, fit: Fit, richer: Fit, best: Fit) -> list[Warned]:

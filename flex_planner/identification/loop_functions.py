@@ -15,10 +15,11 @@ from typing import Any
 
 import casadi as ca
 from flex_planner.arms.arm import Arm
-from flex_planner.arms.mechanism import planar_beam
+from flex_planner.arms.mechanism_of_arm import mechanism_of
 from flex_planner.dynamics.build_chain import build_chain
 from flex_planner.dynamics.dynamics_functions import batch, BatchedFunction, solver_of
 from flex_planner.identification.loop_sizes import LAGS, LoopSizes
+from flex_planner.identification.plant_parameters import with_damping
 import numpy as np
 
 
@@ -50,8 +51,8 @@ def build_loop_functions(arm: Arm, sizes: LoopSizes) -> dict[str, BatchedFunctio
 def _linear_rate(arm: Arm, sizes: LoopSizes) -> tuple[BatchedFunction, BatchedFunction]:
     """Return q'' with its derivatives, and the forces at rest with theirs."""
     n, n_t = sizes.joints, sizes.coordinates
-    still = replace(arm, links=tuple(replace(link, damping_ratio=0.0) for link in arm.links))
-    chain = build_chain(still)
+    links: Any = tuple(with_damping(link, [0.0]) if link.modes else link for link in arm.links)
+    chain = build_chain(replace(arm, links=links))
     q, rates, a = chain.coordinates, chain.rates, chain.accelerations
     p, constants = ca.SX.sym('p', sizes.physical), ca.SX.sym('k', 1 + n)
     mass, *groups = ca.vertsplit(p, [0, *range(1, sizes.physical + 1, n)])
@@ -87,11 +88,11 @@ def _linear_rate(arm: Arm, sizes: LoopSizes) -> tuple[BatchedFunction, BatchedFu
 def _losses(arm: Arm, rates: Any, rigidity: Any, damping: Any) -> Any:
     """Return the damping of twists and modes, of which a chain without ratios has the twists'."""
     losses = [ca.SX(1, 1) for _ in arm.elastic_joints]
-    for i, (link, place) in enumerate(zip(arm.links, arm.modal_slices, strict=True)):
+    links = mechanism_of(arm).links
+    for i, (link, place) in enumerate(zip(links, arm.modal_slices, strict=True)):
         # a bare arm has half the weights as ratios: this is the weight times sqrt(k rho m)
         losses += [2 * damping[i] * float(c) * ca.sqrt(rigidity[i]) * rates[k]
-                   for c, k in zip(planar_beam(link).damping,
-                                   range(place.start, place.stop), strict=True)]
+                   for c, k in zip(link.beam.damping, range(place.start, place.stop), strict=True)]
     return ca.vertcat(*losses)
 
 

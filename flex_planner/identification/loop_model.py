@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from flex_planner.arms.arm import Arm
@@ -13,7 +13,12 @@ from flex_planner.base.validation import Array
 from flex_planner.dynamics.cache_key import cache_key
 from flex_planner.dynamics.compiled_functions import load_functions
 from flex_planner.identification.loop_sizes import LAGS, LoopSizes
-from flex_planner.identification.plant_parameters import mode_weights
+from flex_planner.identification.plant_parameters import (
+    mode_weights,
+    with_damping,
+    with_rigidity,
+)
+from flex_planner.identification.simulated_log import DriveLaw, SimulatedLog
 import numpy as np
 
 # rows that are computed before what nobody needs of them is thrown away
@@ -21,61 +26,6 @@ _BLOCK = 4096
 # of a step and the fastest motion: the method is stable up to 2.8
 _STEP_ANGLE = 1.0
 _MOST_ITERATIONS = 50
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class DriveLaw:
-    """
-    How torques follow from samples, as numbers.
-
-    Attributes
-    ----------
-    period : float
-        Of the samples [s].
-    stiffness, damping : numpy.ndarray, shape (n,)
-        Of the drive's PD, whose torque is late by the delay [N m/rad], [N m s/rad].
-    guide_stiffness, guide_damping : numpy.ndarray, shape (n,)
-        Of a PD that is not there: it keeps the model near the log, at once.
-    keeps : float
-        Share of the last filtered speed that the next one keeps.
-    measured : bool
-        Whether speeds are measured; else they are filtered differences of angles.
-
-    """
-
-    period: float
-    stiffness: Array
-    damping: Array
-    guide_stiffness: Array
-    guide_damping: Array
-    keeps: float = 0.0
-    measured: bool = False
-
-    @property
-    def vector(self) -> Array:
-        """Return them as the compiled functions take them."""
-        return np.concatenate([self.stiffness, self.damping, self.guide_stiffness,
-                               self.guide_damping, [self.keeps, self.measured, self.period]])
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class SimulatedLog:
-    """
-    A simulated log at the samples of the drive.
-
-    Attributes
-    ----------
-    angles, guide : numpy.ndarray, shape (k, n)
-        As encoders say them [rad], and the torque of the guide [N m].
-    angle_slopes, guide_slopes : numpy.ndarray, shape (k, n, m)
-        Derivatives by the parameters, as `list_parameters` has them, and the start angles.
-
-    """
-
-    angles: Array
-    guide: Array
-    angle_slopes: Array
-    guide_slopes: Array
 
 
 def bare_arm(arm: Arm) -> Arm:
@@ -86,9 +36,9 @@ def bare_arm(arm: Arm) -> Arm:
     without which they would not be valid.
 
     """
-    links = tuple(replace(link, damping_ratio=tuple(w / 2 for w in mode_weights(link)) or 0.0,
-                          flexural_rigidity=1.0 if link.modes else link.flexural_rigidity)
-                  for link in arm.links)
+    links: Any = tuple(
+        with_damping(with_rigidity(link, 1.0), [weight / 2 for weight in mode_weights(link)])
+        if link.modes else link for link in arm.links)
     joints = tuple(replace(
         joint, motor=Motor(rotor_inertia=1.0 if joint.is_elastic else 0.0),
         viscous_friction=0.0, coulomb_friction=1.0, coulomb_speed=1.0) for joint in arm.joints)
@@ -189,9 +139,9 @@ class LoopModel:
         return np.concatenate([q, np.zeros_like(q)]), slope
 
     def simulate(self, start: Array, followed: Array, law: DriveLaw, values: Array,
-                 parts: int) -> SimulatedLog:
+                 parts: int, away: Array | None = None) -> SimulatedLog:
         """
-        Return the motion from rest at a start, with its derivatives.
+        Return the motion from a start, with its derivatives.
 
         Parameters
         ----------
@@ -206,17 +156,52 @@ class LoopModel:
             The parameters, as `list_parameters` has them.
         parts : int
             Steps for each of the two parts that the delay divides a period into.
+        away : numpy.ndarray, shape (2 n_t - n,), optional
+            By how much passive coordinates and all rates differ from rest at the start.
 
         """
-        sizes = self.sizes
-        rows = schedule_steps(followed, law.period, values[-1], parts, sizes)
+        rows = schedule_steps(followed, law.period, values[-1], parts, self.sizes)
         per_sample = len(rows) // len(followed)
+        z, dz = self._begin(start, values)
+        if away is None:
+            return self._run(z, dz, rows, per_sample, law, values)
+        apart = self._apart(law.period)
+        z += apart @ away
+        plain = self._run(z, dz, rows, per_sample, law, values)
+        # derivatives are affine in those at the start, so what columns add there they add later
+        added = []
+        for block in np.split(apart, range(dz.shape[1], apart.shape[1], dz.shape[1]), axis=1):
+            width = block.shape[1]
+            other = self._run(z, dz + np.pad(block, ((0, 0), (0, dz.shape[1] - width))), rows,
+                              per_sample, law, values)
+            added.append(other.minus(plain, width))
+        return plain.beside(added)
+
+    def _begin(self, start: Array, values: Array) -> tuple[Array, Array]:
+        """Return arm and drive at rest at a start, (state,), with derivatives (state, columns)."""
+        sizes = self.sizes
         x, slope = self._at_rest(start, values)
         z, dz = np.zeros(sizes.state), np.zeros((sizes.state, sizes.columns))
         z[:x.size], dz[:x.size] = x, slope
         n, offsets = sizes.joints, slice(sizes.physical, sizes.physical + sizes.joints)
         z[sizes.angles] = start + values[offsets]
         dz[sizes.angles, offsets] = dz[sizes.angles, -n:] = np.eye(n)
+        return z, dz
+
+    def _apart(self, period: float) -> Array:
+        """Return how arm and drive differ from rest if the arm does, (state, 2 n_t - n)."""
+        sizes, n, n_t = self.sizes, self.sizes.joints, self.sizes.coordinates
+        apart = np.eye(sizes.state)[:, n:2 * n_t]
+        speeds = slice(n_t - n, n_t)
+        # the drive has seen the joints move before
+        apart[2 * n_t:2 * n_t + n, speeds] = np.eye(n)
+        apart[sizes.angles, speeds] = -period * np.eye(n)
+        return apart
+
+    def _run(self, z: Array, dz: Array, rows: Array, per_sample: int, law: DriveLaw,
+             values: Array) -> SimulatedLog:
+        """Return the motion from a state of arm and drive."""
+        sizes = self.sizes
         shared = np.concatenate([values[:-1], self._constants])
         state, kept = np.concatenate([z, dz.T.ravel()]), []
         for begin in range(0, len(rows), _BLOCK * per_sample):

@@ -5,12 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from typing import Any
 
 from flex_planner.arms.arm import Arm, Joint, Link
+from flex_planner.arms.spatial_arm import SpatialArm
+from flex_planner.arms.spatial_joint import slides
+from flex_planner.arms.spatial_link import SpatialLink
 from flex_planner.base.errors import InvalidValueError
 from flex_planner.base.suggestions import one_of
 from flex_planner.base.validation import Array
 import numpy as np
+
+# of the sine of the angle between an axis and gravity
+_ALONG = 1e-9
 
 
 class Quantity(Enum):
@@ -106,7 +113,23 @@ def parameters_of(arm: Arm, payload_mass: float, delay: float = 0.0) -> Array:
         np.zeros(arm.n_joints), [delay]])
 
 
-def mode_weights(link: Link) -> tuple[float, ...]:
+def check_identifiable(arm: Arm) -> None:
+    """
+    Refuse an arm whose parameters cannot be found.
+
+    Raises
+    ------
+    InvalidValueError
+        If one of its joints slides: parameters are those of joints that turn.
+
+    """
+    for i, joint in enumerate(arm.joints):
+        if slides(joint):
+            raise InvalidValueError(f'joints[{i}]', 'one that slides', 'one that turns, for its '
+                                    'parameters to be identified')
+
+
+def mode_weights(link: Link | SpatialLink) -> tuple[float, ...]:
     """Return the damping ratio of each mode over the largest one."""
     ratios = link.damping_ratios
     largest = ratios.max(initial=0.0)
@@ -117,17 +140,47 @@ def free_parameters(arm: Arm, kinds: frozenset[Quantity]) -> list[int]:
     """
     Return which parameters of some kinds an arm lets be found, as indices of the vector.
 
-    Without gravity an offset of the first joint turns the whole arm, which no log can tell.
+    An offset of the first joint turns the whole arm, which no log can tell without gravity, nor
+    where the joint turns about it.
 
     """
     chosen = []
     for place, one in enumerate(list_parameters(arm.n_joints)):
         bends = arm.links[one.index].modes > 0
         needs_modes = one.kind in (Quantity.RIGIDITY, Quantity.DAMPING)
-        unseen = (one.kind is Quantity.OFFSET and one.index == 0 and not arm.gravity.any())
+        unseen = one.kind is Quantity.OFFSET and one.index == 0 and _turns_unseen(arm)
         if one.kind in kinds and not unseen and (bends or not needs_modes):
             chosen.append(place)
     return chosen
+
+
+def _turns_unseen(arm: Arm) -> bool:
+    """Return whether the weight of an arm does not feel its first joint turn."""
+    if not isinstance(arm, SpatialArm):
+        return not arm.gravity.any()
+    first = arm.joints[0]
+    axis = np.array(first.rotation) @ np.array(first.axis)
+    across = np.linalg.norm(np.cross(axis, arm.gravity))
+    return bool(across <= _ALONG * np.linalg.norm(arm.gravity))
+
+
+def with_damping(link: Link | SpatialLink, ratios: Sequence[float]) -> Link | SpatialLink:
+    """Return a link that bends with other damping ratios (modes,), in space all the same."""
+    largest = float(max(ratios))
+    if not isinstance(link, SpatialLink):
+        even = len(set(ratios)) == 1
+        return replace(link, damping_ratio=largest if even else tuple(map(float, ratios)))
+    if link.elements is not None:
+        return replace(link, elements=replace(link.elements, damping_ratio=largest))
+    assert link.beam is not None
+    return replace(link, beam=replace(link.beam, damping_ratio=largest))
+
+
+def with_rigidity(link: Link | SpatialLink, rigidity: float) -> Link | SpatialLink:
+    """Return a link that bends with another E I; all of a beam's in space keep their ratio."""
+    if isinstance(link, SpatialLink):
+        return link.with_rigidity(rigidity / link.flexural_rigidity)
+    return replace(link, flexural_rigidity=rigidity)
 
 
 def arm_with(arm: Arm, values: Sequence[float] | Array) -> Arm:
@@ -138,19 +191,17 @@ def arm_with(arm: Arm, values: Sequence[float] | Array) -> Arm:
 
     """
     table = np.asarray(values, dtype=float)[1:-1].reshape(6, arm.n_joints).T
-    links = tuple(_link(link, *row[:2]) for link, row in zip(arm.links, table, strict=True))
+    links: Any = tuple(_link(link, *row[:2]) for link, row in zip(arm.links, table, strict=True))
     joints = tuple(_joint(joint, *row[2:5]) for joint, row in zip(arm.joints, table, strict=True))
     return replace(arm, links=links, joints=joints)
 
 
-def _link(link: Link, rigidity: float, damping: float) -> Link:
+def _link(link: Link | SpatialLink, rigidity: float, damping: float) -> Link | SpatialLink:
     """Return a link with other values; a rigid one stays."""
     if not link.modes:
         return link
-    weights = mode_weights(link)
-    even = len(set(weights)) == 1
-    return replace(link, flexural_rigidity=float(rigidity), damping_ratio=(
-        float(damping) if even else tuple(float(damping * weight) for weight in weights)))
+    ratios = [float(damping * weight) for weight in mode_weights(link)]
+    return with_damping(with_rigidity(link, float(rigidity)), ratios)
 
 
 def _joint(joint: Joint, viscous: float, coulomb: float, rotor: float) -> Joint:

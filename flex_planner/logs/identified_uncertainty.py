@@ -96,7 +96,7 @@ def _share(entry: dict[str, Any]) -> float:
 
 def _check(path: Path, arm: Arm, one: Parameter, entry: dict[str, Any]) -> None:
     """Raise LogError if a rigidity of the arm is not the one that was found."""
-    found, has = float(entry['value']), arm.links[one.index].flexural_rigidity
+    found, has = float(entry['value']), float(arm.flexural_rigidities()[one.index])
     if abs(found - has) > _SAME * found:
         raise LogError(f'{say_file(path)} is of another arm: {one.name} was found to be '
                        f'{found:g} {one.unit}, but the arm file says {has:g}; identify again, '

@@ -11,7 +11,6 @@ import os
 from pathlib import Path
 
 from flex_planner.arms.arm import Arm, Joint
-from flex_planner.arms.planar_only import require_planar
 from flex_planner.base.errors import (
     FlexPlannerError,
     InvalidValueError,
@@ -96,8 +95,6 @@ class Study:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, 'name', printable(self.name, LONGEST_NAME))
-        if self.quantity is Quantity.RESIDUAL_VIBRATION:
-            require_planar(self.arm, 'maps of residual vibrations')
         check_motors(self.quantity, self.arm)
         check_axes(self.quantity, self.arm, self.axes)
         check_limit_axis(self.motion.limits, self.axes)

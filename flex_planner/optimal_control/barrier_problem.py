@@ -6,10 +6,11 @@ from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationSolution
 from flex_planner.optimal_control.free_payload import FreePayloadProblem
 from flex_planner.optimal_control.motion_problem import MotionProblem
+from flex_planner.optimal_control.torque_limits import TorqueLimits
 import numpy as np
 
-# stands for a limit that there is none of
-_ENDLESS = 1e30
+ENDLESS = 1e30
+"""Stands for a limit that there is none of."""
 # of its limits, within which a first torque stays
 _INSIDE = 0.9
 # a payload keeps this share of itself in a step, and changes by no more than this of the links
@@ -69,7 +70,7 @@ class MotionBarrier(BarrierOfMotion):
     def __init__(self, motion: MotionProblem) -> None:
         super().__init__(motion)
         self.free = motion.model.arm.n_joints
-        self._p = np.where(np.isfinite(motion.p), motion.p, _ENDLESS)
+        self._p = np.where(np.isfinite(motion.p), motion.p, ENDLESS)
 
     @property
     def cost_rate(self) -> float:
@@ -114,20 +115,12 @@ class MotionBarrier(BarrierOfMotion):
     def _centre(self, z: Array, mu: float) -> Array:
         n_t, n = self.motion.model.arm.n_coordinates, self.motion.model.arm.n_joints
         limits, speeds = self.motion.parameters.torque_limits, z[:, n_t:n_t + n]
-        lower, upper = (np.clip(each, -_ENDLESS, _ENDLESS) for each in limits.bounds(speeds))
+        lower, upper = (np.clip(each, -ENDLESS, ENDLESS) for each in limits.bounds(speeds))
         middle, half = (lower + upper) / 2, _INSIDE * (upper - lower) / 2
         free = self.motion.model.controls(z, self.motion.p).free_torque
         torque = middle + np.clip(free - middle, -half, half)
-        slacks = self._find_slacks(z, torque)
+        slacks = find_slacks(limits, torque, speeds)
         return np.hstack([torque, slacks, mu / slacks])
-
-    def _find_slacks(self, z: Array, torque: Array) -> Array:
-        """Return what the limits leave for torques (k, n) at points (k, 4 n_t)."""
-        n_t, limits = self.motion.model.arm.n_coordinates, self.motion.parameters.torque_limits
-        margins = limits.margins(torque, z[:, n_t:n_t + self.free])
-        if not limits.capped.any():
-            margins = margins[:2]
-        return np.hstack([np.where(np.isfinite(each), each, _ENDLESS) for each in margins])
 
 
 class PayloadBarrier(MotionBarrier):
@@ -199,6 +192,14 @@ class PayloadBarrier(MotionBarrier):
     def restrict(self, solution: CollocationSolution) -> tuple[float, CollocationSolution]:
         """Return the payload, and the motion with it."""
         return self.payload.restrict(solution)
+
+
+def find_slacks(limits: TorqueLimits, torque: Array, speeds: Array) -> Array:
+    """Return what the limits leave for torques at joint speeds (k, n), shape (k, 2 n or 4 n)."""
+    margins = limits.margins(torque, speeds)
+    if not limits.capped.any():
+        margins = margins[:2]
+    return np.hstack([np.where(np.isfinite(each), each, ENDLESS) for each in margins])
 
 
 def payload_step(motion: MotionProblem, payload: float, change: float) -> float:

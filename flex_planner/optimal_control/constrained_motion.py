@@ -15,6 +15,7 @@ from flex_planner.collocation.problem import CompiledRate
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.path_constraints import limits_of_arm, PathSlacks
 from flex_planner.optimal_control.path_constraints.path_constraint import PathConstraint
+from flex_planner.optimal_control.smoothed_torque import smooth_torques, SmoothedTorque
 from flex_planner.optimal_control.smoothed_torque_state import (
     smooth_rates,
     SmoothedTorqueState,
@@ -43,16 +44,20 @@ class ConstrainedMotion(MotionProblem):
     floor : numpy.ndarray, shape (n_c,), optional
         Slacks below which multipliers grow no more than linearly, > 0: an iterate may be there, a
         solution is not. Without it F is undefined where a slack is not positive.
+    smooth : bool
+        Whether the motors' limits have the barrier, too, see `SmoothedTorque`.
 
     """
 
     def __init__(self, motion: MotionProblem, slacks: PathSlacks, mu: float,
-                 floor: Array | None = None) -> None:
+                 floor: Array | None = None, *, smooth: bool = False) -> None:
         super().__init__(motion.model, motion.task, motion.parameters,
                          via_times=motion.junctions if motion.junctions.size else None,
                          ends=motion.ends)
-        self.slacks, self.mu = slacks, mu
+        self.slacks, self.mu, self.smooth = slacks, mu, smooth
         self.conditions = smooth_rates(self.conditions, mu)
+        if smooth:
+            self.conditions = smooth_torques(self.conditions, self.parameters, mu)
         self.floor: Array = np.zeros(slacks.count) if floor is None else floor
 
     def rate(self, t: Array, z: Array) -> Array:
@@ -85,13 +90,15 @@ class ConstrainedMotion(MotionProblem):
             kept, share = np.maximum(slacks, self.floor), np.maximum(1 - slacks / self.floor, 0.0)
             beyond = np.where(slacks < self.floor, share + share**2 / 2, 0.0)
             rate: Array = self.mu * (beyond - np.log(kept)).sum(axis=1)
-        if isinstance(self.conditions, SmoothedTorqueState):
+        if isinstance(self.conditions, SmoothedTorqueState | SmoothedTorque):
             rate += self.conditions.barrier_rate(z)
         return rate
 
     @property
     def terms(self) -> int:
         """Return how many logarithms the barrier has."""
+        if isinstance(self.conditions, SmoothedTorque):
+            return self.slacks.count + self.conditions.terms
         smoothed = isinstance(self.conditions, SmoothedTorqueState)
         return self.slacks.count + (
             2 * int(np.isfinite(self.task.max_torque_rate).sum()) if smoothed else 0)
@@ -108,21 +115,22 @@ class ConstrainedMotion(MotionProblem):
     def with_changes(self, **changes: float) -> ConstrainedMotion:
         """Return the problem of the same task changed in payload or duration."""
         return ConstrainedMotion(super().with_changes(**changes), self.slacks, self.mu,
-                                 self.floor)
+                                 self.floor, smooth=self.smooth)
 
     def with_via_times(self, times: Array) -> ConstrainedMotion:
         """Return the same problem with its via points passed at other times (K,) [s]."""
-        return ConstrainedMotion(super().with_via_times(times), self.slacks, self.mu, self.floor)
+        return ConstrainedMotion(super().with_via_times(times), self.slacks, self.mu, self.floor,
+                                 smooth=self.smooth)
 
     def with_mu(self, mu: float) -> ConstrainedMotion:
         """Return the same problem with another barrier."""
-        return ConstrainedMotion(self, self.slacks, mu, self.floor)
+        return ConstrainedMotion(self, self.slacks, mu, self.floor, smooth=self.smooth)
 
     def floored(self, near: CollocationSolution, share: float) -> ConstrainedMotion:
         """Return the same problem with a floor at a share of the smallest slacks of a motion."""
         z = near.stage_values().reshape(-1, self.size)
         least = np.maximum(self.slacks(self.layout.take_states(z)).min(axis=0), _LEAST_FLOOR)
-        return ConstrainedMotion(self, self.slacks, self.mu, share * least)
+        return ConstrainedMotion(self, self.slacks, self.mu, share * least, smooth=self.smooth)
 
 
 def slacks_of(motion: MotionProblem) -> PathSlacks | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationSolution
-from flex_planner.optimal_control.barrier_problem import MotionBarrier
+from flex_planner.optimal_control.barrier_problem import find_slacks, MotionBarrier
 from flex_planner.optimal_control.free_duration import FreeDurationProblem
 from flex_planner.optimal_control.free_problem import append_zeros
 from flex_planner.optimal_control.motion_problem import Indices, MotionProblem
@@ -36,7 +36,8 @@ class DurationBarrier(MotionBarrier):
         self.duration = FreeDurationProblem(motion, price)
         self.size, self.price = motion.size + 2, price
         # slacks of no torque at rest
-        self._at_rest = self._find_slacks(np.zeros((1, motion.size)), np.zeros((1, self.free)))[0]
+        rest = np.zeros((1, self.free))
+        self._at_rest = find_slacks(motion.parameters.torque_limits, rest, rest)[0]
         self.explicit: Indices = np.concatenate([motion.explicit, [self.size - 2, self.size - 1]])
 
     def scale(self, mu: float) -> Array:

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from flex_planner.arms.arm import Arm
-from flex_planner.arms.kinematics import bent_distances
-from flex_planner.arms.spatial_arm import SpatialArm
+from flex_planner.arms.kinematics import bent_distances, link_bends
 from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationSolution
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.path_constraints import Deflection
 from flex_planner.optimal_control.sampled_motion import sample_motion
 from flex_planner.optimal_control.task import Task
+import numpy as np
 
 # shares of a link's length. The model keeps the links' lengths and their small slopes: at a tenth
 # the slope of a cantilever's tip is 0.15 rad and the tip 0.6 % nearer than it is taken to be, at
@@ -81,10 +81,9 @@ def find_largest_bending(arm: Arm, coordinates: Array) -> Bending:
 
 def limits_of_model(arm: Arm) -> tuple[Deflection, ...]:
     """Return how far the links of an arm may bend, as limits on the way."""
-    if isinstance(arm, SpatialArm):  # they bend in two planes, for which there is no such limit
-        return ()
-    return tuple(Deflection(link=i, limit=_LIMIT, stations=_LIMITED)
-                 for i, link in enumerate(arm.links, 1) if link.modes)
+    return tuple(Deflection(link=i + 1, limit=_LIMIT, stations=_LIMITED)
+                 for i, link in enumerate(arm.links)
+                 if link_bends(arm, i, np.eye(link.modes)).any())  # others twist alone
 
 
 def keeps_model(task: Task) -> bool:

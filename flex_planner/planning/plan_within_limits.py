@@ -14,7 +14,12 @@ from dataclasses import dataclass, replace
 
 from flex_planner.base.progress import StoppedError
 from flex_planner.base.validation import Array
-from flex_planner.collocation import CollocationSolution, GaussRule, Solver
+from flex_planner.collocation import (
+    CollocationResult,
+    CollocationSolution,
+    GaussRule,
+    Solver,
+)
 from flex_planner.collocation.interior_point import BarrierOutcome
 from flex_planner.optimal_control.constrained_motion import (
     ConstrainedMotion,
@@ -41,6 +46,7 @@ from flex_planner.planning.strategies.within_limits import (
     FIRST,
     first_mesh,
     solve_again,
+    solve_smoothly,
     solve_within_limits,
     STAGES,
     STRONG,
@@ -160,7 +166,25 @@ def plan_from_barrier(problem: MotionProblem, slacks: PathSlacks, met: BarrierOu
         If the monitor stopped it.
 
     """
-    limited, result = solve_within_limits(problem, slacks, met, solver, coarse=True)
+    return _plan(*solve_within_limits(problem, slacks, met, solver, coarse=True), solver)
+
+
+def plan_smoothly(problem: MotionProblem, slacks: PathSlacks, met: BarrierOutcome,
+                  solver: Solver) -> Plan | None:
+    """
+    Return the plan of a motion with a barrier as it is, the motors' limits in it, or None.
+
+    Raises
+    ------
+    StoppedError
+        If the monitor stopped it.
+
+    """
+    return _plan(*solve_smoothly(problem, slacks, met, solver), solver)
+
+
+def _plan(limited: ConstrainedMotion, result: CollocationResult, solver: Solver) -> Plan | None:
+    """Return the plan of a motion within limits if it is solved and certified, or None."""
     if not result.converged:
         solver.monitor.check()
         return None

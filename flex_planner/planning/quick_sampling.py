@@ -10,7 +10,6 @@ from flex_planner.planning.executed_limits import find_executed_slack
 from flex_planner.planning.execution import Execution, ExecutionCertificate
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.point_times import point_times
-from flex_planner.planning.published_motion import PublishedMotion
 from flex_planner.planning.sampling import SampledPlan, SamplingSettings, take_samples
 
 
@@ -39,9 +38,7 @@ def sample_quickly(plan: Plan, settings: SamplingSettings,
 
     """
     watch, controller = monitor or Monitor(), settings.controller_of(plan)
-    period = settings.controller_period
-    motion = PublishedMotion.of(plan, controller,
-                                controller.period if period is None else period)
+    motion = settings.motion_of(plan)
     sampled = take_samples(motion, controller, *point_times(
         motion, settings.longest_step, settings.torque_tolerance, watch))
     execution = Execution.of(plan, controller)

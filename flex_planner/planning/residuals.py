@@ -3,26 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from flex_planner.arms.planar_only import require_planar
 from flex_planner.base.errors import InvalidTaskError, NoEquilibriumError
 from flex_planner.base.progress import Monitor
 from flex_planner.control.joint_controller import JointController
 from flex_planner.control.linear_feedback import LinearFeedback, pd_feedback
 from flex_planner.planning.execution import Execution
 from flex_planner.planning.feedback.differing_arm import (
+    CORNERS,
     course_of,
     Difference,
     DifferingArm,
+    list_differences,
     Response,
 )
 from flex_planner.planning.feedback.find_gains import RESOLUTION
 from flex_planner.planning.feedback.gains import Record
 from flex_planner.planning.plan import Plan
-from flex_planner.planning.robust.differing_arms import has_all_modes
 from flex_planner.planning.uncertainty import ASSUMED, Uncertainty
 import numpy as np
+
+# signs of errors of stiffness and payload
+_ONE_BY_ONE = (-1, 0), (1, 0), (0, -1), (0, 1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,19 +52,6 @@ class Residuals(Record):
     differences: tuple[Difference, ...]
 
 
-def list_differences(plan: Plan, uncertainty: Uncertainty) -> tuple[Difference, ...]:
-    """Return what is looked at, see `Residuals`; what the arm or the task lacks is left out."""
-    given = plan.problem.parameters
-    stiffness = uncertainty.stiffness if plan.arm.n_passive else 0.0
-    payload = (uncertainty.payload_error(float(given.payload_mass))
-               if given.payload_mass or given.payload_inertia else 0.0)
-    errors = [(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1), (1, -1), (1, 1), (-1, -1), (-1, 1)]
-    found = [Difference(stiffness=a * stiffness, payload=b * payload) for a, b in errors]
-    if plan.arm.n_passive and not has_all_modes(plan.arm):
-        found += [Difference(more_modes=True), replace(found[-1], more_modes=True)]
-    return tuple(dict.fromkeys(found))
-
-
 def find_residuals(plan: Plan, controller: JointController, *,
                    uncertainty: Uncertainty = ASSUMED, resolution: float = RESOLUTION,
                    law: LinearFeedback | None = None,
@@ -75,7 +65,7 @@ def find_residuals(plan: Plan, controller: JointController, *,
     Parameters
     ----------
     plan : Plan
-        Solved, of a planar arm, ending at rest.
+        Solved, ending at rest.
     controller : JointController
         Its gains, rate, and how it holds efforts.
     uncertainty : Uncertainty
@@ -91,17 +81,15 @@ def find_residuals(plan: Plan, controller: JointController, *,
     ------
     InvalidTaskError
         If the plan is not solved, or does not end at rest.
-    PlanarOnlyError
-        If the arm is a spatial one.
     StoppedError
         If the monitor stopped it.
 
     """
-    require_planar(plan.arm, 'residuals on other arms')
     if not plan.solved or not plan.task.ends_at_rest:
         raise InvalidTaskError('residuals on other arms are those of a plan that is solved and '
                                f'ends at rest: {plan.message}')
-    differences = list_differences(plan, uncertainty)
+    payload = uncertainty.payload_error(float(plan.problem.parameters.payload_mass))
+    differences = list_differences(plan, uncertainty.stiffness, payload, (*_ONE_BY_ONE, *CORNERS))
     used = law or pd_feedback(controller.gains, controller.rate)
     return Residuals(
         controller=controller, uncertainty=uncertainty, differences=differences,

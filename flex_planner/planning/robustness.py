@@ -82,7 +82,7 @@ def assess_robustness(plan: Plan, sampled: SampledPlan,
 
     nominal = sampled.execution.residual_vibration
     more, growth = nominal, sampled.execution.feedback_growth
-    if plan.arm.n_passive:
+    if plan.arm.n_modes:
         other = replace(execution, dynamics=ArmDynamics.of(with_more_modes(plan.arm)))
         more = _vibration(execution, other.dynamics, plain_parameters(given), sampled, monitor)
         positions = plan.uniform_samples(_POSTURES).coordinates[:, :plan.arm.n_joints]
@@ -91,14 +91,14 @@ def assess_robustness(plan: Plan, sampled: SampledPlan,
         nominal=nominal, more_modes=more, more_modes_growth=growth,
         stiffness_difference=stiffness_error, payload_difference=payload_error,
         stiffness_differs=worst(*(differing_parameters(given, error, 0.0) for error in (
-            -stiffness_error, stiffness_error))) if plan.arm.n_passive else nominal,
+            -stiffness_error, stiffness_error))) if plan.arm.n_modes else nominal,
         payload_differs=worst(*(differing_parameters(given, 0.0, error) for error in (
             -payload_error, payload_error))) if payload else nominal)
 
 
 def prepare_robustness(arm: Arm) -> None:
     """Compile what `assess_robustness` takes for an arm, or load it."""
-    if arm.n_passive:
+    if arm.n_modes:
         ArmDynamics.of(with_more_modes(arm))
 
 

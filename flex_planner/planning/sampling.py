@@ -146,6 +146,12 @@ class SamplingSettings:
         """Return the controller that a plan is for."""
         return self.controller or JointController(gains=default_gains(plan.model))
 
+    def motion_of(self, plan: Plan, begin: float = 0.0) -> PublishedMotion:
+        """Return what is published of a plan, which begins after a time [s]."""
+        controller, period = self.controller_of(plan), self.controller_period
+        return PublishedMotion.of(plan, controller,
+                                  controller.period if period is None else period, begin)
+
     def begin_of(self, plan: Plan) -> float:
         """Return how long to hold the arm of a plan: not if it moves at the start [s]."""
         return self.start_hold if plan.task.starts_at_rest else 0.0
@@ -226,10 +232,7 @@ def _close_enough(plan: Plan, settings: SamplingSettings, execution: Execution,
                   watch: Monitor) -> SampledPlan:
     """Return samples with which the arm arrives as with infinitely many of them."""
     limits = CertificateLimits()
-    period = settings.controller_period
-    motion = PublishedMotion.of(plan, execution.controller,
-                                execution.controller.period if period is None else period,
-                                settings.begin_of(plan))
+    motion = settings.motion_of(plan, settings.begin_of(plan))
     exact = execution.arrive(motion, watch)
     vibration = execution.vibration(exact)
     for refinement in range(_REFINEMENTS + 1):

@@ -44,6 +44,12 @@ class Uncertainty:
         for name in ('stiffness', 'payload'):
             number(f'{name}_error', getattr(self, name), at_least=0, at_most=MAX_ERROR)
 
+    def __str__(self) -> str:
+        """Return it in words, with who says so."""
+        payload = '' if self.payload_mass is None else f' of {self.payload_mass:.4g} kg'
+        return (f'stiffness +-{100 * self.stiffness:.2g}%, payload{payload} '
+                f'+-{100 * self.payload:.2g}% ({self.source})')
+
     def payload_error(self, mass: float) -> float:
         """Return by which share a payload may be off [kg]."""
         known = self.payload_mass

@@ -257,8 +257,7 @@ def _links_overlap(motion: _Motion) -> PlanWarning | None:
 
 def _too_few_modes(motion: _Motion) -> PlanWarning | None:
     """Warn of vibrations that the modes of the plan do not have, see `estimate_left_out`."""
-    if (not motion.problem.task.ends_at_rest or not motion.problem.model.arm.n_passive
-            or isinstance(motion.arm, SpatialArm)):  # the estimate is that of planar arms
+    if not motion.problem.task.ends_at_rest or not motion.problem.model.arm.n_passive:
         return None
     left, limit = estimate_left_out(motion.problem.task, motion.times, motion.weights,
                                     motion.torques), CertificateLimits().residual_vibration

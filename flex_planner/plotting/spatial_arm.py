@@ -15,12 +15,15 @@ from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.plotting.figures import explain_lines, Picture, plain
 from flex_planner.plotting.spatial_motion import show_space
+from matplotlib.figure import FigureBase
 import numpy as np
 
 _NATURAL_MODES, _STATIONS = 4, 41
 _SHOWN_BEND, _ARROW = 0.1, 0.15  # of the reach
 _MILLI, _SIDE, _LEGEND_COLUMNS = 1e3, 4.6, 8
 _SMALL_CHANGE = 1e-6
+# no layout of Matplotlib knows how far the numbers at axes of space reach
+_ZOOM, _AWAY, _NUMBERS = 0.88, 8, 5
 
 
 def draw_spatial_arm(model: ArmModel, postures: Sequence[Array], payload_mass: float) -> Picture:
@@ -44,22 +47,32 @@ def draw_spatial_arm(model: ArmModel, postures: Sequence[Array], payload_mass: f
     """
     arm, parameters = model.arm, Parameters.of(model.arm, payload_mass=payload_mass)
     shown = min(arm.n_passive, _NATURAL_MODES)
-    rows, columns = 1 + bool(shown), max(len(postures), shown)
-    figure = Picture(_SIDE * columns, _SIDE * rows)
-
-    def space(place: int) -> Any:
-        return figure.add_subplot(rows, columns, place, projection='3d')
-
-    for place, posture in enumerate(postures, 1):
+    rows = 1 + bool(shown)
+    figure = Picture(_SIDE * max(len(postures), shown), _SIDE * rows)
+    first, *others = np.atleast_1d(figure.subfigures(rows, 1))
+    for axes, posture in zip(_spaces(first, len(postures)), postures, strict=True):
         rest, _ = equilibrium(model, posture, parameters)
-        _draw_rest(space(place), arm, rest, payload_mass)
+        _draw_rest(axes, arm, rest, payload_mass)
+    explain_lines(first, first.axes, _LEGEND_COLUMNS)
     if shown:
         frequencies, vectors = natural_modes(model, rest, parameters, locked=True)
-        for k in range(shown):
-            _draw_mode(space(columns + 1 + k), arm, rest, vectors[:, k], frequencies[k])
-    explain_lines(figure, figure.axes, _LEGEND_COLUMNS)
+        for k, axes in enumerate(_spaces(others[0], shown)):
+            _draw_mode(axes, arm, rest, vectors[:, k], frequencies[k])
     figure.suptitle(f'{plain(arm.name)}, payload {payload_mass:g} kg')
     return figure
+
+
+def _spaces(part: FigureBase, count: int) -> list[Any]:
+    """Return diagrams of space beside one another."""
+    return list(np.ravel(part.subplots(1, count, subplot_kw={'projection': '3d'})))
+
+
+def _show(axes: Any, points: Array) -> None:
+    """Show points (k, 3) [m], the names and numbers of the axes within the diagram."""
+    show_space(axes, points)
+    axes.set_box_aspect((1, 1, 1), zoom=_ZOOM)
+    axes.locator_params(nbins=_NUMBERS)
+    axes.zaxis.labelpad = _AWAY
 
 
 def _draw_rest(axes: Any, arm: Arm, rest: Array, payload_mass: float) -> None:
@@ -80,7 +93,7 @@ def _draw_rest(axes: Any, arm: Arm, rest: Array, payload_mass: float) -> None:
     if payload_mass:
         axes.plot(*carried[:, None], 'o', color=PLANNED, label='payload')
     shown = [points.reshape(-1, 3), carried[None], _draw_gravity(axes, arm, points[0, 0])]
-    show_space(axes, np.concatenate(shown))
+    _show(axes, np.concatenate(shown))
     units = [units_of(joint) for joint in arm.joints]
     values = ', '.join(f'{unit.scale * value:.4g}'
                        for unit, value in zip(units, rest[:n], strict=True))
@@ -109,7 +122,7 @@ def _draw_mode(axes: Any, arm: Arm, rest: Array, vector: Array, frequency: float
     axes.plot(*still.T, color=ARM, linewidth=2)
     for side, style in ((1, '-'), (-1, '--')):
         axes.plot(*(still + side * bend).T, style, color=FLEXIBLE)
-    show_space(axes, np.concatenate([still, still + bend, still - bend]))
+    _show(axes, np.concatenate([still, still + bend, still - bend]))
     axes.set_title(f'natural mode, {frequency / (2 * np.pi):.4g} Hz, joints locked\n'
                    f'drawn with {largest * _MILLI:.3g} mm where it moves most',
                    fontsize='medium')

@@ -6,10 +6,12 @@ import math
 from typing import Any
 
 from flex_planner.arms.arm import Arm, Joint, Link, Node
-from flex_planner.arms.planar_only import require_planar
+from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.base.yaml_text import format_yaml
+from flex_planner.reports.spatial_arm_file import spatial_fields
 
 _UNLIMITED = 'unlimited'
+_HEAD = '# SI units, radians. One entry per link and per joint, from the base outwards.\n'
 
 
 def format_arm_file(arm: Arm) -> str:
@@ -20,11 +22,12 @@ def format_arm_file(arm: Arm) -> str:
 
     Raises
     ------
-    PlanarOnlyError
-        If the arm is a spatial one.
+    InvalidValueError
+        If the arm is one in space that a file of its own cannot describe, see `spatial_fields`.
 
     """
-    require_planar(arm, 'arm files written here')
+    if isinstance(arm, SpatialArm):
+        return _HEAD + format_yaml(spatial_fields(arm, _joint))
     content: dict[str, Any] = {
         'name': arm.name, 'source': arm.source, 'gravity': arm.gravity.tolist(),
         'links': [_link(link) for link in arm.links],
@@ -33,8 +36,7 @@ def format_arm_file(arm: Arm) -> str:
     if arm.payload_com.any() or arm.payload_inertia:
         content['payload'] = {'center_of_mass': arm.payload_com.tolist(),
                               'inertia': arm.payload_inertia}
-    return ('# SI units, radians. One entry per link and per joint, from the base outwards.\n'
-            + format_yaml(content))
+    return _HEAD + format_yaml(content)
 
 
 def _link(link: Link) -> dict[str, Any]:

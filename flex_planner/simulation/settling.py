@@ -5,31 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from flex_planner.arms.arm import Arm
-from flex_planner.arms.kinematics import tip_position
-from flex_planner.arms.link import Link
-from flex_planner.arms.spatial_link import SpatialLink
+from flex_planner.arms.kinematics import link_bends, tip_position
 from flex_planner.base.validation import Array
 from flex_planner.control.extent import peak_to_peak
 import numpy as np
 
 MIN_SETTLING, MAX_SETTLING = 1e-3, 1000.0  # [s], that an arm may be watched after its arrival
-_STATIONS = 41
 
 
 def bending_peak_to_peak(arm: Arm, coordinates: Array) -> float:
     """Return the largest change of any link's deflection over coordinates (k, n_t) [m]."""
-    return max((_deflection_change(link, coordinates[:, part])
-                for link, part in zip(arm.links, arm.modal_slices, strict=True) if link.modes),
-               default=0.0)
-
-
-def _deflection_change(link: Link | SpatialLink, modal: Array) -> float:
-    """Return the largest change of a link's deflection over modal displacements (k, m) [m]."""
-    if isinstance(link, SpatialLink):
-        across = link.axes()[:, 1:]  # a beam bends in this plane
-        return peak_to_peak(link.displace(modal, _STATIONS) @ across)
-    stations = np.linspace(0, link.length, _STATIONS, dtype=np.float64)
-    return float(np.ptp(modal @ link.mode_shapes().shape(stations).T, axis=0).max())
+    return max((peak_to_peak(np.moveaxis(link_bends(arm, i, coordinates[:, part].T), -1, 0))
+                for i, part in enumerate(arm.modal_slices) if arm.links[i].modes), default=0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

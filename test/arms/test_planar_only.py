@@ -9,9 +9,6 @@ from flex_planner.arms.inverse_kinematics import workspace
 from flex_planner.arms.kinematics import frame_angles
 from flex_planner.arms.planar_only import PlanarOnlyError
 from flex_planner.dynamics.rigid_inertia import RigidInertia
-from flex_planner.dynamics.unbent_arm import mass_matrix
-from flex_planner.maps.quantities import Quantity
-from flex_planner.maps.study import Study
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.holding import knows_holding
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
@@ -23,7 +20,6 @@ from flex_planner.planning.proofs import (
     is_payload_bounded,
 )
 from flex_planner.planning.proofs.short_durations import rigid_bound
-from flex_planner.planning.robust.objective import Robustness
 import numpy as np
 import pytest
 from spatial_arms import yaw_pitch
@@ -38,11 +34,7 @@ def task() -> Task:
 @pytest.mark.parametrize('make', [
     lambda: workspace(ARM),
     lambda: frame_angles(ARM, np.zeros(4)),
-    lambda: mass_matrix(ARM, np.zeros(2), 1.0, 0.0),
     lambda: RigidInertia.of(ARM, 1.0, 0.0),
-    lambda: Robustness(max_residual=1e-3, stiffness_error=0.1).check(task()),
-    lambda: Study(name='map', arm=ARM, quantity=Quantity.RESIDUAL_VIBRATION, axes=(),
-                  motion=None),  # type: ignore[arg-type]
 ])
 def test_spatial_arms_are_refused(make: Callable[[], Any]) -> None:
     with pytest.raises(PlanarOnlyError, match="arm is 'yaw and pitch', but must be a planar one"):

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
+import sys
+from types import SimpleNamespace
 from typing import Any
+from xml.dom import minidom
 
 from flex_planner.arms.arm_files import arm_from_mapping, ArmFileError, load_arm
 from flex_planner.arms.spatial_arm import SpatialArm
@@ -177,3 +180,49 @@ def test_urdf_of_a_package_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     (share / 'one.urdf').write_text(TEXT)
     monkeypatch.setenv('AMENT_PREFIX_PATH', str(tmp_path))
     assert read_urdf('package://robots/one.urdf', Path()).name == 'branched'
+
+
+XACRO = """<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">
+  <xacro:arg name="effort" default="60"/>
+  <xacro:property name="half" value="${pi/2}"/>
+  <xacro:macro name="rod" params="name length">
+    <link name="${name}"><inertial><origin xyz="${length/2} 0 0"/><mass value="1.2"/>
+      <inertia ixx="0.002" ixy="0" ixz="0" iyy="0.06" iyz="0" izz="0.06"/></inertial></link>
+  </xacro:macro>
+  <link name="base"/>
+  <xacro:rod name="upper" length="0.8"/>
+  <xacro:rod name="fore" length="0.5"/>
+  <joint name="a" type="revolute"><parent link="base"/><child link="upper"/>
+    <origin rpy="${half} 0 0"/><axis xyz="0 0 1"/>
+    <limit lower="-2" upper="2" effort="$(arg effort)" velocity="3"/></joint>
+  <joint name="b" type="revolute"><parent link="upper"/><child link="fore"/>
+    <origin xyz="0.8 0 0"/><axis xyz="0 0 1"/>
+    <limit lower="-2" upper="2" effort="30" velocity="3"/></joint>
+</robot>"""
+
+
+def test_xacro_files_are_expanded(tmp_path: Path) -> None:
+    pytest.importorskip('xacro', reason='an extra')
+    file = tmp_path / 'arm.urdf.xacro'
+    file.write_text(XACRO)
+    arm = arm_from_mapping({'urdf': file.name, 'tip': 'fore'}, folder=tmp_path)
+    assert isinstance(arm, SpatialArm)
+    assert arm.joints[0].motor.standstill_torque == 60
+    np.testing.assert_allclose(arm.links[0].body.center_of_mass, [0.4, 0, 0])
+    file.write_text(XACRO.replace('${half}', '${hal}'))
+    with pytest.raises(UrdfError, match=r"arm.urdf.xacro: xacro: name 'hal' is not defined"):
+        read_urdf(file.name, tmp_path)
+
+
+def test_what_xacro_makes_of_a_file_is_read(tmp_path: Path,
+                                            monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / 'arm.xacro'
+    file.write_text(TEXT)
+    monkeypatch.setitem(sys.modules, 'xacro', None)
+    with pytest.raises(UrdfError, match='xacro is not installed: expand it elsewhere'):
+        read_urdf(file.name, tmp_path)
+    monkeypatch.setitem(sys.modules, 'xacro', SimpleNamespace(process_file=minidom.parse))
+    assert read_urdf(file.name, tmp_path).name == parse_urdf(TEXT).name
+    file.write_text('<robot')
+    with pytest.raises(UrdfError, match='arm.xacro: xacro: '):
+        read_urdf(file.name, tmp_path)

@@ -7,6 +7,7 @@ from pathlib import Path
 from types import SimpleNamespace as Message
 from typing import Any
 
+from bench.recorded_motions import record_motion
 from flex_planner.arms.arm_files import load_arm
 from flex_planner.base.yaml_text import parse_yaml
 from flex_planner.cli import main
@@ -20,7 +21,6 @@ from flex_planner.recording import MessageTypes, Recording, Topic
 from flex_planner.reports.arm_file import format_arm_file
 import numpy as np
 import pytest
-from recorded_motions import record_motion
 
 TRUTH = [0.11, 0.9, 0.01, 0.02, 0.01, 0.012, 0.0, 1e-3]
 DRIVE = Drive(gains=Gains.of(1, 4.0, 0.3), speed_filter=50.0)

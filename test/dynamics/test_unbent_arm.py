@@ -17,6 +17,7 @@ from flex_planner.dynamics.unbent_arm import bending_stiffness, free_vibrations,
 from light_model import LightModel
 import numpy as np
 import pytest
+from spatial_arms import flexible_3r, oblique, ur5
 
 # unlike links and nodes of every kind, pinned and clamped
 ARMS = ['workshop', 'crane']
@@ -37,7 +38,8 @@ def test_mass_matrix_is_that_of_the_compiled_dynamics(
     np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-13 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize('arm', [stepped_arm(), data_sheet_arm(2), data_sheet_arm(3)],
+@pytest.mark.parametrize('arm', [stepped_arm(), data_sheet_arm(2), data_sheet_arm(3), oblique(),
+                                 flexible_3r(2, 1), ur5(elastic=[0, 2])],
                          ids=lambda arm: arm.name)
 def test_mass_matrix_of_data_sheet_arms_is_that_of_the_dynamics(arm: Arm) -> None:
     positions = np.random.default_rng(1).uniform(-2, 2, arm.n_joints)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+from bench.recorded_motions import LSB, record_motion
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import load_arm
 from flex_planner.control.joint_controller import Gains
@@ -22,7 +23,6 @@ from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.sampling import sample_plan, SamplingSettings
 import numpy as np
 import pytest
-from recorded_motions import LSB, record_motion
 
 PAYLOAD, DELAY = 0.11, 1.4e-3
 # payload, E I, damping ratio, viscous and Coulomb friction, rotor, offset, delay
@@ -138,6 +138,18 @@ def test_arm_with_more_modes_than_planned_for_is_told_and_found() -> None:
     for one in (poor, found):
         assert one.payload_mass == pytest.approx(PAYLOAD, rel=0.02)
         assert one.estimates[1].value == pytest.approx(0.1, rel=0.05)
+
+
+def test_arm_that_still_moves_when_a_motion_begins_is_told_and_taken_into_account() -> None:
+    # of the bending, about 0.4 mm at the tip, and the speed of joint and mode
+    away = np.array([2e-4, 0.02, 0.0])
+    log = record_motion(true_arm(), PAYLOAD, DRIVE, swing(1.2), 1.0, delay=DELAY, every=10,
+                        away=away)
+    found = identify(one_link(), [log], payload_mass=0.1, drive=replace(DRIVE, resolution=LSB),
+                     more_modes=0)
+    assert found.has(Finding.BEGAN_IN_MOTION) and 0.8 < found.best.rms < 1.25
+    widths = np.array([one.half_width for one in found.estimates]) / np.delete(TRUTH, -2)
+    assert (errors(found) < 3 * widths).all()
 
 
 def test_what_is_not_free_stays() -> None:

@@ -5,12 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from flex_planner.arms.arm_files import load_arm
 from flex_planner.arms.kinematics import tip_position
-from flex_planner.base.errors import InvalidValueError
+from flex_planner.arms.spatial_arm import SpatialArm
+from flex_planner.base.progress import Monitor
+from flex_planner.control.joint_controller import Gains
 from flex_planner.maps.axes import Axis
+from flex_planner.maps.cell_solver import CellSolver, NearCells
 from flex_planner.maps.end_points import End
 from flex_planner.maps.pictures.scene import Scene
 from flex_planner.maps.quantities import Quantity
+from flex_planner.maps.simulated_arm import SimulatedArm
 from flex_planner.maps.study import load_study, Study, StudyError
 from flex_planner.maps.study_motion import StudyMotion
 import numpy as np
@@ -93,6 +98,18 @@ def test_what_does_not_fit_the_arm_is_refused(tmp_path: Path, arm: str, start: s
         read(tmp_path, arm, start, goal, *axes)
 
 
-def test_vibrations_of_spatial_arms_are_not_mapped() -> None:
-    with pytest.raises(InvalidValueError, match='maps of residual vibrations'):
-        study(quantity=Quantity.RESIDUAL_VIBRATION)
+def test_planar_arm_in_space_leaves_the_same_vibration() -> None:
+    planar, motion = load_arm('clamped_motors'), StudyMotion(
+        start=End(name='start', angles=np.array([-0.05, 0.2])),
+        goal=End(name='goal', angles=np.array([0.0, 0.25])), duration=0.7, payload_mass=1.0)
+    simulated = SimulatedArm(settling=0.1, gains=Gains.of(2, 40.0, 4.0))
+    scales, found = np.array([0.9, 1.0]), []
+    for arm in (planar, SpatialArm.of_planar(planar)):
+        made = study(arm=arm, quantity=Quantity.RESIDUAL_VIBRATION, motion=motion,
+                     simulated=simulated, axes=(Axis(name='payload_scale', values=scales),))
+        solver = CellSolver(made)
+        solution = solver.solve((0,), made.task((0,)), Monitor(), NearCells())
+        found.append(solver.result((0,), solution).value)
+    assert found[0] > 1e-5
+    # in space directions are further apart
+    assert found[1] == pytest.approx(found[0], rel=2e-3)

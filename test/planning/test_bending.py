@@ -6,12 +6,13 @@ from dataclasses import replace
 
 from flex_planner.arms.arm import Arm, Joint, Link, Motor, Node
 from flex_planner.arms.kinematics import link_points
+from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.capacity.min_duration import find_min_duration
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.path_constraints import read_constraint, write_constraint
 from flex_planner.optimal_control.task import Task
-from flex_planner.planning.bending import find_largest_bending, keeps_model
+from flex_planner.planning.bending import find_largest_bending, keeps_model, limits_of_model
 from flex_planner.planning.certificate import CertificateLimits
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_path import plan_path
@@ -21,6 +22,7 @@ from flex_planner.planning.within_model import bound_bending
 import numpy as np
 from plan_checks import solution_of
 import pytest
+from spatial_arms import flexible_3r
 
 
 def test_pinned_link_bends_from_its_chord(ei50_arm: Arm) -> None:
@@ -146,3 +148,19 @@ def test_limit_on_the_way_is_told_before_bending(refused: Plan) -> None:
     found = find_refusal(problem, solution_of(refused))
     assert found is not None
     assert found[0] is PlanStatus.LIMIT_VIOLATED
+
+
+def test_planar_link_in_space_is_bent_to_what_the_model_holds() -> None:
+    planar = soft_plan(0.8, allowed=False)
+    plan = plan_path(replace(planar.task, path_constraints=(),
+                             arm=SpatialArm.of_planar(planar.arm)))
+    assert plan.solved, plan.message
+    assert keeps_model(plan.task)
+    # by a slack of another form, which a barrier keeps to differently
+    assert plan.cost == pytest.approx(planar.cost, rel=1e-4)
+
+
+def test_links_in_space_are_limited_where_they_bend_in_a_plane() -> None:
+    assert [one.link for one in limits_of_model(flexible_3r())] == [2, 3]
+    twisting = flexible_3r(modes=0, twist=1)
+    assert twisting.n_modes == 2 and limits_of_model(twisting) == ()

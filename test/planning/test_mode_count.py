@@ -7,6 +7,7 @@ from dataclasses import replace
 from factories import PlanFactory
 from flex_planner.arms.arm import Arm, Link, MAX_MODES
 from flex_planner.arms.arm_files import load_arm
+from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.integration import simulate
 from flex_planner.dynamics.physical_parameters import PhysicalParameters
@@ -101,3 +102,15 @@ def test_estimate_is_linear_in_the_torque(clamped: Plan) -> None:
     once, twice = (estimate_left_out(clamped.task, times, weights, factor * torques)
                    for factor in (1.0, 2.0))
     assert twice == pytest.approx(2 * once, rel=1e-9)
+
+
+def test_planar_arm_in_space_has_the_same_estimate(clamped: Plan) -> None:
+    times, weights = np.linspace(0, 1, 401), np.full(401, 1 / 401)
+    torques = np.column_stack([np.sin(9 * times), np.cos(40 * times)])
+    task = Task(arm=SpatialArm.of_planar(clamped.arm), duration=1.0, payload_mass=1.0,
+                start_positions=clamped.task.start_positions,
+                goal_positions=clamped.task.goal_positions)
+    expected, found = (estimate_left_out(one, times, weights, torques)
+                       for one in (clamped.task, task))
+    assert expected > 1e-4
+    assert found == pytest.approx(expected, rel=1e-9)

@@ -5,14 +5,20 @@ from __future__ import annotations
 from dataclasses import replace
 
 from factories import PlanFactory
+from flex_planner.arms.arm_files import load_arm
+from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.base.errors import InvalidTaskError, InvalidValueError
 from flex_planner.control.joint_controller import Gains, JointController
-from flex_planner.planning.feedback.differing_arm import Difference
+from flex_planner.control.linear_feedback import pd_feedback
+from flex_planner.optimal_control.task import Task
+from flex_planner.planning.execution import Execution
+from flex_planner.planning.feedback.differing_arm import course_of, Difference, DifferingArm
 from flex_planner.planning.feedback.find_gains import find_feedback_gains, GainSettings
 from flex_planner.planning.plan import Plan, PlanStatus
-from flex_planner.planning.residuals import find_residuals, Residuals
+from flex_planner.planning.plan_path import plan_path
+from flex_planner.planning.residuals import find_residuals, list_differences, Residuals
 from flex_planner.planning.sampling import sample_plan, SamplingSettings
-from flex_planner.planning.uncertainty import Uncertainty
+from flex_planner.planning.uncertainty import ASSUMED, Uncertainty
 import pytest
 
 PD = JointController(gains=Gains.of(2, 100.0, 10.0))
@@ -44,6 +50,24 @@ def test_figures_are_those_that_gains_were_tried_with(plan: Plan, found: Residua
 def test_smaller_errors_leave_less(plan: Plan, found: Residuals) -> None:
     known = find_residuals(plan, PD, uncertainty=Uncertainty(stiffness=0.01, payload=0.01))
     assert known.worst < 0.2 * found.worst
+
+
+def test_planar_arm_in_space_leaves_the_same() -> None:
+    planar, softer = load_arm('clamped_motors'), Difference(stiffness=-0.1, payload=0.1)
+    controller = JointController(gains=Gains.of(2, 40.0, 4.0))
+    found = []
+    for arm in (planar, SpatialArm.of_planar(planar)):
+        plan = plan_path(Task(arm=arm, start_positions=[0.3, 0.2], goal_positions=[0.35, 0.25],
+                              duration=0.7, payload_mass=1.0), search='fast')
+        assert softer in list_differences(plan, ASSUMED)
+        differing = DifferingArm.of(Execution.of(plan, controller), plan,
+                                    course_of(plan, controller), softer, 0.0)
+        found.append(differing.respond(pd_feedback(controller.gains, controller.rate)))
+    assert found[0].residual > 1e-5
+    assert found[1].growth == pytest.approx(found[0].growth, rel=1e-6)
+    assert found[1].tip_error == pytest.approx(found[0].tip_error, rel=1e-6)
+    # in space directions are further apart
+    assert found[1].residual == pytest.approx(found[0].residual, rel=2e-3)
 
 
 def test_payload_that_was_not_identified_may_be_off_by_a_tenth() -> None:

@@ -36,3 +36,8 @@ def test_arm_in_space_is_drawn_at_rest_and_in_its_natural_modes() -> None:
     (line,) = (one for one in figure.axes[1].lines if one.get_label() == 'flexible')
     drawn = np.array(line.get_data_3d()).T  # type: ignore[attr-defined]
     np.testing.assert_allclose(drawn[-1], tip_position(model.arm, rest), atol=1e-12)
+    # what the lines are stands beside the diagrams
+    figure.draw_without_rendering()
+    (legend,) = figure.subfigs[0].legends
+    box = legend.get_window_extent()
+    assert not any(box.overlaps(axes.get_tightbbox()) for axes in figure.axes)

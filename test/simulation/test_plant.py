@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from bench.recorded_motions import record_motion
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.errors import (
@@ -30,7 +31,6 @@ from flex_planner.simulation.joint_control import Disturbance, Encoder
 from flex_planner.simulation.plant import Control, Plant, RunawayError
 import numpy as np
 import pytest
-from recorded_motions import record_motion
 
 GAINS = Gains.of(2, 100.0, 10.0)
 FREE = Gains.of(2, 0.0, 0.0)

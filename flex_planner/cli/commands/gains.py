@@ -10,9 +10,13 @@ import sys
 from flex_planner.base.paths import file_stem
 from flex_planner.base.progress import Monitor
 from flex_planner.base.yaml_text import format_yaml
-from flex_planner.cli.commands.robustness import add_errors, given_uncertainty
-from flex_planner.cli.controller_options import add_controller
-from flex_planner.cli.options import add_folder, Commands, number_argument
+from flex_planner.cli.controller_options import (
+    add_controller,
+    add_encoders,
+    add_errors,
+    given_uncertainty,
+)
+from flex_planner.cli.options import add_folder, Commands
 from flex_planner.cli.outputs import check_folder
 from flex_planner.cli.pictures import print_files
 from flex_planner.cli.progress_line import run_with_progress
@@ -21,7 +25,6 @@ from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.planning.feedback.find_gains import (
     find_feedback_gains,
     GainSettings,
-    RESOLUTION,
 )
 from flex_planner.planning.feedback.gains import FeedbackGains
 from flex_planner.planning.plan import Plan
@@ -42,9 +45,7 @@ def add_command(commands: Commands) -> None:
         'modes per link and at the rate of the controller.')
     add_task(parser, payload='mass at the tip (default: 0)')
     add_controller(parser)
-    add = parser.add_argument
-    add('--encoder-resolution', type=number_argument, default=RESOLUTION, metavar='RAD',
-        help='of the encoders of the joints [rad] (default: %(default).2g, 16 bits)')
+    add_encoders(parser)
     add_errors(parser)
     add_folder(parser)
     parser.set_defaults(run=_gains)
@@ -55,8 +56,8 @@ def _gains(options: argparse.Namespace) -> int:
     request = Request.of(options)
     check_folder(options.output)
 
-    errors = given_uncertainty(options, request.uncertainty)
     with translate_errors():
+        errors = given_uncertainty(options, request.uncertainty)
         settings = GainSettings(encoder_resolution=options.encoder_resolution,
                                 stiffness_error=errors.stiffness,
                                 payload_error=errors.payload_error(request.task.payload_mass))

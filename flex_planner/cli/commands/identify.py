@@ -9,7 +9,6 @@ import sys
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.arm_files import load_arm
-from flex_planner.arms.planar_only import require_planar
 from flex_planner.base.progress import Monitor
 from flex_planner.base.text_files import say_file, write_text
 from flex_planner.base.validation import integer, number
@@ -29,7 +28,7 @@ from flex_planner.identification.identification import Identification
 from flex_planner.identification.identify import ALL, identify
 from flex_planner.identification.joint_log import JointLog
 from flex_planner.identification.plan_residuals import find_plan_residuals, PlanResiduals
-from flex_planner.identification.plant_parameters import Quantity
+from flex_planner.identification.plant_parameters import check_identifiable, Quantity
 from flex_planner.logs.csv_log import read_csv_log
 from flex_planner.logs.drive_file import load_drive
 from flex_planner.logs.identified_uncertainty import identification_file
@@ -86,7 +85,8 @@ def add_command(commands: Commands) -> None:
 def _run(options: argparse.Namespace) -> int:
     """Identify; print and write the result."""
     arm = load_arm(options.arm)
-    require_planar(arm, 'identification')
+    check_identifiable(arm)
+    format_arm_file(arm)  # what cannot be written is refused before the work
     if options.modes is not None:
         arm = _with_modes(arm, options.modes)
     mass = number('--payload', options.payload, at_least=0, at_most=MAX_PAYLOAD, unit='kg')

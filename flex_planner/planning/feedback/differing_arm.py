@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from flex_planner.arms.kinematics import tip_jacobian, tip_position
@@ -19,6 +20,7 @@ from flex_planner.planning.plan import Plan
 from flex_planner.planning.published_motion import PublishedMotion
 from flex_planner.planning.robust.differing_arms import (
     differing_parameters,
+    has_all_modes,
     other_execution,
     with_more_modes,
 )
@@ -52,6 +54,28 @@ class Difference:
             ('stiffness', self.stiffness), ('payload', self.payload)) if share]
         parts += ['two more modes'] if self.more_modes else []
         return ', '.join(parts) or 'as modelled'
+
+
+CORNERS = (1, -1), (1, 1), (-1, -1), (-1, 1)
+"""Signs of errors of stiffness and payload at the corners of their box, the worst last."""
+
+
+def list_differences(plan: Plan, stiffness: float, payload: float,
+                     signs: Sequence[tuple[int, int]] = CORNERS) -> tuple[Difference, ...]:
+    """
+    Return none, errors with some signs, and two more modes alone and with the last errors.
+
+    What the arm or the task lacks is left out.
+
+    """
+    given = plan.problem.parameters
+    stiffness = stiffness if plan.arm.n_modes else 0.0
+    payload = payload if given.payload_mass or given.payload_inertia else 0.0
+    found = [Difference(), *(Difference(stiffness=a * stiffness, payload=b * payload)
+                             for a, b in signs)]
+    if plan.arm.n_modes and not has_all_modes(plan.arm):
+        found += [Difference(more_modes=True), replace(found[-1], more_modes=True)]
+    return tuple(dict.fromkeys(found))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -137,9 +161,11 @@ class DifferingArm:
         return float(np.log(np.abs(values).max()) / law.period)
 
     def respond(self, law: LinearFeedback, monitor: Monitor | None = None, *,
-                bending: bool = False) -> Response:
+                bending: bool = False, growth: float | None = None) -> Response:
         """
         Return what becomes of the plan under a law, and in the second after it, by simulation.
+
+        Its growth is found unless it is known.
 
         Raises
         ------
@@ -147,7 +173,8 @@ class DifferingArm:
             If the monitor stopped it.
 
         """
-        growth, execution, arm = self.growth(law), self.execution, self._under(law)
+        growth = self.growth(law) if growth is None else growth
+        execution, arm = self.execution, self._under(law)
         motion = arm.follow(self.course, execution.start, monitor)
         if not np.isfinite(motion.states).all():
             return Response(growth=growth)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from flex_planner.base.errors import InvalidTaskError, NoEquilibriumError
 from flex_planner.base.progress import Monitor
@@ -30,14 +31,13 @@ from flex_planner.planning.execution import (
 )
 from flex_planner.planning.feedback.differing_arm import (
     course_of,
-    Difference,
     DifferingArm,
+    list_differences,
     Response,
     without_friction,
 )
 from flex_planner.planning.feedback.gains import FeedbackGains, Record
 from flex_planner.planning.plan import Plan
-from flex_planner.planning.robust.differing_arms import has_all_modes
 import numpy as np
 
 # encoders of 16 bits
@@ -81,17 +81,6 @@ class GainSettings:
         number('encoder_resolution', self.encoder_resolution, at_least=1e-9, at_most=1, unit='rad')
         for name in ('stiffness_error', 'payload_error'):
             number(name, getattr(self, name), at_least=0, at_most=MAX_ERROR)
-
-    def differences(self, plan: Plan) -> tuple[Difference, ...]:
-        """Return what is looked at: the model, the corners of the box, more modes; worst last."""
-        stiffness = self.stiffness_error if plan.arm.n_passive else 0.0
-        payload = self.payload_error if (plan.task.payload_mass
-                                         or plan.task.payload_inertia) else 0.0
-        corners = [Difference(stiffness=a * stiffness, payload=b * payload)
-                   for a in (1, -1) for b in (-1, 1)]
-        if plan.arm.n_passive and not has_all_modes(plan.arm):
-            corners += [Difference(more_modes=True), replace(corners[-1], more_modes=True)]
-        return tuple(dict.fromkeys([Difference(), *corners]))
 
 
 def find_feedback_gains(plan: Plan, settings: GainSettings | None = None,
@@ -137,7 +126,8 @@ class _Search:
                  monitor: Monitor) -> None:
         self._plan, self._settings, self._controller = plan, settings, controller
         self._monitor, self._rate = monitor, controller.rate
-        self._differences = settings.differences(plan)
+        self._differences = list_differences(plan, settings.stiffness_error,
+                                             settings.payload_error)
         # of roundings, and of a noise of half a step
         self._noise = settings.encoder_resolution * float(np.sqrt(1 / 12 + 1 / 4))
         parameters = without_friction(plan.problem.parameters)
@@ -165,7 +155,7 @@ class _Search:
 
     def _add_state(self, found: FeedbackGains) -> FeedbackGains:
         """Look for a regulator with its observer, and one that estimates a torque, too."""
-        gains = self._regulators()
+        gains = self._regulators
         try:
             observers = [self._model.observe(self._noise, error) for error in _ERRORS]
             wandering = [self._model.observe(self._noise, error, wander)
@@ -223,11 +213,11 @@ class _Search:
         growth = arm.growth(law)
         if growth > UNSTABLE_GROWTH:
             return Response(growth=growth)
-        return arm.respond(law, self._monitor)
+        return arm.respond(law, self._monitor, growth=growth)
 
     def _add_joints(self, found: FeedbackGains) -> FeedbackGains:
         """Look for gains on the joints alone: those next to regulators, and those given."""
-        coupled = [self._model.project(gain, _ERRORS[2]) for gain in self._regulators()]
+        coupled = [self._model.project(gain, _ERRORS[2]) for gain in self._regulators]
         best = self._firmest([joint_feedback(gain, self._rate) for gain in coupled])
         if best is not None:
             found = replace(found, coupled_joints=coupled[best[0]],
@@ -243,6 +233,7 @@ class _Search:
         return replace(found, joints=choices[which],
                        records={**found.records, 'joints': record})
 
+    @cached_property
     def _regulators(self) -> list[Array]:
         """Return gains on the state, the firmest first; none where there are none."""
         try:

@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from flex_planner.arms.arm import Arm
-from flex_planner.arms.kinematics import link_deflections
+from flex_planner.arms.kinematics import link_bends, tip_jacobian, twist_levers
+from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
+from flex_planner.control.extent import peak_to_peak
 from flex_planner.control.held_periods import HeldPeriods
 from flex_planner.control.joint_controller import JointController
 from flex_planner.control.joint_reference import JointReference
@@ -48,14 +50,16 @@ class Ringing:
     passive : numpy.ndarray, shape (n_f, instants, 2 n_t)
         From a state less `rest` to the coordinates without a motor in the second after it, at
         updates of the controller.
-    shapes : numpy.ndarray, shape (k, n_f)
-        From these coordinates to the deflections of points of the links.
+    shapes : tuple of numpy.ndarray, shape (k, 1 to 3, n_f)
+        From these coordinates to the deflections of k points: of links, along a line or in a
+        plane, of the stretched arm's tip by elastic joints, and of the tip in space of an arm
+        there.
 
     """
 
     rest: Array
     passive: Array
-    shapes: Array
+    shapes: tuple[Array, ...]
 
     @classmethod
     def of(cls, execution: Execution, goal: Array, hold: Array) -> Ringing:
@@ -75,14 +79,15 @@ class Ringing:
         while rows.shape[1] < count:  # twice as many instants each time
             rows = np.concatenate([rows, rows @ power], axis=1)
             power = power @ power
-        return cls(rest=rest, passive=rows[:, :count], shapes=_deflections(arm))
+        return cls(rest=rest, passive=rows[:, :count], shapes=tuple(_deflections(arm, rest)))
 
     def residual(self, away: Array) -> float:
         """Return the largest peak-to-peak deflection from a state less the rest (2 n_t,) [m]."""
         if not np.isfinite(away).all():
             return np.inf
-        deflections = self.shapes @ (self.passive @ away)
-        return float(np.nan_to_num(np.ptp(deflections, axis=1), nan=np.inf).max())
+        passive = self.passive @ away
+        extents = [peak_to_peak((part @ passive).transpose(2, 0, 1)) for part in self.shapes]
+        return float(np.nan_to_num(extents, nan=np.inf).max())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -149,10 +154,24 @@ def _rest_and_period(execution: Execution, goal: Array, hold: Array) -> tuple[Ar
     return state, free - forced @ feedback
 
 
-def _deflections(arm: Arm) -> Array:
-    """Return what makes deflections of passive coordinates: of links, beyond twisted joints."""
-    size = arm.n_passive
-    beyond = np.cumsum([link.length for link in reversed(arm.links)])[::-1]
-    twisted = np.eye(size)[:len(arm.elastic_joints)] * beyond[list(arm.elastic_joints), None]
-    return np.vstack([*(link_deflections(arm, i, np.eye(size))[::_STRIDE]
-                        for i, link in enumerate(arm.links) if link.modes), twisted])
+def _deflections(arm: Arm, rest: Array) -> list[Array]:
+    """
+    Return what makes deflections of passive coordinates, shape (k, 1 to 3, n_f) each.
+
+    Of links; beyond elastic joints; and of a spatial arm, whose links may twist, of its tip.
+
+    """
+    n, n_t, size = arm.n_joints, arm.n_coordinates, arm.n_passive
+    parts = [_of_modes(arm, i) for i, link in enumerate(arm.links) if link.modes]
+    if arm.elastic_joints:
+        twisted = np.eye(len(arm.elastic_joints), size) * twist_levers(arm)[:, None]
+        parts.append(twisted[:, None])
+    if isinstance(arm, SpatialArm):
+        parts.append(tip_jacobian(arm, rest[:n_t])[None, :, n:])
+    return parts
+
+
+def _of_modes(arm: Arm, index: int) -> Array:
+    """Return the deflections of a link's stations by the passive coordinates, (k, 1 or 2, m)."""
+    modal = np.eye(arm.n_coordinates)[arm.modal_slices[index], arm.n_joints:]
+    return link_bends(arm, index, modal)[::_STRIDE]

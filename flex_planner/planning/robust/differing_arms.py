@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import fields, replace
 
-from flex_planner.arms.arm import Arm
+from flex_planner.arms.arm import Arm, Link
+from flex_planner.arms.spatial_link import SpatialLink
 from flex_planner.base.validation import Array
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.physical_parameters import PhysicalParameters
@@ -100,14 +101,23 @@ def weighed_errors(robustness: Robustness, nominal: Execution, *, finely: bool =
 
 
 def _slow_frequency(nominal: Execution) -> float:
-    """Return the highest of the lowest frequencies, one for each part that bends [rad/s]."""
+    """Return the highest of the lowest frequencies, one for each way to bend [rad/s]."""
     arm, n = nominal.dynamics.arm, nominal.dynamics.arm.n_joints
     coordinates = nominal.start[:arm.n_coordinates]
     frequencies, _ = natural_modes(nominal.dynamics, coordinates, nominal.parameters,
                                    locked=False)
-    flexible = sum(bool(link.modes) for link in arm.links) + len(arm.elastic_joints)
+    flexible = sum(map(_ways_to_bend, arm.links)) + len(arm.elastic_joints)
     frequency = np.nan_to_num(frequencies)[n:n + flexible]
     return float(frequency.max(initial=0.0))
+
+
+def _ways_to_bend(link: Link | SpatialLink) -> int:
+    """Return in how many planes a link bends, and whether it twists; of elements two at most."""
+    if not isinstance(link, SpatialLink):
+        return int(link.modes > 0)
+    if not link.beam:
+        return min(link.modes, 2)
+    return sum(count > 0 for count in (*link.beam.modes, link.beam.twist_modes))
 
 
 def _other_start(nominal: Execution, dynamics: ArmDynamics, parameters: PhysicalParameters,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from flex_planner.arms.planar_only import require_planar
 from flex_planner.base.errors import InvalidTaskError, InvalidValueError
 from flex_planner.base.validation import Array, number
 from flex_planner.control.joint_controller import JointController
@@ -26,9 +25,11 @@ class Robustness:
     ----------
     max_residual : float
         Largest peak-to-peak deflection of any link in the second after the arrival, under the
-        joint controller, 1e-9 to 1000 [m].
+        joint controller, 1e-9 to 1000 [m]. What elastic joints move the stretched arm's tip by
+        counts, too, and of an arm in space what all of it moves the tip by.
     stiffness_error : float
-        By which share E I of all links may differ from the model, up and down, 0 to 0.5.
+        By which share E I of all links, and what else of them is stiff, may differ from the
+        model, up and down, 0 to 0.5. Springs of joints do not.
     payload_error : float
         The same of mass and inertia of the payload; one of the two must be > 0.
     controller : JointController or None
@@ -62,14 +63,10 @@ class Robustness:
         Raises
         ------
         InvalidTaskError
-            If the links are rigid, the motion does not end at rest, it has via points, rates of
-            torques have a price or a bound, or the payload, of which alone an error is given, has
-            no mass.
-        PlanarOnlyError
-            If the arm is a spatial one.
+            If nothing of the arm bends, nothing is there of which an error is given, the motion
+            does not end at rest, it has via points, or rates of torques have a price or a bound.
 
         """
-        require_planar(task.arm, 'plans that forgive errors of the model')
         if not task.arm.n_passive:
             raise InvalidTaskError('max_residual is given, but the links of the arm are rigid: '
                                    'there is no vibration')
@@ -82,6 +79,10 @@ class Robustness:
             if getattr(task, name).size:
                 raise InvalidTaskError(f'{name} is given, but must be left out of motions that '
                                        'forgive errors of the model (max_residual)')
+        if not task.arm.n_modes and self.stiffness_error:
+            raise InvalidTaskError('stiffness_error is given, but the links of the arm are rigid, '
+                                   'and springs of joints are taken as known: give payload_error '
+                                   'alone')
         if not self.stiffness_error and not (task.payload_mass or task.payload_inertia):
             raise InvalidTaskError('payload_error is given, but there is no payload: give '
                                    'stiffness_error')

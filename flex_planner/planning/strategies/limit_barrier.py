@@ -101,6 +101,32 @@ def reach_limit(parameter: FreeParameter, problem: MotionProblem, solver: Solver
         See `continue_in_price`.
 
     """
+    fallen = _fall_to_limit(parameter, problem, solver)
+    if fallen is None:
+        return None
+    return _solve_there(parameter, problem, *fallen, solver, target_gap) or _solve_easier(
+        parameter, problem, fallen[0].restrict(fallen[1].solution)[0], solver)
+
+
+def is_beyond_newton(parameter: FreeParameter, problem: MotionProblem, solver: Solver,
+                     target_gap: TargetGap) -> bool:
+    """
+    Return whether the limit is found with the barrier, but no motion within the limits from it.
+
+    Parameters
+    ----------
+    parameter, problem, solver, target_gap
+        As of `reach_limit`.
+
+    """
+    fallen = _fall_to_limit(parameter, problem, solver)
+    return fallen is not None and _solve_there(
+        parameter, problem, *fallen, solver, target_gap) is None
+
+
+def _fall_to_limit(parameter: FreeParameter, problem: MotionProblem,
+                   solver: Solver) -> tuple[LimitBarrier, BarrierOutcome] | None:
+    """Return a barrier and its end if that is a value nearer to the limit, else None."""
     if not applies(problem, solver):
         return None
     most, limit = _most_effort(problem), _LIMITS[parameter]
@@ -108,15 +134,19 @@ def reach_limit(parameter: FreeParameter, problem: MotionProblem, solver: Solver
         return None
     barrier = limit.barrier(problem, _PRICE * most / limit.amount(problem))
     met = _lower_mu(barrier, solver)
-    if met is None:
+    value = np.nan if met is None else barrier.restrict(met.solution)[0]
+    if met is None or not parameter.improves(value, parameter.value(problem)):
         return None
+    return (barrier, met) if parameter.is_possible(value) else None
+
+
+def _solve_there(parameter: FreeParameter, problem: MotionProblem, barrier: LimitBarrier,
+                 met: BarrierOutcome, solver: Solver, target_gap: TargetGap) -> Extremal | None:
+    """Return the motion within the limits at the lower price that leaves the gap wanted."""
     value = barrier.restrict(met.solution)[0]
-    if not parameter.improves(value, parameter.value(problem)) or not parameter.is_possible(value):
-        return None
     price = min(_find_price(problem, value, target_gap(value)), barrier.price)
-    near, guess = _lower_price(limit.barrier(problem, price), barrier, met, solver)
-    reached = parameter.solve_beyond(problem, near, lambda near: guess, price, solver)
-    return reached or _solve_easier(parameter, problem, value, solver)
+    near, guess = _lower_price(_LIMITS[parameter].barrier(problem, price), barrier, met, solver)
+    return parameter.solve_beyond(problem, near, lambda near: guess, price, solver)
 
 
 def limit_from_guess(parameter: FreeParameter, problem: MotionProblem,

@@ -9,13 +9,12 @@ weights but R: it does not change what the arm can do.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from flex_planner.base.errors import FlexPlannerError
-from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationSolution, GaussRule, Solver
 from flex_planner.collocation.barrier_mesh import follow_barrier
-from flex_planner.collocation.interior_point import BarrierOutcome, BarrierSchedule
+from flex_planner.collocation.interior_point import BarrierSchedule
 from flex_planner.optimal_control.constrained_motion import relieve_ends, slacks_of
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.path_barrier import PathBarrier
@@ -25,13 +24,8 @@ from flex_planner.optimal_control.state_payload_barrier import StatePayloadBarri
 from flex_planner.planning.strategies.free_parameters import FreeParameter, PAYLOAD
 from flex_planner.planning.strategies.homotopies import drop_weights
 from flex_planner.planning.strategies.limit_barrier import barrier_price, moved_mass
-from flex_planner.planning.strategies.within_limits import (
-    COARSE,
-    find_cost_rate,
-    first_count,
-    first_mesh,
-    STAGES,
-)
+from flex_planner.planning.strategies.reached_limit import ReachedLimit
+from flex_planner.planning.strategies.within_limits import first_count, first_mesh, STAGES
 import numpy as np
 
 # mu at first, and the bounds of it at last, of the price of the value per second
@@ -41,52 +35,6 @@ _SHARE = 0.5
 _TOLERANCE, _PATIENCE = 1e-3, 80
 # of the duration, over which torques may turn at least
 _TURN = 1 / 200
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ReachedLimit:
-    """
-    Where the interior-point method ended.
-
-    Attributes
-    ----------
-    value : float
-        Payload or duration [kg, s].
-    gap : float
-        What the barrier keeps of it at most: the number of limits times mu and the duration, by
-        the price. A bound where the task is convex, else the size of it [kg, s].
-    motion : CollocationSolution
-        With that value.
-    met : BarrierOutcome or None
-        The barrier's end, where the motion was found with one.
-
-    """
-
-    value: float
-    gap: float
-    motion: CollocationSolution
-    met: BarrierOutcome | None = None
-
-    def lower_price(self, problem: MotionProblem) -> BarrierOutcome:
-        """
-        Return a start for the motion of least cost with a value that is a little easier.
-
-        Costates and multipliers at a price that is nearly endless are as many times as large as mu
-        is; where the limit is near, they are alike.
-
-        """
-        assert self.met is not None
-        motion, states = self.motion, np.ones(problem.size)
-        states[problem.layout.costates] = 0
-        mu = COARSE * find_cost_rate(problem, _scale(motion, states))
-        ratio = mu / self.met.mu
-        costates = np.ones(problem.size)
-        costates[problem.layout.costates] = ratio
-        multipliers = np.ones(self.met.y.shape[-1])
-        bounded = _count_bounds(problem)
-        multipliers[bounded + (multipliers.size - bounded) // 2:] = ratio
-        near = _scale(motion, costates).stretched(problem.task.duration / motion.mesh[-1])
-        return replace(self.met, solution=near, y=self.met.y * multipliers, mu=mu)
 
 
 def reach_limit_without_jumps(parameter: FreeParameter, problem: MotionProblem, solver: Solver,
@@ -140,7 +88,8 @@ def reach_limit_without_jumps(parameter: FreeParameter, problem: MotionProblem, 
     if not met.converged:
         return None
     value, motion = barrier.restrict(met.solution)
-    return ReachedLimit(value=value, gap=limits * last * amount, motion=motion, met=met)
+    return ReachedLimit(value=value, gap=limits * last * amount, motion=motion, met=met,
+                        free=_count_bounds(bare))
 
 
 def _barriers(parameter: FreeParameter, problem: MotionProblem, slacks: PathSlacks, price: float,
@@ -165,9 +114,3 @@ def _without_prices(problem: MotionProblem) -> MotionProblem:
 def _count_bounds(problem: MotionProblem) -> int:
     """Return how many torques have a bound of their rates."""
     return int(np.isfinite(problem.task.torque_rate_bounds).sum())
-
-
-def _scale(motion: CollocationSolution, factors: Array) -> CollocationSolution:
-    """Return a motion with its unknowns multiplied by factors (m,)."""
-    return CollocationSolution(motion.mesh, motion.nodes * factors, motion.stages * factors,
-                               motion.rule)

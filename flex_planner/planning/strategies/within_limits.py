@@ -54,6 +54,8 @@ _ENDS = (_LAST[0], _SETTLING), (_LAST[1], _SETTLING), (_LAST[1], _PATIENCE)
 # at first, from a motion that limits have bent, in units of mu at last
 _NEAR = 10.0
 _TOLERANCE = 1e-2
+# of a motion with the motors' limits in the barrier: its certificate says how exact it is
+_COARSE_ERROR = 1e-4
 # of the mesh at the end: more would take long and are seldom a solution
 _MOST_INTERVALS, _MOST_MESHES = 1000, 8
 # positions in an interval
@@ -128,7 +130,10 @@ def solve_within_limits(problem: MotionProblem, slacks: PathSlacks, met: Barrier
     rate = find_cost_rate(problem, met.solution)
     limited = ConstrainedMotion(problem, slacks, _LAST[0] * rate)
     failed: CollocationResult | None = None
+    same = 0.0, False
     for last, settling in _ENDS[int(coarse):] if met.converged else ():
+        if same == (last, True):  # more iterations before they need not settle change nothing
+            continue
         finer = _follow(problem, slacks, met, last * rate, solver, settling)
         limited = limited.with_mu(last * rate).floored(finer.solution, _FLOOR)
         # where the interior point goes to and fro, Newton's method may still settle
@@ -141,7 +146,34 @@ def solve_within_limits(problem: MotionProblem, slacks: PathSlacks, met: Barrier
         if result.converged or result.status in INTERRUPTED:
             return limited, result
         failed = failed or result
+        same = last, finer.iterations <= settling
     return limited, failed or CollocationResult.failed(met.solution, met.message)
+
+
+def solve_smoothly(problem: MotionProblem, slacks: PathSlacks, met: BarrierOutcome,
+                   solver: Solver) -> tuple[ConstrainedMotion, CollocationResult]:
+    """
+    Return what `solve_within_limits` does, with the barrier as it is, the motors' limits in it.
+
+    Near the largest payload nearly all torques are on their limits, and where links ring they
+    switch so often that Newton's method does not find out when.
+
+    Parameters
+    ----------
+    problem, slacks, solver
+        As of `approach_limits`.
+    met : BarrierOutcome
+        A motion of the problem on the mesh of the method.
+
+    Raises
+    ------
+    StoppedError
+        If the monitor stopped it.
+
+    """
+    limited = ConstrainedMotion(problem, slacks, met.mu, smooth=True).floored(
+        met.solution, _FLOOR)
+    return limited, _finish(limited, met.solution, solver.coarse(_COARSE_ERROR))
 
 
 def solve_again(problem: MotionProblem, slacks: PathSlacks, near: CollocationSolution,
@@ -221,7 +253,8 @@ def _lower_floor(limited: ConstrainedMotion, soft: CollocationResult,
                 result.converged and _keeps(lower, result.solution)):
             break
         # step by step, which is slower than at once
-        lower = ConstrainedMotion(limited, limited.slacks, limited.mu, _FLOOR * limited.floor)
+        lower = ConstrainedMotion(limited, limited.slacks, limited.mu, _FLOOR * limited.floor,
+                                  smooth=limited.smooth)
         result = _finish(lower, soft.solution, solver)
         if not result.converged:
             break

@@ -12,8 +12,10 @@ from flex_planner.arms.arm import Arm
 from flex_planner.base.errors import FlexPlannerError, InvalidValueError
 from flex_planner.base.processes import helper_processes
 from flex_planner.base.text import printable
+from flex_planner.logs.identified_uncertainty import find_uncertainty
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.planning.robustness import prepare_robustness
+from flex_planner.planning.uncertainty import ASSUMED, Uncertainty
 from flex_planner.ros.messages.classes import WHY_NOT_ROS
 from flex_planner.ros.messages.plans import duration_seconds, planning_time_limit
 from flex_planner.ros.motion_recorder import MotionRecorder
@@ -36,6 +38,7 @@ from flex_planner.ros.runtime.parameters import (
     declare,
     declare_arm,
     judge_changes,
+    name_arm_file,
     warn_of_unknown,
 )
 from flex_planner.ros.runtime.running import run_node
@@ -97,6 +100,7 @@ class PlannerNode(Node):  # type: ignore[misc]
         warn_of_unknown(self, PlannerSettings, ARM_PARAMETERS)
         helper_processes()  # what the environment says is refused at once
         arm = declare_arm(self)
+        uncertainty = self._find_uncertainty(arm)
         self._settings = declare(self, PlannerSettings.for_arm(arm))
         self._settings.check_joints(arm.n_joints)
         recorder = OutcomeRecorder(arm, self.resolve_topic_name)
@@ -114,7 +118,8 @@ class PlannerNode(Node):  # type: ignore[misc]
         self._controller = Controller(self, action_name) if action_name else None
         self._planner = RequestPlanner(
             ArmModel(arm), recorder, starts, self._arm_state,
-            Replanner(self._topics.running, self._now_ns, self._listen_for_bending(arm)))
+            Replanner(self._topics.running, self._now_ns, self._listen_for_bending(arm)),
+            uncertainty)
         prepare_robustness(arm)
         self._queue = RequestQueue(self._settings.queue_length, self._settings.max_waiting_time)
         self._record, self._logs_next = Record(), 0.0
@@ -132,6 +137,15 @@ class PlannerNode(Node):  # type: ignore[misc]
                      lambda request, state: plan(request.task, state), fill_plan),
             Endpoint(self, '~/find_max_payload', (FindMaxPayload, action.FindMaxPayload), handlers,
                      search, fill_search)]
+
+    def _find_uncertainty(self, arm: Arm) -> Uncertainty:
+        """Return how far the arm may be from its file, which is logged."""
+        name = name_arm_file(self)
+        found = find_uncertainty(name, arm) if name else ASSUMED
+        self.get_logger().info(printable(
+            f'errors of the model of {arm.name}, for what is left on other arms and for gains: '
+            f'{found}'))
+        return found
 
     def _judge_parameters(self, changes: list[Parameter]) -> SetParametersResult:
         return judge_changes(self._settings, changes)

@@ -23,6 +23,7 @@ from flex_planner.planning.plan_path import plan_kind
 from flex_planner.planning.robustness import assess_robustness
 from flex_planner.planning.sampling import judge_execution, sample_plan
 from flex_planner.planning.strategies.initial_guesses import WARM_START
+from flex_planner.planning.uncertainty import ASSUMED, Uncertainty
 from flex_planner.planning.warnings import WarningKind
 from flex_planner.ros.messages.measured_starts import ArmStateError, starts_at_arm, with_start
 from flex_planner.ros.messages.payload_searches import (
@@ -87,13 +88,15 @@ class RequestPlanner:
         Where the arm is; without it, nobody knows and nothing is checked.
     replanner : Replanner, optional
         Plans again in motion; without it, no plan is carried out.
+    uncertainty : Uncertainty
+        Of the arm, a tenth by default: for what is left of a plan on other arms, and for gains.
 
     """
 
     def __init__(self, model: ArmModel, recorder: OutcomeRecorder,
                  starts: Starts | None = None, arm_state: ArmState | None = None,
-                 replanner: Replanner | None = None) -> None:
-        self._model, self._recorder = model, recorder
+                 replanner: Replanner | None = None, uncertainty: Uncertainty = ASSUMED) -> None:
+        self._model, self._recorder, self._uncertainty = model, recorder, uncertainty
         self._starts = Starts('', model.arm) if starts is None else starts
         self._arm_state = arm_state
         self._replanner = replanner or Replanner(RunningPlans(), time.time_ns)
@@ -124,7 +127,7 @@ class RequestPlanner:
             report = report_from_plan(plan)
             if cell and plan.strategy == WARM_START:
                 report.map_cell = cell.place
-            return _outcome(report, plan, settings, monitor)
+            return self._outcome(report, plan, settings, monitor)
 
         return self._conclude(plan_task, message, state)
 
@@ -158,7 +161,7 @@ class RequestPlanner:
             report = report_from_search(found)
             if cell and found.warm:
                 report.map_cell = cell.place
-            outcome = _outcome(report, found.plan, settings, monitor)
+            outcome = self._outcome(report, found.plan, settings, monitor)
             return replace(outcome, search=search_message(found, options))
 
         return self._conclude(search_payload, request.task, state, search_without_result(request))
@@ -222,6 +225,41 @@ class RequestPlanner:
         if outcome.trajectory.points:
             outcome.report.start_time = message.start_time
         return replace(outcome, start_ns=start_ns)
+
+    def _outcome(self, report: PlanReport, plan: Plan | None, settings: PlannerSettings,
+                 monitor: Monitor) -> Outcome:
+        """Return the outcome that a report tells of, with a trajectory if it is a success."""
+        if plan is None or report.error_code != PlanReport.NONE:
+            return Outcome(report=report, trajectory=FlexibleTrajectory(), plan=plan)
+        reference = sample_plan(plan, settings.sampling(), monitor)
+        judged = judge_execution(plan, reference)
+        if not judged.solved:
+            add_execution(report, reference)
+            report.error_code = STATUS_CODES[judged.status]
+            report.error_msg = say_reason(judged.status.value, judged.message)
+            return Outcome(report=report, trajectory=FlexibleTrajectory(), plan=judged)
+        reference = replace(reference, robustness=assess_robustness(
+            plan, reference, monitor, uncertainty=self._uncertainty))
+        trajectory = report_trajectory(report, plan, reference, settings)
+        broken = trajectory_violations(trajectory.joint_trajectory, settings.joint_names)
+        if broken:
+            raise RuntimeError(f'the trajectory would be refused: {"; ".join(broken)}')
+        return Outcome(report=report, trajectory=trajectory, plan=plan, reference=reference,
+                       gains=self._find_gains(plan, settings, monitor))
+
+    def _find_gains(self, plan: Plan, settings: PlannerSettings,
+                    monitor: Monitor) -> FeedbackGains | None:
+        """Return gains of feedback, None where they are not asked for or the motion has none."""
+        if not settings.feedback_gains:
+            return None
+        errors, mass = self._uncertainty, float(plan.problem.parameters.payload_mass)
+        try:
+            return find_feedback_gains(plan, GainSettings(
+                controller=settings.controller(), stiffness_error=errors.stiffness,
+                payload_error=errors.payload_error(mass)), monitor)
+        except FlexPlannerError as error:
+            _LOG.warning('no gains of feedback: %s', error)
+            return None
 
     def check_start(self, outcome: Outcome, state: RequestState) -> None:
         """Make an outcome a failure if its plan begins elsewhere than the arm, or too late."""
@@ -295,35 +333,3 @@ def _name_limit(report: PlanReport, monitor: Monitor) -> None:
     """Say which time limit was reached, if one was."""
     if report.error_code == PlanReport.TIMEOUT:
         report.error_msg += f'; allowed_planning_time is {monitor.time_limit:g} s'
-
-
-def _outcome(report: PlanReport, plan: Plan | None, settings: PlannerSettings,
-             monitor: Monitor) -> Outcome:
-    """Return the outcome that a report tells of, with a trajectory if it is a success."""
-    if plan is None or report.error_code != PlanReport.NONE:
-        return Outcome(report=report, trajectory=FlexibleTrajectory(), plan=plan)
-    reference = sample_plan(plan, settings.sampling(), monitor)
-    judged = judge_execution(plan, reference)
-    if not judged.solved:
-        add_execution(report, reference)
-        report.error_code = STATUS_CODES[judged.status]
-        report.error_msg = say_reason(judged.status.value, judged.message)
-        return Outcome(report=report, trajectory=FlexibleTrajectory(), plan=judged)
-    reference = replace(reference, robustness=assess_robustness(plan, reference, monitor))
-    trajectory = report_trajectory(report, plan, reference, settings)
-    broken = trajectory_violations(trajectory.joint_trajectory, settings.joint_names)
-    if broken:
-        raise RuntimeError(f'the trajectory would be refused: {"; ".join(broken)}')
-    return Outcome(report=report, trajectory=trajectory, plan=plan, reference=reference,
-                   gains=_find_gains(plan, settings, monitor))
-
-
-def _find_gains(plan: Plan, settings: PlannerSettings, monitor: Monitor) -> FeedbackGains | None:
-    """Return gains of feedback, None where they are not asked for or the motion has none."""
-    if not settings.feedback_gains:
-        return None
-    try:
-        return find_feedback_gains(plan, GainSettings(controller=settings.controller()), monitor)
-    except FlexPlannerError as error:
-        _LOG.warning('no gains of feedback: %s', error)
-        return None

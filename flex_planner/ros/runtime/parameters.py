@@ -146,10 +146,16 @@ def declare_arm(node: Node) -> Arm:
     """
     description = Description(
         text='Name of a preset in config/arms, or path of an arm file.', read_only=True)
-    given = 'arm' in _given(node)
-    name = str(node.declare_parameter('arm', _DEFAULT_ARM, _descriptor(description, '')).value)
+    node.declare_parameter('arm', _DEFAULT_ARM, _descriptor(description, ''))
     text = declare_description(node)
-    return arm_from_mapping({}, description=text) if text and not given else load_arm(name, text)
+    name = name_arm_file(node)
+    return load_arm(name, text) if name else arm_from_mapping({}, description=text)
+
+
+def name_arm_file(node: Node) -> str:
+    """Return preset or path of the arm that was declared; empty if it is a URDF without one."""
+    described = any(node.get_parameter(name).value for name in ARM_PARAMETERS[1:])
+    return '' if described and 'arm' not in _given(node) else str(node.get_parameter('arm').value)
 
 
 def declare_description(node: Node) -> str:

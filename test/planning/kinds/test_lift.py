@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from factories import TaskFactory
-from flex_planner.base.progress import Monitor
+from flex_planner.base.progress import Monitor, StoppedError
 from flex_planner.collocation import Solver
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.direct.unknowns import Free
@@ -123,7 +123,10 @@ def test_interrupted_motion_says_so(rigid: MotionProblem, flexible: MotionProble
                                     kinds: dict[Free, KindOfMotion]) -> None:
     stopped = Solver(monitor=Monitor(time_limit=-1.0)).coarse()
     for problem in (rigid, flexible):
-        found = solve_best_kind(PAYLOAD, problem, [kinds[Free.PAYLOAD]], stopped)
+        try:
+            found = solve_best_kind(PAYLOAD, problem, [kinds[Free.PAYLOAD]], stopped)
+        except StoppedError:  # where no test before has had the core of that size compiled
+            continue
         assert found is None or found.interrupted
 
 

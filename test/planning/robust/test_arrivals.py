@@ -5,11 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 from factories import PlanFactory
+from flex_planner.arms.kinematics import tip_position
 from flex_planner.base.progress import Monitor
-from flex_planner.control.joint_controller import JointController
+from flex_planner.control.extent import peak_to_peak
+from flex_planner.control.joint_controller import Gains, JointController
 from flex_planner.control.linearisation import hold_inputs, linearise_dynamics
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
+from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import Plan
+from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.robust.arrivals import tabulate_reference
 from flex_planner.planning.robust.differing_plans import as_keys, CarriedOut, DifferingArms
 from flex_planner.planning.robust.objective import Robustness
@@ -17,6 +21,7 @@ from flex_planner.simulation.settling import bending_peak_to_peak
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from spatial_arms import yaw_pitch
 
 
 def test_residual_is_that_of_a_second_of_simulation(clamped_plan: Plan,
@@ -32,6 +37,25 @@ def test_residual_is_that_of_a_second_of_simulation(clamped_plan: Plan,
     simulated = bending_peak_to_peak(clamped_plan.arm, after[:, :clamped_plan.arm.n_coordinates])
     # linearised about the rest, after an arrival 12 mm away from it
     assert carried_out.residual(errors) == pytest.approx(simulated, rel=0.02)
+
+
+def test_arm_in_space_rings_as_a_simulation_does() -> None:
+    task = Task(arm=yaw_pitch(), start_positions=[0, -0.2], goal_positions=[1.2, 0.3],
+                duration=0.8, payload_mass=0.4)
+    plan = plan_path(task, search='fast')
+    controller = JointController(gains=Gains.of(2, 200.0, 20.0))
+    arms = DifferingArms(plan, Robustness(max_residual=1e-3, controller=controller))
+    execution, _ = arms.arm((-0.1, 0.1)) or pytest.fail('buckles')
+    motion = execution.arm.follow(tabulate_reference(plan, controller), execution.start, 1.8)
+    after = motion.states[motion.times >= 0.8 - 1e-9][:, :4]
+    # of the link in both planes, and of the tip by the link alone
+    still = np.hstack([np.tile(after[-1, :2], (len(after), 1)), after[:, 2:]])
+    simulated = max(bending_peak_to_peak(plan.arm, after),
+                    peak_to_peak(tip_position(plan.arm, still)))
+    found = CarriedOut(plan, arms, Monitor()).residual((-0.1, 0.1))
+    assert found == pytest.approx(simulated, rel=0.02)
+    planes = np.ptp(after[:, 2:], axis=0)
+    assert planes.min() > 0.1 * planes.max() > 1e-4
 
 
 def test_arms_that_are_looked_at_are_closer_where_vibrations_are_fast(

@@ -22,6 +22,7 @@ from flex_planner.planning.robust.objective import Robustness, RobustSearch
 from flex_planner.planning.sampling import judge_execution, sample_plan, SamplingSettings
 import numpy as np
 import pytest
+from spatial_arms import yaw_pitch
 
 
 def forgiving(plan: Plan, limit: float, controller: JointController | None = None,
@@ -152,3 +153,16 @@ def test_unstable_controller_is_named() -> None:
     assert found.status is PlanStatus.OBJECTIVE_NOT_MET
     assert 'the PD of the joints' in found.message and 'is unstable' in found.message
     assert len(search_of(found).trials) == 1
+
+
+@pytest.mark.thorough
+def test_arm_in_space_rings_less_for_a_quarter_of_a_percent() -> None:
+    task = Task(arm=yaw_pitch(), start_positions=[0, -0.2], goal_positions=[1.2, 0.3],
+                duration=0.8, payload_mass=0.4)
+    plan = plan_path(task, search='fast')
+    found = forgiving(plan, 3e-3, JointController(gains=Gains.of(2, 200.0, 20.0)))
+    search = search_of(found)
+    assert found.solved and search.met
+    assert search.residual <= 3e-3 < 0.85 * search.plain_residual
+    assert plan.cost < found.cost <= 1.003 * plan.cost
+    assert not CertificateLimits().violations(found.certificate)

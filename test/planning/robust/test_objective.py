@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from flex_planner.arms.arm_files import load_arm
 from flex_planner.base.errors import InvalidTaskError, InvalidValueError
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.robust.objective import Robustness
@@ -28,3 +29,12 @@ def test_error_of_a_payload_needs_one(clamped_task: Task) -> None:
     with pytest.raises(InvalidTaskError, match='there is no payload'):
         Robustness(max_residual=1e-3, stiffness_error=0.0).check(task)
     Robustness(max_residual=1e-3).check(task)
+
+
+def test_springs_of_joints_are_taken_as_known() -> None:
+    arm = load_arm('scara_elastic')
+    task = Task(arm=arm, start_positions=[0, 1, -0.1, 0], goal_positions=[1, 1, -0.1, 0],
+                duration=1.0, payload_mass=1.0)
+    with pytest.raises(InvalidTaskError, match='springs of joints are taken as known: give pay'):
+        Robustness(max_residual=1e-3).check(task)
+    Robustness(max_residual=1e-3, stiffness_error=0.0).check(task)

@@ -7,13 +7,14 @@ from collections.abc import Iterator
 from contextlib import ExitStack
 import math
 from pathlib import Path
+import shutil
 import signal
 import subprocess
 import sys
 import time
 from typing import Any
 
-from flex_planner.arms.arm_files import load_arm
+from flex_planner.arms.arm_files import find_arm_file, load_arm
 from flex_planner.optimal_control.task import postures_from_points
 from flex_planner.ros.messages.trajectory_rules import trajectory_violations
 from flex_planner.ros.runtime.processes import NodeProcess
@@ -544,13 +545,17 @@ def test_node_can_be_ended_while_it_starts(tmp_path: Path, number: signal.Signal
 
 
 def test_node_with_a_bad_parameter_says_so_and_ends(tmp_path: Path) -> None:
+    of_another = tmp_path / 'arm.yaml'
+    shutil.copy(find_arm_file('korayem_rigid'), of_another)
+    (tmp_path / 'arm_identification.yaml').write_text('parameters: []')
     wrong: list[tuple[dict[str, object], str]] = [
         ({'arm': 'no_such_arm'}, "arm 'no_such_arm' is neither a file nor one of the presets"),
         ({'arm': 'korayem_rigid', 'joint_names': []}, 'joint_names'),
         ({'arm': 'korayem_rigid', 'joint_names': ['a', 'b', 'c'],
           'effort_weights': [1.0, 1.0, 1.0], 'controller_stiffness': [1.0, 1.0, 1.0],
           'controller_damping': [1.0, 1.0, 1.0]}, 'joint_names'),
-        ({'arm': 'korayem_rigid', 'tolerance': 5.0}, 'tolerance')]
+        ({'arm': 'korayem_rigid', 'tolerance': 5.0}, 'tolerance'),
+        ({'arm': str(of_another)}, 'arm_identification.yaml is not what flex-planner identify')]
     with ExitStack() as stack:  # all start at once, which takes hardly longer than one
         nodes = [stack.enter_context(NodeProcess(
             'flex_planner.ros.planner.node', parameters, log=tmp_path / f'{k}.log'))

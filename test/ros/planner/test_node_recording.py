@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from factories import PlanFactory
 from flex_planner.arms.arm import Arm
+from flex_planner.arms.arm_files import find_arm_file
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.sampling import sample_plan
 from flex_planner.reports.recording import RecordedRequest
@@ -100,7 +101,14 @@ def only(found: list[Found], topic: str) -> Found:
 
 @pytest.fixture(scope='module')
 def planner(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Planner]:
-    with Planner(tmp_path_factory.mktemp('recorded'), 'korayem_ei50') as planner:
+    folder = tmp_path_factory.mktemp('recorded')
+    path = folder / 'arm.yaml'
+    shutil.copy(find_arm_file('korayem_ei50'), path)
+    path.with_name('arm_identification.yaml').write_text(yaml.safe_dump({'parameters': [
+        {'name': name, 'value': value, 'half_width': share * value, 'spread': None,
+         'verdict': 'identified'} for name, value, share in (
+             ('payload_mass', 0.8, 0.02), ('links[0].flexural_rigidity', 50, 0.03))]}))
+    with Planner(folder, str(path)) as planner:
         yield planner
 
 
@@ -137,6 +145,13 @@ def test_request_and_answer_are_recorded_as_they_were(answer: PlanPath.Response,
                             ('flexible_trajectory', trajectory)):
         recorded = plain(only(found, topic).message, original)
         assert recorded == plain(original, original), topic
+
+
+def test_figures_on_other_arms_are_those_of_the_identification_beside_the_arm_file(
+        planner: Planner, answer: PlanPath.Response) -> None:
+    report = answer.report
+    assert (report.stiffness_difference, report.payload_difference) == (0.03, 0.02)
+    assert 'stiffness +-3%, payload of 0.8 kg +-2% (identified, ' in planner.log()
 
 
 @READERS

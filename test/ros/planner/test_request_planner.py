@@ -13,6 +13,7 @@ from typing import Any
 from flex_planner.arms.arm import Arm, Joint
 from flex_planner.base.progress import StoppedError, StopReason
 from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.planning.uncertainty import Uncertainty
 from flex_planner.recording import read_metadata
 from flex_planner.reports.recording import RecordedRequest
 from flex_planner.ros.planner import request_planner
@@ -94,8 +95,8 @@ def test_recording_that_is_told_to_stop_leaves_nothing_and_is_not_published(
     told = []  # once the samples are judged, everyone is told to stop
     assess = request_planner.assess_robustness
 
-    def assessed(*arguments: Any) -> Any:
-        robustness = assess(*arguments)
+    def assessed(*arguments: Any, **options: Any) -> Any:
+        robustness = assess(*arguments, **options)
         told.append(True)
         return robustness
 
@@ -181,6 +182,20 @@ def test_topics_of_a_recording_are_named_as_they_are_remapped(
     assert RecordedRequest.read(path).solved
 
 
+def test_arms_that_differ_are_those_of_an_identification(
+        ei5_model: ArmModel, settings: PlannerSettings) -> None:
+    known = Uncertainty(stiffness=0.01, payload=0.02, payload_mass=1.0)
+    worker = RequestPlanner(ei5_model, OutcomeRecorder(ei5_model.arm, '/flex_planner'),
+                            uncertainty=known)
+    state = RequestState(settings=replace(settings, record=False, feedback_gains=True))
+    outcome = worker.plan(task(), state)
+    report, gains = outcome.report, outcome.gains
+    assert (report.stiffness_difference, report.payload_difference) == (0.01, 0.02)
+    assert gains is not None
+    assert {(abs(one.stiffness), abs(one.payload)) for one in gains.differences} == {
+        (0.0, 0.0), (0.01, 0.02)}
+
+
 def test_ticket_tells_how_far_a_plan_is(worker: RequestPlanner, settings: PlannerSettings) -> None:
     # a search for cheaper kinds would end on the mesh of another motion
     state = RequestState(settings=replace(settings, record=False, search='fast'))
@@ -262,7 +277,8 @@ def test_parameters_decide_where_the_request_does_not(worker: RequestPlanner,
 
 def test_search_from_more_than_the_maximum_finds_nothing(worker: RequestPlanner,
                                                          settings: PlannerSettings) -> None:
-    outcome = search(worker, replace(settings, search='fast'), payload_mass=7.0)
+    outcome = search(worker, replace(settings, search='fast', allowed_planning_time=200.0),
+                     payload_mass=7.0)
     check_failure(outcome, PlanReport.NOT_FOUND, 'no motion with 7 kg in 1 s was found')
 
 

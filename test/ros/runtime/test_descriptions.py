@@ -27,12 +27,17 @@ class GivenNode:
 
     def __init__(self, **given: str) -> None:
         self._parameter_overrides, self.asked = given, list[str]()
+        self._values: dict[str, SimpleNamespace] = {}
 
     def declare_parameter(self, name: str, default: str, descriptor: Any) -> SimpleNamespace:
         self.asked.append(name)
         assert descriptor.read_only
         assert descriptor.description
-        return SimpleNamespace(value=self._parameter_overrides.get(name, default))
+        self._values[name] = SimpleNamespace(value=self._parameter_overrides.get(name, default))
+        return self._values[name]
+
+    def get_parameter(self, name: str) -> SimpleNamespace:
+        return self._values[name]
 
 
 def declared(**given: str) -> SpatialArm:

@@ -16,9 +16,9 @@ LSB = 2 * np.pi / 2**16
 def record_motion(arm: Arm, payload: float, drive: Drive, reference: JointReference,
                   seconds: float, *, offset: np.ndarray | None = None, delay: float = 0.0,
                   lead: float = 0.02, resolution: float = LSB, every: int = 1,
-                  seed: int = 0) -> JointLog:
+                  seed: int = 0, away: np.ndarray | None = None) -> JointLog:
     """
-    Return the log of a motion.
+    Return the log of a motion, from rest or `away` from it: passive coordinates and all rates.
 
     The true arm and its encoders differ by the offset; the torque is `delay` late. Steps are of
     the method of Dormand and Prince of order 8, each with the torque that acts then.
@@ -31,6 +31,8 @@ def record_motion(arm: Arm, payload: float, drive: Drive, reference: JointRefere
     advance = dynamics.held_step(physical)
     state = np.zeros(2 * arm.n_coordinates)
     state[:n] = reference.positions[0] - shift
+    if away is not None:
+        state[n:] = away
     lag, share = divmod(delay / period, 1)
     past = [np.zeros(n)] * (int(lag) + 2)
     keeps = np.exp(-2 * np.pi * drive.speed_filter * period) if drive.speed_filter else 0.0
