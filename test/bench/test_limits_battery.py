@@ -19,7 +19,8 @@ import pytest
 _WORSE = 1e-3
 _KINDS_THAT_BREAK_LIMITS = [(7, 0.0615903), (42, 0.0493899)]
 _TOUCHED_LIMITS = [(28, 0.0141108), (73, 0.130643)]
-# with 240 intervals for the first and the last: with less it passes between its points what it should touch
+# with 240 intervals for the first and the last: with less it passes between its points what it
+# should touch
 _SLOW = [(41, 0.144070), (54, 0.0287053), (82, 0.0315937)]
 
 
