@@ -158,8 +158,9 @@ SPATIAL = """
 ## Arms in space
 
 Motions from cold with the compiled functions at hand; `python -m bench.spatial` has the arms, the
-ends and the weights. CPU time, and the time that was set as a bar beforehand where there is one.
-*Far* goals are those on whose way motors saturate or joints meet their limits.
+ends and the weights. CPU time of the quicker one of two runs, and the time that was set as a bar
+beforehand where there is one; other work on the machine, as when this was measured (a load of 9 to
+12 on two cores), makes it up to twice as long. On the way to *far* goals joints meet their limits.
 
 {table}
 """

@@ -8,6 +8,7 @@ Of a model of elements only integrals are kept, as of a beam, see `flex_planner.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 from flex_planner.arms.link import MAX_MODES
 from flex_planner.arms.mechanism import FlexibleBody
@@ -108,11 +109,11 @@ def turn_body(body: FlexibleBody, axes: Array) -> FlexibleBody:
     """Return integrals in other axes, the columns of a rotation (3, 3) in those that they have."""
     if np.array_equal(axes, np.eye(3)):
         return body
-    vectors = {name: clean(axes.T @ getattr(body, name)) for name in (
+    vectors: dict[str, Any] = {name: clean(axes.T @ getattr(body, name)) for name in (
         'first_moment', 'displacement', 'moment', 'tip', 'tip_displacement', 'tip_turn', 'spin')}
-    matrices = {name: clean(axes.T @ getattr(body, name) @ axes)
+    matrices: dict[str, Any] = {name: clean(axes.T @ getattr(body, name) @ axes)
                 for name in ('inertia', 'inertia_slope', 'inertia_bend')}
-    bent = {name: np.einsum('ab,ajk->bjk', axes, getattr(body, name))
+    bent: dict[str, Any] = {name: np.einsum('ab,ajk->bjk', axes, getattr(body, name))
             for name in ('shortening', 'tip_shortening')}
     return replace(body, cross_moment=clean(body.cross_moment @ axes), **vectors, **matrices,
                    **bent)
