@@ -32,6 +32,7 @@ setup(
     package_dir=DATA_FOLDERS,
     package_data={'flex_planner': ['py.typed'],
                   'flex_planner.collocation': ['core.c', 'core_parts/*.c'],
+                  'flex_planner.control': ['held_periods.c'],
                   'flex_planner.dynamics': ['integration.c'],
                   'flex_planner.config': ['arm_template.yaml', 'arms/*.yaml', 'studies/*.yaml'],
                   'flex_planner.recording.flex_planner_interfaces': [

@@ -133,11 +133,11 @@ def single_link(every: int, away: Sequence[float] = ()) -> Case:
 
 def _swing(size: float, seconds: float = 0.5) -> JointReference:
     """Return a motion of a polynomial of fifth order, with the torque of a stiff arm."""
-    times = np.linspace(0, seconds, 101)
+    times: Array = np.linspace(0, seconds, 101, dtype=np.float64)
     s = times / seconds
     angle = np.polynomial.Polynomial([0, 0, 0, 10, -15, 6])
-    position, speed, acceleration = (
-        size / seconds**k * angle.deriv(k)(s)[:, None] for k in range(3))
+    position, speed, acceleration = (np.asarray(
+        size / seconds**k * angle.deriv(k)(s)[:, None], dtype=np.float64) for k in range(3))
     return JointReference(times=times, positions=position, velocities=speed,
                           accelerations=acceleration, torques=0.14 * acceleration)
 

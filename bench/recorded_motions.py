@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from flex_planner.arms.arm import Arm
+from flex_planner.base.validation import Array
 from flex_planner.control.joint_reference import JointReference
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.physical_parameters import PhysicalParameters
@@ -14,9 +15,9 @@ LSB = 2 * np.pi / 2**16
 
 
 def record_motion(arm: Arm, payload: float, drive: Drive, reference: JointReference,
-                  seconds: float, *, offset: np.ndarray | None = None, delay: float = 0.0,
+                  seconds: float, *, offset: Array | None = None, delay: float = 0.0,
                   lead: float = 0.02, resolution: float = LSB, every: int = 1,
-                  seed: int = 0, away: np.ndarray | None = None) -> JointLog:
+                  seed: int = 0, away: Array | None = None) -> JointLog:
     """
     Return the log of a motion, from rest or `away` from it: passive coordinates and all rates.
 
@@ -29,15 +30,15 @@ def record_motion(arm: Arm, payload: float, drive: Drive, reference: JointRefere
     dynamics = ArmDynamics.of(arm)
     physical = PhysicalParameters.of_arm(arm, payload_mass=payload).physical
     advance = dynamics.held_step(physical)
-    state = np.zeros(2 * arm.n_coordinates)
+    state: Array = np.zeros(2 * arm.n_coordinates)
     state[:n] = reference.positions[0] - shift
     if away is not None:
         state[n:] = away
     lag, share = divmod(delay / period, 1)
-    past = [np.zeros(n)] * (int(lag) + 2)
+    past: list[Array] = [np.zeros(n)] * (int(lag) + 2)
     keeps = np.exp(-2 * np.pi * drive.speed_filter * period) if drive.speed_filter else 0.0
 
-    def read() -> np.ndarray:
+    def read() -> Array:
         angles = state[:n] + shift
         if not resolution:
             return angles

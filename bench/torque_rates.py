@@ -1,8 +1,9 @@
 """
-The limits of the paper's motion with bounds of the rates of torques, by IPOPT.
+Motions of two rigid links with prices and bounds of the rates of torques, by IPOPT.
 
 A programme of its own, on Radau collocation of textbook equations of two rigid links, with torque
-as a state and its rate as the control: ``python -m bench.torque_rates``.
+as a state and its rate as the control. ``python -m bench.torque_rates`` prints the limits of the
+paper's motion; `bench.rates_battery` holds random motions against it.
 
 """
 
@@ -14,6 +15,8 @@ from typing import Any
 
 import casadi as ca
 from flex_planner import load_arm, Task
+from flex_planner.base.validation import Array
+from flex_planner.planning.plan import Plan
 import numpy as np
 
 _DEGREE = 3
@@ -36,6 +39,18 @@ def find_limit(task: Task, *, payload: bool, intervals: int) -> float:
         Of equal length.
 
     """
+    found = _optimise(task, 'payload' if payload else 'duration', intervals, None)
+    return np.nan if found is None else float(found[-2 if payload else -1])
+
+
+def find_cost(task: Task, intervals: int, plan: Plan | None = None) -> float:
+    """Return the least cost of a task from a plan or a straight line, inf for none."""
+    found = _optimise(task, '', intervals, plan)
+    return np.inf if found is None else float(found[0])
+
+
+def _optimise(task: Task, free: str, intervals: int, plan: Plan | None) -> Array | None:
+    """Return cost, payload and duration of the best motion with one of these free, or none."""
     K, roots = intervals * _DEGREE, ca.collocation_points(_DEGREE, 'radau')
     C, _, B = ca.collocation_coeff(roots)
     q, v, a, u, r = (ca.SX.sym(name, 2, K) for name in 'qvaur')
@@ -58,23 +73,40 @@ def find_limit(task: Task, *, payload: bool, intervals: int) -> float:
             margins += [stall - slope * v[:, j] - u[:, j], stall + slope * v[:, j] + u[:, j]]
     rows += [first[0] - ca.DM(task.goal_positions), first[1], first[2]]
     equations, inequalities = ca.vertcat(*rows), ca.vertcat(*margins)
+    aim = {'payload': -m + _TINY * cost, 'duration': T + _TINY * cost}.get(free, cost)
+    unknowns = ca.vertcat(*(ca.vec(each) for each in (q, v, a, u, r)), m, T)
     solver = ca.nlpsol('limit', 'ipopt', {
-        'x': ca.vertcat(*(ca.vec(each) for each in (q, v, a, u, r)), m, T),
-        'f': (-m if payload else T) + _TINY * cost, 'g': ca.vertcat(equations, inequalities)}, {
+        'x': unknowns, 'f': aim, 'g': ca.vertcat(equations, inequalities)}, {
             'ipopt': {'print_level': 0, 'sb': 'yes', 'max_iter': 800}, 'print_time': False})
     endless, bounds = np.full(8 * K, np.inf), np.tile(task.torque_rate_bounds, K)
-    least = [0.0, task.duration] if payload else [task.payload_mass, _SHORTEST]
-    most = [_HEAVIEST, task.duration] if payload else [task.payload_mass, _LONGEST]
-    way = task.goal_positions - task.start_positions
+    given = [task.payload_mass, task.duration]
+    least = [0.0 if free == 'payload' else given[0], _SHORTEST if free == 'duration' else given[1]]
+    most = [_HEAVIEST if free == 'payload' else given[0],
+            _LONGEST if free == 'duration' else given[1]]
     times = np.concatenate([(k + np.array(roots)) / intervals for k in range(intervals)])
-    start = np.concatenate([
-        (task.start_positions + np.outer(times, way)).ravel(), np.tile(way / task.duration, K),
-        np.zeros(6 * K), np.array([task.payload_mass, task.duration])])
+    start = np.concatenate([_straight(task, times) if plan is None else _along(plan, times),
+                            np.zeros(2 * K), np.array(given)])
     found = solver(x0=start, lbx=np.concatenate([-endless, -bounds, least]),
                    ubx=np.concatenate([endless, bounds, most]), lbg=0, ubg=ca.vertcat(
                        ca.DM.zeros(equations.numel()), ca.inf * ca.DM.ones(inequalities.numel())))
-    unknowns = np.ravel(found['x'])
-    return float(unknowns[-2 if payload else -1]) if solver.stats()['success'] else np.nan
+    if not solver.stats()['success']:
+        return None
+    spent = ca.Function('cost', [unknowns], [cost])(found['x'])
+    return np.append(float(spent), np.ravel(found['x'])[-2:])
+
+
+def _straight(task: Task, times: Array) -> Array:
+    """Return q, v, a and u on a straight line at shares (k,) of the duration, (8 k,)."""
+    way = task.goal_positions - task.start_positions
+    return np.concatenate([(task.start_positions + np.outer(times, way)).ravel(),
+                           np.tile(way / task.duration, times.size), np.zeros(4 * times.size)])
+
+
+def _along(plan: Plan, times: Array) -> Array:
+    """Return q, v, a and u of a plan at shares (k,) of its duration, (8 k,)."""
+    at = plan.sample(times * plan.task.duration)
+    return np.concatenate([each.ravel() for each in (
+        at.coordinates, at.rates, at.accelerations, at.torques)])
 
 
 def _torques(task: Task, load: Any, q: Any, v: Any, a: Any) -> Any:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.progress import StoppedError
 from flex_planner.capacity.bracket import bracket_width
@@ -24,7 +25,7 @@ from flex_planner.optimal_control.holding import holding_limit
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import MAX_PAYLOAD
 from flex_planner.optimal_control.totals import integrate_totals
-from flex_planner.planning.bending import find_largest_bending, LARGEST
+from flex_planner.planning.bending import find_largest_bending, LARGEST, limits_of_model
 from flex_planner.planning.kinds.clusters import MOST_KINDS
 from flex_planner.planning.kinds.effort import SearchEffort
 from flex_planner.planning.kinds.kinds_strategy import as_guess
@@ -56,9 +57,7 @@ def search_directly(problem: MotionProblem, solver: Solver, accuracy: float,
     """Follow the price to the limit, then plan there."""
     search = LimitSearch(PAYLOAD, problem, solver, accuracy, effort)
     try:
-        held = None if start is not None else (
-            _carry_within_model(problem, solver, accuracy, effort)
-            or _hold_at_once(problem, solver) or _carry_the_most(problem, solver))
+        held = None if start is not None else _find_at_once(problem, solver, accuracy, effort)
         if held is not None and not (held.held or held.within_limits):
             return with_bound(held, problem)
         found = held or _follow(search, problem, solver, start, accuracy)
@@ -106,6 +105,21 @@ def _follow(search: LimitSearch, problem: MotionProblem, solver: Solver,
     return found
 
 
+def _find_at_once(problem: MotionProblem, solver: Solver, accuracy: float,
+                  effort: SearchEffort) -> MaxPayload | None:
+    """Return the outcome where no price need be followed, or none can be."""
+    if _bends_too_far(problem):  # so does what can be held
+        found = _carry_within_model(problem, solver, accuracy, effort)
+        touched = found is not None and found.plan is not None and is_touched(found.plan)
+        return found if touched else _carry_the_most(problem, solver)
+    found = _hold_at_once(problem, solver) or _carry_the_most(problem, solver)
+    if found is not None or not _switches_often(problem, solver, accuracy):
+        return found
+    found = _carry_within_model(problem, solver, accuracy, effort)
+    bent = found is not None and found.plan is not None and is_touched(found.plan)
+    return None if bent and problem.task.allow_large_bending else found
+
+
 def _carry_within_model(problem: MotionProblem, solver: Solver, accuracy: float,
                         effort: SearchEffort) -> MaxPayload | None:
     """
@@ -113,11 +127,11 @@ def _carry_within_model(problem: MotionProblem, solver: Solver, accuracy: float,
 
     Where links bend too far with less than the motors can carry, motions with much more are none
     of the arm, and hard to find: their weight pulls along the links. Where clamped links ring, the
-    torques of the largest payload switch too often. None where neither is so, or nothing is found.
+    torques of the largest payload switch too often. None where nothing is found.
 
     """
-    bent, bounded = _bends_too_far(problem), bound_bending(problem)
-    if bounded is None or not (bent or _switches_often(problem, solver, accuracy)):
+    bounded = bound_bending(problem)
+    if bounded is None:
         return None
     starts = effort.starts if effort.explores else 0
     kinds = find_kinds(drop_weights(bounded), PAYLOAD.unknown, starts, solver)
@@ -125,30 +139,32 @@ def _carry_within_model(problem: MotionProblem, solver: Solver, accuracy: float,
         task=problem.task, method=PayloadMethod.DIRECT, status=PlanStatus.NOT_FOUND, message='',
         kinds=tuple(kinds[:MOST_KINDS]), starts=starts), [
             as_guess(bounded, kind, solver) for kind in kinds[:_LIFTED]])
-    if found is None or found.plan is None or not found.solved:
-        return None
-    return found if not bent or is_touched(found.plan) else None
+    return found if found is not None and found.solved else None
 
 
 def _switches_often(problem: MotionProblem, solver: Solver, accuracy: float) -> bool:
     """Return whether Newton's method fails where the barrier leads to the largest payload."""
-    links = [link.mode_shapes() for link in problem.model.arm.links if link.modes]
-    clamped = any(shapes.tip_deflection.any() for shapes in links)
-    if not clamped or not is_cheap(PAYLOAD, problem):
+    arm = problem.model.arm
+    if isinstance(arm, SpatialArm) or not (limits_of_model(arm) and is_cheap(PAYLOAD, problem)):
+        return False
+    if not any(link.mode_shapes().tip_deflection.any() for link in arm.links if link.modes):
         return False
     return is_beyond_newton(PAYLOAD, drop_weights(problem), solver,
                             lambda value: bracket_width(accuracy, value))
 
 
 def _bends_too_far(problem: MotionProblem) -> bool:
-    """Return whether the links bend further than their model holds by what the motors hold."""
+    """Return whether links may not bend as far as they do by what the motors hold."""
+    arm = problem.model.arm
+    if problem.task.allow_large_bending or not (arm.gravity.any() and limits_of_model(arm)):
+        return False
     limit = holding_limit(problem.model, problem.task, problem.parameters)[0]
     try:
         heaviest = PAYLOAD.with_value(problem, min(limit * _HELD, MAX_PAYLOAD))
     except FlexPlannerError:  # the links give way first
         return True
-    goal = heaviest.goal[None, :problem.model.arm.n_coordinates]
-    return find_largest_bending(problem.model.arm, goal).share > LARGEST
+    goal = heaviest.goal[None, :arm.n_coordinates]
+    return find_largest_bending(arm, goal).share > LARGEST
 
 
 def _hold_at_once(problem: MotionProblem, solver: Solver) -> MaxPayload | None:

@@ -70,8 +70,8 @@ class LimitResult:
     starts : int
         How many starts were explored.
     within_limits : bool
-        Whether limits on the way bend the motion: the other end of the bracket is where no motion
-        within them was found, which is no bound.
+        Whether limits on the way bend the motion, or the motors' limits are in its barrier: the
+        other end of the bracket is where no motion was found, which is no bound.
     warm : bool
         Whether it went on from the motion that it was given to start from.
     iterations : int

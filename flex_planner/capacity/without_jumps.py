@@ -13,10 +13,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
+from flex_planner.capacity.certify_reached import certify_reached
 from flex_planner.capacity.results import LimitResult, MaxPayload, MinDuration
 from flex_planner.capacity.within_limits import (
     carry_more,
-    certify_reached,
     hurry_within_limits,
     known_motions,
 )

@@ -21,6 +21,7 @@ from flex_planner.collocation.interior_point import (
 )
 from flex_planner.collocation.solution import CollocationSolution
 import numpy as np
+from numpy.typing import NDArray
 
 # mu falls by this factor from mesh to mesh
 _FALL = 0.01
@@ -104,19 +105,19 @@ def _settle(problem: BarrierProblem, guess: CollocationSolution, y: Array,
     return replace(more, iterations=met.iterations + more.iterations)
 
 
-def _find_unsettled(met: BarrierOutcome, free: int, count: int) -> Array:
+def _find_unsettled(met: BarrierOutcome, free: int, count: int) -> NDArray[np.bool_]:
     """Return the intervals whose multipliers go to and fro, shape (N,); none if all does."""
     if not met.correction <= _NEARLY:
         return np.zeros(met.solution.intervals, dtype=bool)
     middle = free + (met.y.shape[-1] - free) // 2
     products = met.y[..., middle - count:middle] * met.y[..., -count:]
     off = np.abs(np.log(products / met.mu)).max(axis=(1, 2)) > _OFF
-    unsettled: Array = off & (met.solution.steps > 0)
+    unsettled: NDArray[np.bool_] = off & (met.solution.steps > 0)
     return unsettled
 
 
 def _find_cuts(problem: BarrierProblem, met: BarrierOutcome, slacks: Slacks,
-               count: int) -> Array:
+               count: int) -> NDArray[np.bool_]:
     """Return which intervals are to be cut in two, shape (N,)."""
     solution, y = met.solution, met.y
     intervals, stages, size = solution.stages.shape
@@ -127,12 +128,12 @@ def _find_cuts(problem: BarrierProblem, met: BarrierOutcome, slacks: Slacks,
     sigma, lam = y[..., middle - count:middle], y[..., -count:]
     steep = np.abs(np.diff(np.log(sigma), axis=1)).max(axis=1) > _STEEPEST
     matters = lam.max(axis=1) > _MATTERS * lam.max(axis=(0, 1))
-    cuts: Array = (passed | (steep & matters).any(axis=1)) & (solution.steps > 0)
+    cuts: NDArray[np.bool_] = (passed | (steep & matters).any(axis=1)) & (solution.steps > 0)
     return cuts
 
 
 def cut_mesh(problem: BarrierProblem, solution: CollocationSolution, y: Array,
-             cut: Array) -> tuple[CollocationSolution, Array]:
+             cut: NDArray[np.bool_]) -> tuple[CollocationSolution, Array]:
     """
     Return z and y on a mesh with some intervals cut in two.
 

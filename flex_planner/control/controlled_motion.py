@@ -135,7 +135,7 @@ class ControlledArm:
         """Return states after steps, which steps are too long, and where limits cross some."""
         rows, n = self._rows(reference, steps), self.dynamics.arm.n_joints
         after, feedback, fifth, third = self.dynamics.controlled_steps(
-            state, rows, np.stack([steps.lengths, steps.firsts], axis=1), self._constants,
+            state, rows, np.stack([steps.lengths, steps.firsts], axis=1), self.constants,
             self.parameters.physical)
         states, n_t = np.vstack([state, after]), self.dynamics.arm.n_coordinates
         speeds = states[:, n_t:n_t + n]
@@ -158,7 +158,7 @@ class ControlledArm:
         return TorqueLimits.of(self.dynamics.arm)
 
     @property
-    def _constants(self) -> Array:
+    def constants(self) -> Array:
         """Return gains and limits, shape (5 n,)."""
         gains, limits = self.controller.gains, self._limits
         return np.concatenate([gains.stiffness, gains.damping, limits.stall, limits.slope,

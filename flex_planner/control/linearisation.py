@@ -58,8 +58,19 @@ def hold_inputs(A: Array, B: Array, step: float) -> tuple[Array, Array]:
     size, inputs = B.shape[-2:]
     system = np.zeros((*A.shape[:-2], size + inputs, size + inputs))
     system[..., :size, :size], system[..., :size, size:] = A, B
-    held = _exponential(system * step)
+    scale = _balance(system)
+    held = _exponential(system * (step * scale / scale[:, None])) * (scale[:, None] / scale)
     return held[..., :size, :size], held[..., :size, size:]
+
+
+def _balance(matrices: Array) -> Array:
+    """Return powers of 2 (m,) by which unknowns are scaled so that rows and columns are alike."""
+    from scipy.linalg import matrix_balance  # see `ArmDynamics.prepare`
+
+    size = matrices.shape[-1]
+    largest = np.abs(matrices).reshape(-1, size, size).max(axis=0)
+    _, (scale, _) = matrix_balance(largest, permute=False, separate=True)
+    return np.asarray(scale, dtype=np.float64)
 
 
 def _exponential(matrices: Array) -> Array:

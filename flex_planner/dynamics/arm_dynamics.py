@@ -136,6 +136,11 @@ class ArmDynamics:
         """Return where the compiled function of these steps is, None if it is interpreted."""
         return self._load('runge_kutta_step').address
 
+    @property
+    def forward_dynamics_address(self) -> int | None:
+        """Return the address of `forward_dynamics` in compiled code, None without a compiler."""
+        return self._load('forward_dynamics').address
+
     def controlled_steps(self, state: Array, reference: Array, timing: Array, controller: Array,
                          physical: Array) -> tuple[Array, Array, Array, Array]:
         """

@@ -117,6 +117,11 @@ class Experiment:
         error = found if self.method is Method.INPUT_ERROR else found - self.measured
         return error / self.noise, slope / self.noise[:, None]
 
+    @property
+    def step(self) -> float:
+        """Return the time between samples that are compared, by their median [s]."""
+        return float(np.median(np.diff(self.places))) * self.law.period
+
     def fit_percent(self, errors: Array) -> Array:
         """Return how much of what was measured is explained, of each joint, shape (n,)."""
         spread = np.linalg.norm(self.measured - self.measured.mean(axis=0), axis=0)

@@ -124,7 +124,7 @@ def predict_half_widths(model: LoopModel, experiments: Sequence[Experiment], val
     """Return half of the intervals of 95 % that logs would lead to, if the model is the plant."""
     problem = LogErrors(model, experiments, values, free, monitor)
     jacobian = problem.evaluate(problem.first)[1]
-    return half_widths(np.zeros(len(jacobian)), jacobian, 1.0)[:len(problem.free)]
+    return half_widths(np.zeros(len(jacobian)), jacobian, problem.crowding)[:len(problem.free)]
 
 
 def _summarize(problem: LogErrors, unknowns: Array, converged: bool) -> Fit:
@@ -134,8 +134,8 @@ def _summarize(problem: LogErrors, unknowns: Array, converged: bool) -> Fit:
     count = len(problem.free)
     freedom = max(errors.size - unknowns.size, 1)
     variance = float(errors @ errors) / freedom
-    widths = half_widths(errors, jacobian, variance if problem.is_input else max(variance, 1.0),
-                         problem.blocks())
+    noise = variance if problem.is_input else max(variance, 1.0)
+    widths = half_widths(errors, jacobian, noise * problem.crowding, problem.blocks())
     parts = [errors[problem.rows(i)].reshape(one.measured.shape)
              for i, one in enumerate(problem.experiments)]
     return Fit(found=found, free=tuple(problem.free), half_widths=widths[:count],

@@ -16,6 +16,8 @@ import numpy as np
 _RUN_AWAY = 1e6
 # for how long errors of a wrong model are alike [s]
 _BLOCK = 0.1
+# for how long errors in closed loop are, where intervals hold the truth as often as they say [s]
+_ALONE = 0.01
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -29,7 +31,7 @@ class Unknowns:
         All parameters, as `list_parameters` has them.
     starts : numpy.ndarray, shape (logs, n)
         Joint angles at the start of each log [rad].
-    aways : numpy.ndarray, shape (logs, 2 n_t - n)
+    swings : numpy.ndarray, shape (logs, 2 n_t - n)
         By how much passive coordinates and all rates differ from rest there.
     late : numpy.ndarray, shape (logs,)
         By how much later than its log says each motion began [s].
@@ -38,7 +40,7 @@ class Unknowns:
 
     values: Array
     starts: Array
-    aways: Array
+    swings: Array
     late: Array
 
 
@@ -74,9 +76,9 @@ class LogErrors:
         self.timed = [i for i, one in enumerate(experiments) if one.start_error]
         self.moving = [i for i, one in enumerate(experiments) if one.moves]
         sizes = model.sizes
-        self._aways = 2 * sizes.coordinates - sizes.joints
+        self._swings = 2 * sizes.coordinates - sizes.joints
         self.first = self.join(Unknowns(
-            values=values, starts=starts, aways=np.zeros((len(experiments), self._aways)),
+            values=values, starts=starts, swings=np.zeros((len(experiments), self._swings)),
             late=np.zeros(len(experiments))))
 
     def _offsets(self, values: Array) -> Array:
@@ -86,17 +88,17 @@ class LogErrors:
         """Return those of the unknowns that are free."""
         return np.concatenate([
             unknowns.values[self.free], unknowns.starts.ravel(),
-            unknowns.aways[self.moving].ravel(), unknowns.late[self.timed]])
+            unknowns.swings[self.moving].ravel(), unknowns.late[self.timed]])
 
     def split(self, free: Array) -> Unknowns:
         """Return all unknowns, those that are not free as they are known."""
         values, logs = self.values.copy(), len(self.experiments)
-        late, aways = np.zeros(logs), np.zeros((logs, self._aways))
+        late, swings = np.zeros(logs), np.zeros((logs, self._swings))
         ends = np.cumsum([len(self.free), logs * self.model.sizes.joints,
-                          len(self.moving) * self._aways])
+                          len(self.moving) * self._swings])
         values[self.free], starts, away, late[self.timed] = np.split(free, ends)
-        aways[self.moving] = away.reshape(-1, self._aways)
-        return Unknowns(values=values, starts=starts.reshape(logs, -1), aways=aways, late=late)
+        swings[self.moving] = away.reshape(-1, self._swings)
+        return Unknowns(values=values, starts=starts.reshape(logs, -1), swings=swings, late=late)
 
     def evaluate(self, free: Array) -> tuple[Array, Array]:
         """Return errors and their Jacobian; the last ones are kept."""
@@ -121,7 +123,7 @@ class LogErrors:
         one = self.experiments[index]
         return one.errors(self.model.simulate(
             at.starts[index], one.followed, one.law, at.values, self.parts[index],
-            at.aways[index] if one.moves else None), float(at.late[index]))
+            at.swings[index] if one.moves else None), float(at.late[index]))
 
     def _place(self, index: int, slope: Array, size: int) -> Array:
         """Return the derivatives of the errors of a log by all that is free."""
@@ -165,15 +167,26 @@ class LogErrors:
 
     def blocks(self) -> list[int]:
         """Return where blocks of errors begin that are alike where the model is wrong."""
-        found = []
+        found = list[int]()
         for i, one in enumerate(self.experiments):
-            samples = round(_BLOCK / (np.median(np.diff(one.places)) * one.law.period))
-            rows = self.rows(i)
-            found += range(rows.start, rows.stop, max(samples, 1) * one.measured.shape[1])
+            rows, samples = self.rows(i), max(round(_BLOCK / one.step), 1)
+            found += range(rows.start, rows.stop, samples * one.measured.shape[1])
         return found
+
+    @property
+    def crowding(self) -> float:
+        """
+        Return how many samples say no more than one, for intervals.
+
+        In closed loop the noise of encoders moves the arm, too, by way of the drive: it shakes
+        dry friction loose, and errors are alike for a while.
+
+        """
+        return max(max(_ALONE / one.step, 1.0) if one.method is Method.CLOSED_LOOP else 1.0
+                   for one in self.experiments)
 
     def columns_away(self, index: int) -> slice:
         """Return which columns are those of the state at the start of a log that moves."""
         begin = len(self.free) + self.model.sizes.joints * len(self.experiments)
-        at = begin + self._aways * self.moving.index(index)
-        return slice(at, at + self._aways)
+        at = begin + self._swings * self.moving.index(index)
+        return slice(at, at + self._swings)

@@ -62,7 +62,7 @@ def find_moving_starts(model: LoopModel, experiments: Sequence[Experiment], fit:
     for i, place in enumerate(places):
         unused = [at for j, at in enumerate(places) if j == i or j not in fit.moving]
         basis = _basis(np.delete(jacobian, np.r_[tuple(unused)], axis=1))
-        before = errors - jacobian[:, place] @ fit.found.aways[i]  # as if it had been at rest
+        before = errors - jacobian[:, place] @ fit.found.swings[i]  # as if it had been at rest
         if _is_explained(_beside(basis, before), _basis(_beside(basis, jacobian[:, place])),
                          problem.rows(i), noise_known=not problem.is_input):
             found.append(i)

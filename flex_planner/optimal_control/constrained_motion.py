@@ -52,7 +52,8 @@ class ConstrainedMotion(MotionProblem):
     def __init__(self, motion: MotionProblem, slacks: PathSlacks, mu: float,
                  floor: Array | None = None, *, smooth: bool = False) -> None:
         super().__init__(motion.model, motion.task, motion.parameters,
-                         via_times=motion.junctions if motion.junctions.size else None)
+                         via_times=motion.junctions if motion.junctions.size else None,
+                         ends=motion.ends)
         self.slacks, self.mu, self.smooth = slacks, mu, smooth
         self.conditions = smooth_rates(self.conditions, mu)
         if smooth:

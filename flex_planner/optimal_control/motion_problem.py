@@ -66,6 +66,8 @@ class MotionProblem:
         a task that is refused.
     via_times : numpy.ndarray, shape (K,), optional
         When the via points are passed; free times are guessed if it is not given [s].
+    ends : BoundaryConditions, optional
+        Of another problem with the same ends, which need not be found again.
 
     Raises
     ------
@@ -79,13 +81,14 @@ class MotionProblem:
     """
 
     def __init__(self, model: ArmModel, task: Task, parameters: Parameters, *,
-                 holds: bool = True, via_times: Array | None = None) -> None:
+                 holds: bool = True, via_times: Array | None = None,
+                 ends: BoundaryConditions | None = None) -> None:
         self.model, self.task, self.parameters = model, task, parameters
         self.p = parameters.stack()
         self.conditions = torque_conditions(model, task, parameters)
         self.layout = self.conditions.layout
         self.size = self.layout.size
-        self.ends = BoundaryConditions(model, task, parameters, holds=holds)
+        self.ends = ends or BoundaryConditions(model, task, parameters, holds=holds)
         self.start, self.goal = self.ends.start, self.ends.goal
         self.goal_weights = self.ends.goal_weights
         self.holding_torque = self.ends.holding_torque
@@ -157,7 +160,8 @@ class MotionProblem:
 
     def with_via_times(self, times: Array) -> MotionProblem:
         """Return the same problem with its via points passed at other times (K,) [s]."""
-        return MotionProblem(self.model, self.task, self.parameters, via_times=times)
+        return MotionProblem(self.model, self.task, self.parameters, via_times=times,
+                             ends=self.ends)
 
     def fewest_intervals(self, stages: int) -> int:
         """Return the intervals of a mesh that resolves nothing finely but overlooks nothing."""

@@ -8,6 +8,7 @@ from typing import Any
 
 from flex_planner.base.validation import Array
 from flex_planner.optimal_control.arm_model import ArmModel, Controls
+from flex_planner.optimal_control.boundary_conditions import BoundaryConditions
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.optimal_control.task import Task
@@ -89,12 +90,14 @@ class OffsetProblem(MotionProblem):
         Of `MotionProblem`.
     offset : TorqueOffset
         w, over the duration of the task.
+    ends : BoundaryConditions, optional
+        Of `MotionProblem`, too.
 
     """
 
     def __init__(self, model: ArmModel, task: Task, parameters: Parameters,
-                 offset: TorqueOffset) -> None:
-        super().__init__(model, task, parameters)
+                 offset: TorqueOffset, *, ends: BoundaryConditions | None = None) -> None:
+        super().__init__(model, task, parameters, ends=ends)
         self.offset = offset
         self._chosen = ChosenTorque(model, parameters)
 

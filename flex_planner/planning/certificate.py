@@ -122,7 +122,7 @@ def certify(problem: MotionProblem, result: CollocationResult, monitor: Monitor,
         state_error=float(result.errors[problem.layout.states].max()),
         costate_error=float(result.errors[problem.layout.costates].max()),
         via_error=_via_error(problem, torque.breaks, states),
-        limit_slack=smallest_slack(problem, states, _torques(torque)))
+        limit_slack=smallest_slack(problem, states, _torques(problem, torque)))
 
 
 def simulate_to_goal(problem: MotionProblem, solution: CollocationSolution, monitor: Monitor,
@@ -148,9 +148,10 @@ def _simulate(problem: MotionProblem, solution: CollocationSolution, monitor: Mo
                      rtol=rtol, atol=rtol / 100), torque
 
 
-def _torques(torque: PlannedTorque) -> Array:
-    """Return the planned torques at their breaks, shape (N + 1, n)."""
-    return np.array([torque(time) for time in torque.breaks])
+def _torques(problem: MotionProblem, torque: PlannedTorque) -> Array:
+    """Return the planned torques at their breaks, where they are states, shape (N + 1, n or 0)."""
+    times = torque.breaks if problem.layout.torques else ()
+    return np.array([torque(time) for time in times]).reshape(torque.breaks.size, -1)
 
 
 def _target(problem: MotionProblem, solution: CollocationSolution) -> Array:

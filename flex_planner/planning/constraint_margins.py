@@ -114,14 +114,14 @@ def smallest_slack(problem: MotionProblem, states: Array, torques: Array) -> flo
     ----------
     problem : MotionProblem
         Of n joints.
-    states, torques : numpy.ndarray, shape (k, 2 n_t) and (k, n)
-        Of the motion, at the same moments.
+    states, torques : numpy.ndarray, shape (k, 2 n_t) and (k, n), or (k, 0)
+        Of the motion, at the same moments; torques where they are states.
 
     """
     slacks = slacks_of(problem)
     if slacks is None:
         return np.inf
-    return float(slacks(np.hstack([states, torques]) if problem.layout.torques else states).min())
+    return float(slacks(np.hstack([states, torques])).min())
 
 
 def _margin(k: int, slacks: PathSlacks, solution: CollocationSolution, times: Array,

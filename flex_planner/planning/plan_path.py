@@ -37,7 +37,6 @@ from flex_planner.planning.proofs import (
 from flex_planner.planning.robust.make_robust import make_robust
 from flex_planner.planning.smooth_torques import (
     plan_without_jumps,
-    refuse_torque_rates,
     STIFF_LINKS,
     without_torque_rates,
 )
@@ -117,7 +116,6 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
         return _impossible(refused, prove_not_held(error, task.payload_mass))
     if objectives is not None:
         objectives.check(task)
-        refuse_torque_rates(task, 'motions that must meet objectives')
     proof = find_proof(problem)
     if proof is not None:
         return _impossible(problem, proof)
@@ -129,7 +127,7 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
     if broken:
         return _not_possible(problem, broken)
     if task.has_torque_rates:
-        return _plan_smoothly(problem, solver, start_from, strategies, effort)
+        return _plan_smoothly(problem, solver, start_from, objectives, strategies, effort)
     plan = (_plan_as_rigid(problem, solver, start_from, objectives, strategies, effort)
             or _plan_again(problem, solver, start_from, objectives))
     if plan is not None:
@@ -229,15 +227,16 @@ def _plan_again(problem: MotionProblem, solver: Solver,
 
 def _plan_smoothly(problem: MotionProblem, solver: Solver,
                    start: Plan | KindOfMotion | CollocationSolution | None,
-                   strategies: Sequence[Strategy], effort: SearchEffort) -> Plan:
+                   objectives: Objectives | None, strategies: Sequence[Strategy],
+                   effort: SearchEffort) -> Plan:
     """Return the plan whose torques have no jumps, from one like it or from the one with jumps."""
-    again = _plan_again(problem, solver, start, None)
+    again = _plan_again(problem, solver, start, objectives)
     if again is not None:
         return again
     if isinstance(start, Plan) and start.solution is not None and start.problem.layout.torques:
         plan = plan_problem(problem, solver, tuple(_given(start, problem, solver)))
         if plan.certified:
-            return _keep(plan, solver, None, effort)
+            return _keep(plan, solver, objectives, effort)
     task = without_torque_rates(problem.task)
     stiff = find_stiff_links(MotionProblem(problem.model, task, problem.parameters), solver)
     if stiff is not None:
@@ -246,7 +245,7 @@ def _plan_smoothly(problem: MotionProblem, solver: Solver,
                       strategies=strategies, search=effort)
     if plain.status is PlanStatus.INFEASIBLE:  # nor is a motion whose torques are less free
         return replace(plain, task=problem.task, problem=problem)
-    return _keep(plan_without_jumps(problem, plain, solver), solver, None, effort)
+    return _keep(plan_without_jumps(problem, plain, solver), solver, objectives, effort)
 
 
 def _not_possible(problem: MotionProblem, why: str) -> Plan:

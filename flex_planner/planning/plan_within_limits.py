@@ -14,7 +14,12 @@ from dataclasses import dataclass, replace
 
 from flex_planner.base.progress import StoppedError
 from flex_planner.base.validation import Array
-from flex_planner.collocation import CollocationResult, CollocationSolution, Solver
+from flex_planner.collocation import (
+    CollocationResult,
+    CollocationSolution,
+    GaussRule,
+    Solver,
+)
 from flex_planner.collocation.interior_point import BarrierOutcome
 from flex_planner.optimal_control.constrained_motion import (
     ConstrainedMotion,
@@ -38,9 +43,13 @@ from flex_planner.planning.strategies.payload_within_limits import find_largest_
 from flex_planner.planning.strategies.strategy import Attempt
 from flex_planner.planning.strategies.within_limits import (
     approach_limits,
+    FIRST,
+    first_mesh,
     solve_again,
     solve_smoothly,
     solve_within_limits,
+    STAGES,
+    STRONG,
 )
 import numpy as np
 
@@ -192,6 +201,16 @@ class _Near:
     kind: KindOfMotion
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Start:
+    """A motion to start from, what one that it leads to costs at least, and mu at first."""
+
+    problem: MotionProblem
+    solution: CollocationSolution
+    bound: float = 0.0
+    first: tuple[tuple[float, float], ...] = FIRST
+
+
 class _Search:
     """Motions within the limits, from several starts."""
 
@@ -199,24 +218,25 @@ class _Search:
         self._free, self._slacks, self._solver = free, slacks, solver
         self._starts = 0
         self._near: list[_Near] = []
-        self._left_out: list[tuple[MotionProblem, CollocationSolution]] = []
+        self._left_out: list[_Start] = []
         self._failed: CollocationSolution | None = None
         self._failure = ''
 
     def run(self, effort: SearchEffort) -> None:
         """Come near to a motion from each start that may lead to something cheaper."""
-        for problem, start, bound in self._choose_starts(effort):
-            if bound >= (1 - _CHEAPER) * self._best_cost():
-                self._left_out.append((problem, start))
+        for start in self._choose_starts(effort):
+            if start.bound >= (1 - _CHEAPER) * self._best_cost():
+                self._left_out.append(start)
             else:
-                self._approach(problem, start)
+                self._approach(start)
 
-    def _approach(self, problem: MotionProblem, start: CollocationSolution) -> None:
+    def _approach(self, start: _Start) -> None:
         """Come near to a motion from a start."""
         self._starts += 1
-        met = approach_limits(problem, self._slacks, start, self._solver)
+        met = approach_limits(start.problem, self._slacks, start.solution, self._solver,
+                              start.first)
         if met.converged:
-            self._add(problem, met)
+            self._add(start.problem, met)
         elif self._failed is None:
             self._failed = met.solution
 
@@ -225,8 +245,8 @@ class _Search:
         plan = self._find_best()
         if plan is None and self._left_out:
             self._near.clear()
-            for problem, start in self._left_out:
-                self._approach(problem, start)
+            for start in self._left_out:
+                self._approach(start)
             plan = self._find_best()
         return plan or self._refuse(self._failure)
 
@@ -262,36 +282,61 @@ class _Search:
         """Return what a motion may cost to be of use."""
         return self._free.cost if self._free.solved else np.inf
 
-    def _choose_starts(self, effort: SearchEffort,
-                       ) -> Iterator[tuple[MotionProblem, CollocationSolution, float]]:
-        """Yield problem and start of each try, with what the motion costs at least, if known."""
+    def _choose_starts(self, effort: SearchEffort) -> Iterator[_Start]:
+        """Yield the start of each try."""
         free = self._free
         assert free.solution is not None
         if not free.solved:
-            yield free.problem, free.solution, 0.0
+            yield _Start(free.problem, free.solution)
             for start in pass_otherwise(free.problem, free.solution,
                                         self._obstacles(free.solution)):
-                yield free.problem, start, 0.0
+                yield _Start(free.problem, start)
         if not effort.explores:
             return
+        if not free.solved:
+            yield from self._start_far_from_limits(free.problem, free.solution)
         for kind in free.kinds[1:_TRIED + 1]:
             home = turn_goal(free.problem, kind.motion.problem)
             # values of the rigid arm are no bounds
             bound = kind.value if kind.motion.problem.size == home.size else 0.9 * kind.value
             start = as_guess(home, kind, self._solver)
-            yield home, start, bound
+            yield _Start(home, start, bound)
             if free.solved:  # which passes no obstacle that could be passed on its other side
                 for other in pass_otherwise(home, start, self._obstacles(start)):
-                    yield home, other, bound
+                    yield _Start(home, other, bound)
+
+    def _start_far_from_limits(self, problem: MotionProblem,
+                               near: CollocationSolution) -> Iterator[_Start]:
+        """Yield starts whose barrier leads away from all limits at first."""
+        yield _Start(problem, near, first=STRONG)
+        yield from (_Start(problem, start) for start in self._keep_the_others(problem, near))
+        intervals = len(first_mesh(problem, self._solver)) - 1
+        yield _Start(problem, problem.straight_line(intervals, GaussRule.of(STAGES)),
+                     first=STRONG)
+
+    def _keep_the_others(self, problem: MotionProblem,
+                         near: CollocationSolution) -> Iterator[CollocationSolution]:
+        """Yield motions that keep all limits but obstacles, where a motion breaks both."""
+        obstacles, slacks = self._obstacles(near), self._slacks
+        others = tuple(one for one in slacks.constraints if one not in obstacles)
+        if not obstacles or not others or problem.layout.torques:
+            return
+        rest = relieve_ends(problem, PathSlacks(slacks.arm, others))
+        if (self._values(near, rest) >= 0).all():
+            return
+        for first in (FIRST, STRONG):
+            met = approach_limits(problem, rest, near, self._solver, first)
+            if met.converged:
+                yield met.solution
 
     def _obstacles(self, motion: CollocationSolution) -> list[KeepOut]:
         """Return the obstacles that a motion passes through."""
         return find_obstacles(self._slacks, self._values(motion))
 
-    def _values(self, solution: CollocationSolution) -> Array:
-        """Return the slacks along a motion, shape (k, n_c)."""
+    def _values(self, solution: CollocationSolution, slacks: PathSlacks | None = None) -> Array:
+        """Return all slacks along a motion, or some, shape (k, n_c)."""
         z = solution.values_at(_SHARES).reshape(-1, self._free.problem.size)
-        return self._slacks(z[:, self._free.problem.layout.states])
+        return (slacks or self._slacks)(z[:, self._free.problem.layout.states])
 
     def _best_cost(self) -> float:
         """Return about the cost of the cheapest motion within the limits so far."""

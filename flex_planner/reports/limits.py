@@ -9,14 +9,14 @@ Row = tuple[str, str]
 
 
 def limit_rows(plan: Plan) -> list[Row]:
-    """Return the limits that a motion meets, and the nearest of the others; empty without any."""
+    """Return limits that a motion reaches, and the nearest of the others; empty without any."""
     margins = sorted(plan.constraints, key=lambda one: one.slack)
     if not margins:
         return []
-    met = [one for one in margins if one.slack < ACTIVE]
-    rows = [('limits on the way', f'{len(margins)}, {len(met)} of them met')]
-    rows += [('  limit', f'{one}{_span(one)}') for one in met]
-    nearest = margins[len(met):][:1]
+    reached = [one for one in margins if one.slack < ACTIVE]
+    rows = [('limits on the way', _count(margins, len(reached)))]
+    rows += [('  limit', f'{one}{_span(one)}') for one in reached]
+    nearest = margins[len(reached):][:1]
     rows += [('  nearest of the others', f'{one}, {one.slack:.1%} of its scale')
              for one in nearest]
     if plan.barrier_gap:
@@ -24,7 +24,15 @@ def limit_rows(plan: Plan) -> list[Row]:
     return rows
 
 
+def _count(margins: list[ConstraintMargin], reached: int) -> str:
+    """Return how many limits there are, and how many are broken, reached, or have room."""
+    broken = sum(not one.kept for one in margins)
+    kinds = {'broken': broken, 'reached': reached - broken, 'with room': len(margins) - reached}
+    return f'{len(margins)}: ' + ', '.join(
+        f'{count} {kind}' for kind, count in kinds.items() if count)
+
+
 def _span(one: ConstraintMargin) -> str:
-    """Return between which times a limit is met."""
+    """Return between which times less than a hundredth of a limit is left."""
     spans = ', '.join(f'{first:.4g} to {last:.4g} s' for first, last in one.active)
-    return f'; met from {spans}' if spans else ''
+    return f'; reached from {spans}' if spans else ''

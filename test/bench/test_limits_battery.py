@@ -15,11 +15,13 @@ from flex_planner.planning.plan import Plan
 import numpy as np
 import pytest
 
-# what IPOPT finds, by `bench.limits_battery`, and how much dearer a plan may be; one is dearer
-_WORSE, _KNOWN_WORSE = 1e-3, {41: 1.5e-3}
+# what IPOPT finds, by `bench.limits_battery`, and how much dearer a plan may be
+_WORSE = 1e-3
 _KINDS_THAT_BREAK_LIMITS = [(7, 0.0615903), (42, 0.0493899)]
 _TOUCHED_LIMITS = [(28, 0.0141108), (73, 0.130643)]
-_SLOW = [(41, 0.143889), (54, 0.0287053)]
+# with 240 intervals for the first and the last: with less it passes between its points what it
+# should touch
+_SLOW = [(41, 0.144070), (54, 0.0287053), (82, 0.0315937)]
 
 
 def plan_rigid(seed: int) -> tuple[Plan, Array]:
@@ -52,7 +54,15 @@ def test_limits_that_are_only_touched_do_not_stop_the_interior_point_method(
 @pytest.mark.parametrize(('seed', 'cost'), _SLOW)
 def test_meshes_are_cut_until_a_motion_within_limits_is_found(seed: int, cost: float) -> None:
     plan, slacks = plan_rigid(seed)
-    assert plan.solved and plan.cost < (1 + _KNOWN_WORSE.get(seed, _WORSE)) * cost
+    assert plan.solved and plan.cost < (1 + _WORSE) * cost
+    assert slacks.min() > 0
+
+
+@pytest.mark.thorough
+def test_starts_far_from_limits_lead_to_a_cheaper_kind() -> None:
+    plan, slacks = plan_rigid(40)
+    # by IPOPT; from the free motion alone the plan costs 0.047525
+    assert plan.solved and plan.cost < (1 + _WORSE) * 0.0415670
     assert slacks.min() > 0
 
 

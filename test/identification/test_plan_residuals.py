@@ -26,7 +26,7 @@ def found_with(payload: float = 0.11) -> Identification:
     """Return an identification of the arm of the case, with another payload."""
     values = np.concatenate([[payload], CASE.truth[1:]])
     nothing = np.zeros((1, 0))
-    fit = Fit(found=Unknowns(values=values, starts=nothing, aways=nothing, late=np.zeros(1)),
+    fit = Fit(found=Unknowns(values=values, starts=nothing, swings=nothing, late=np.zeros(1)),
               free=(), half_widths=np.zeros(0), late=np.zeros(1), moving=(), rms=1.0, cost=0.0,
               fit_percent=np.full((1, 1), 100.0), evaluations=1, converged=True)
     return Identification(

@@ -11,6 +11,7 @@ from flex_planner.collocation import GaussRule
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.barrier_problem import MotionBarrier, PayloadBarrier
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
+from flex_planner.optimal_control.smoothed_torque import SmoothedTorque
 from flex_planner.optimal_control.task import Task
 from flex_planner.paper.cases import paper_arm, point_to_point
 import numpy as np
@@ -101,6 +102,35 @@ def test_conditions_without_a_barrier_are_those_of_the_bounded_torque(name: str)
     np.testing.assert_allclose(rate, expected, atol=1e-5 * np.abs(expected).max())
 
 
+@pytest.mark.parametrize('name', ['flexible', 'capped', 'desk'])
+def test_smoothed_torque_is_what_the_conditions_lead_to(name: str) -> None:
+    barrier = barrier_of(ARMS[name], payload=False)
+    z, y = points(barrier)
+    motion, n, half = barrier.motion, barrier.free, barrier.size // 2
+    smoothed = SmoothedTorque(motion.model, motion.parameters, MU)
+    rate, jacobian = smoothed.rate_jacobian(z)
+    for given, wanted in zip((rate, jacobian), barrier.condense(z, y, MU), strict=True):
+        np.testing.assert_allclose(given, wanted, atol=1e-9 * np.abs(wanted).max())
+    found = smoothed.controls(z)
+    np.testing.assert_allclose(found.torque, y[:, :n], rtol=1e-9)
+    lower, upper = motion.parameters.torque_limits.bounds(z[:, half // 2:half // 2 + n])
+    assert ((lower < found.torque) & (found.torque < upper)).all()
+    # what dH/dpsi = z' and dH/dz = -psi' take: H itself, barrier and all
+    for j in range(barrier.size):
+        shift = np.zeros_like(z)
+        shift[:, j] = 1e-6
+        ahead, behind = (smoothed.controls(at).hamiltonian + smoothed.barrier_rate(at)
+                         for at in (z + shift, z - shift))
+        wanted = rate[:, j - half] if j >= half else -rate[:, j + half]
+        assert np.abs((ahead - behind) / 2e-6 - wanted).max() < 1e-5 * np.abs(rate).max()
+    heavier, lighter = (SmoothedTorque(motion.model, replace(
+        motion.parameters, payload_mass=1.0 + change), MU) for change in (1e-6, -1e-6))
+    share = (heavier.controls(z).hamiltonian - lighter.controls(z).hamiltonian) / 2e-6
+    more = (heavier.barrier_rate(z) - lighter.barrier_rate(z)) / 2e-6
+    np.testing.assert_allclose(found.payload_share, share + more,
+                               atol=1e-5 * np.abs(share).max())
+
+
 def test_motors_without_limits_leave_the_torque_alone() -> None:
     arm = paper_arm(50.0, 1)
     free = replace(arm, joints=tuple(replace(joint, motor=replace(
@@ -109,6 +139,9 @@ def test_motors_without_limits_leave_the_torque_alone() -> None:
     z, y = points(barrier)
     torque = barrier.motion.model.controls(z, barrier.motion.p).free_torque
     np.testing.assert_allclose(y[:, :2], torque, rtol=1e-9)
+    smoothed = SmoothedTorque(barrier.motion.model, barrier.motion.parameters, MU)
+    np.testing.assert_array_equal(smoothed.controls(z).torque, torque)
+    assert smoothed.terms == 0
 
 
 def test_first_torques_are_inside_the_limits() -> None:

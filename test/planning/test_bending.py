@@ -7,6 +7,7 @@ from dataclasses import replace
 from flex_planner.arms.arm import Arm, Joint, Link, Motor, Node
 from flex_planner.arms.kinematics import link_points
 from flex_planner.arms.spatial_arm import SpatialArm
+from flex_planner.base.progress import Monitor
 from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.capacity.min_duration import find_min_duration
 from flex_planner.optimal_control.motion_problem import MotionProblem
@@ -164,3 +165,19 @@ def test_links_in_space_are_limited_where_they_bend_in_a_plane() -> None:
     assert [one.link for one in limits_of_model(flexible_3r())] == [2, 3]
     twisting = flexible_3r(modes=0, twist=1)
     assert twisting.n_modes == 2 and limits_of_model(twisting) == ()
+
+
+def test_payload_that_bends_a_link_too_far_at_rest_is_not_searched_beyond_that() -> None:
+    task = soft_plan(2.0, allowed=False).task
+    level = replace(task, arm=replace(task.arm, gravity=[0.0, -9.81]), payload_mass=0.0,
+                    start_positions=[-1.5], goal_positions=[-0.4])
+    phases: set[str] = set()
+    found = find_max_payload(level, search='fast', monitor=Monitor(
+        report=lambda progress: phases.add(progress.phase)))
+    assert found.solved, found.message
+    assert found.within_limits and found.plan is not None
+    assert 0.29 < largest(found.plan) <= 0.3
+    assert not any('rising price' in phase for phase in phases)
+    # the goal alone, at rest, bends the link by nearly as much
+    rest = found.plan.problem.goal[None, :2]
+    assert 0.25 < find_largest_bending(level.arm, rest).share <= 0.3

@@ -17,7 +17,7 @@ from factories import TaskFactory
 from flex_planner.arms.arm import Arm, Joint, Link
 from flex_planner.base.errors import InvalidTaskError
 from flex_planner.base.progress import Monitor, StopReason
-from flex_planner.capacity import within_limits
+from flex_planner.capacity import certify_reached, within_limits
 from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.capacity.min_duration import find_min_duration
 from flex_planner.capacity.results import PayloadMethod
@@ -232,6 +232,24 @@ def test_largest_payload_within_limits(rigid_model: ArmModel, paper_task: TaskFa
     assert found.payload == pytest.approx(payload, abs=5e-3)
     assert found.plan is not None
     assert all(one.kept for one in found.plan.constraints)
+
+
+def test_torques_that_switch_too_often_stay_as_the_barrier_has_them(
+        rigid_model: ArmModel, paper_task: TaskFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(certify_reached, 'plan_from_barrier', lambda *given: None)
+    task = replace(paper_task(rigid_model.arm), path_constraints=SPEEDS)
+    found = find_max_payload(task, model=rigid_model, search='fast', accuracy=5e-3)
+    assert found.solved, found.message
+    assert found.payload == pytest.approx(4.536, abs=5e-3)
+    plan = found.plan
+    assert plan is not None and isinstance(plan.problem, ConstrainedMotion)
+    assert plan.problem.smooth
+    # strictly within the motors' limits, which the barrier has besides those on the way
+    samples = plan.uniform_samples(2001)
+    assert (samples.torques < samples.upper_bounds).all()
+    assert (samples.torques > samples.lower_bounds).all()
+    assert plan.problem.terms == plan.problem.slacks.count + 4
+    assert hamiltonian_drift(plan.problem, solution_of(plan)) < 1e-3
 
 
 def test_payloads_are_tried_where_the_barrier_leads_to_none(

@@ -12,13 +12,18 @@ from flex_planner.control.joint_controller import Gains, JointController
 from flex_planner.control.linear_feedback import pd_feedback
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.execution import Execution
-from flex_planner.planning.feedback.differing_arm import course_of, Difference, DifferingArm
+from flex_planner.planning.feedback.differing_arm import (
+    course_of,
+    Difference,
+    DifferingArm,
+    list_differences,
+)
 from flex_planner.planning.feedback.find_gains import find_feedback_gains, GainSettings
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_path import plan_path
-from flex_planner.planning.residuals import find_residuals, list_differences, Residuals
+from flex_planner.planning.residuals import find_residuals, Residuals
 from flex_planner.planning.sampling import sample_plan, SamplingSettings
-from flex_planner.planning.uncertainty import ASSUMED, Uncertainty
+from flex_planner.planning.uncertainty import Uncertainty
 import pytest
 
 PD = JointController(gains=Gains.of(2, 100.0, 10.0))
@@ -59,7 +64,7 @@ def test_planar_arm_in_space_leaves_the_same() -> None:
     for arm in (planar, SpatialArm.of_planar(planar)):
         plan = plan_path(Task(arm=arm, start_positions=[0.3, 0.2], goal_positions=[0.35, 0.25],
                               duration=0.7, payload_mass=1.0), search='fast')
-        assert softer in list_differences(plan, ASSUMED)
+        assert softer in list_differences(plan, 0.1, 0.1)
         differing = DifferingArm.of(Execution.of(plan, controller), plan,
                                     course_of(plan, controller), softer, 0.0)
         found.append(differing.respond(pd_feedback(controller.gains, controller.rate)))

@@ -16,6 +16,7 @@ from flex_planner.optimal_control.via_points import ViaPoint
 from flex_planner.planning.objectives import Objectives
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_path
+from flex_planner.planning.robust.objective import Robustness
 from flex_planner.planning.torque_jumps import find_torque_jumps
 import numpy as np
 import pytest
@@ -225,8 +226,21 @@ def test_one_number_stands_for_all_joints(rigid_arm: Arm, paper_task: TaskFactor
     np.testing.assert_allclose(bound.torque_rate_prices, 1 / 8 * (1 / 200)**2)
 
 
-def test_objectives_refuse_a_price_on_rates(rigid_model: ArmModel,
-                                            paper_task: TaskFactory) -> None:
-    with pytest.raises(InvalidTaskError, match='torque_rate_weight .* objectives'):
-        plan_path(priced(paper_task(rigid_model.arm)), model=rigid_model,
-                  objectives=Objectives(max_joint_speeds=[1.0, 1.0]))
+def test_objectives_are_met_by_torques_without_jumps(rigid_model: ArmModel,
+                                                     paper_task: TaskFactory) -> None:
+    task = priced(paper_task(rigid_model.arm), max_torque_rate=[150.0, 100.0])
+    plan = plan_path(task, model=rigid_model, search='fast',
+                     objectives=Objectives(max_joint_speeds=[0.95, 1.1]))
+    assert plan.solved and plan.objectives is not None and plan.objectives.met
+    speeds = np.abs(plan.uniform_samples(2001).rates).max(axis=0)
+    # without the objective 1.07 and 1.26 rad/s; the smallest weight leaves one of them tight
+    assert (speeds <= [0.95, 1.1]).all() and (speeds / [0.95, 1.1]).max() > 0.99
+    assert (plan.torque_rates <= np.array([150.0, 100.0]) * (1 + 1e-9)).all()
+    np.testing.assert_allclose(plan.sample([0.0, 1.0]).torques, 0, atol=1e-9)
+
+
+def test_forgiving_plans_refuse_a_price_on_rates(ei50_model: ArmModel,
+                                                 paper_task: TaskFactory) -> None:
+    with pytest.raises(InvalidTaskError, match='torque_rate_weight .* forgive .*max_residual'):
+        plan_path(priced(paper_task(ei50_model.arm)), model=ei50_model,
+                  objectives=Objectives(robustness=Robustness(max_residual=1e-3)))

@@ -30,6 +30,8 @@ EXPECTED = {
     'plan_a_path.py': ('solved and certified by a cold start', 'J = 0.647'),
     'post_in_the_way.py': ('post J = 0.8185', '0.45 N m J = 0.651', 'round the post: 5.60'),
     'replay_and_report.py': ('/flex_planner/motion_task', 'the check of the recording passed'),
+    'torques_without_jumps.py': ('the torque jumps by 5.55 N m', 'a price: rates up to 303, 236',
+                                 'bounds: rates up to 150, 150', 'speeds up to 1.00, 1.0'),
     'urdf_over_ros.py': ('joints: yaw, shoulder, elbow', 'the tip is at (0.500, 1.200, 0.900) m'),
     'your_own_urdf.py': ('link forearm was merged with gripper', 'solved and certified'),
     'your_own_arm.py': ('dampingratio', 'joints locked: 2.803', 'solved and certified'),

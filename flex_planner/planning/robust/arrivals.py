@@ -10,6 +10,7 @@ from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
 from flex_planner.control.extent import peak_to_peak
+from flex_planner.control.held_periods import HeldPeriods
 from flex_planner.control.joint_controller import JointController
 from flex_planner.control.joint_reference import JointReference
 from flex_planner.control.linearisation import hold_inputs, linearise_dynamics
@@ -46,15 +47,19 @@ class Ringing:
     ----------
     rest : numpy.ndarray, shape (2 n_t,)
         The state that the controller leads it to.
-    deflections : tuple of numpy.ndarray, shape (k, 1 to 3, instants, 2 n_t)
-        From a state less `rest` to the deflections of k points in the second after it, at updates
-        of the controller: of links, along a line or in a plane, of the stretched arm's tip by
-        elastic joints, and of the tip in space of an arm there.
+    passive : numpy.ndarray, shape (n_f, instants, 2 n_t)
+        From a state less `rest` to the coordinates without a motor in the second after it, at
+        updates of the controller.
+    shapes : tuple of numpy.ndarray, shape (k, 1 to 3, n_f)
+        From these coordinates to the deflections of k points: of links, along a line or in a
+        plane, of the stretched arm's tip by elastic joints, and of the tip in space of an arm
+        there.
 
     """
 
     rest: Array
-    deflections: tuple[Array, ...]
+    passive: Array
+    shapes: tuple[Array, ...]
 
     @classmethod
     def of(cls, execution: Execution, goal: Array, hold: Array) -> Ringing:
@@ -67,25 +72,21 @@ class Ringing:
             If the arm buckles there.
 
         """
-        rest, period = _rest_and_period(execution, goal, hold)
-        parts = _deflections(execution.dynamics.arm, rest)
-        sizes, power = [len(part) * part.shape[1] for part in parts], period
-        rows = np.vstack([part.reshape(-1, rest.size) for part in parts])[:, None]
+        arm = execution.dynamics.arm
+        rest, power = _rest_and_period(execution, goal, hold)
+        rows = np.eye(rest.size)[arm.n_joints:arm.n_coordinates, None]
         count = int(np.ceil(WATCHED / execution.controller.period - 1e-6)) + 1
         while rows.shape[1] < count:  # twice as many instants each time
             rows = np.concatenate([rows, rows @ power], axis=1)
             power = power @ power
-        split = np.split(rows[:, :count], np.cumsum(sizes)[:-1])
-        return cls(rest=rest, deflections=tuple(
-            found.reshape(*part.shape[:2], count, rest.size)
-            for found, part in zip(split, parts, strict=True)))
+        return cls(rest=rest, passive=rows[:, :count], shapes=tuple(_deflections(arm, rest)))
 
     def residual(self, away: Array) -> float:
         """Return the largest peak-to-peak deflection from a state less the rest (2 n_t,) [m]."""
         if not np.isfinite(away).all():
             return np.inf
-        extents = [peak_to_peak((part @ away).transpose(2, 0, 1))
-                   for part in self.deflections]
+        passive = self.passive @ away
+        extents = [peak_to_peak((part @ passive).transpose(2, 0, 1)) for part in self.shapes]
         return float(np.nan_to_num(extents, nan=np.inf).max())
 
 
@@ -111,7 +112,7 @@ class Arrival:
     states: Array
 
     @classmethod
-    def of(cls, execution: Execution, ringing: Ringing, reference: JointReference,
+    def of(cls, execution: Execution, ringing: Ringing, trajectory: HeldPeriods,
            monitor: Monitor | None = None) -> Arrival:
         """
         Return how an arm arrives that follows a trajectory.
@@ -122,7 +123,7 @@ class Arrival:
             If the monitor stopped it.
 
         """
-        motion = execution.arm.follow(reference, execution.start, execution.duration, monitor)
+        motion = trajectory.follow(execution.arm, execution.start, monitor)
         return cls(execution=execution, ringing=ringing, times=motion.times,
                    states=motion.states)
 
@@ -155,7 +156,7 @@ def _rest_and_period(execution: Execution, goal: Array, hold: Array) -> tuple[Ar
 
 def _deflections(arm: Arm, rest: Array) -> list[Array]:
     """
-    Return what makes deflections of a state, shape (k, 1 to 3, 2 n_t) each.
+    Return what makes deflections of passive coordinates, shape (k, 1 to 3, n_f) each.
 
     Of links; beyond elastic joints; and of a spatial arm, whose links may twist, of its tip.
 
@@ -167,7 +168,7 @@ def _deflections(arm: Arm, rest: Array) -> list[Array]:
         parts.append(twisted[:, None])
     if isinstance(arm, SpatialArm):
         parts.append(tip_jacobian(arm, rest[:n_t])[None, :, n:])
-    return [np.pad(part, ((0, 0), (0, 0), (n, n_t))) for part in parts]
+    return parts
 
 
 def _of_modes(arm: Arm, index: int) -> Array:

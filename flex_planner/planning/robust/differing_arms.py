@@ -16,8 +16,8 @@ import numpy as np
 
 MORE_MODES = 2
 # by how much the phase at arrival of the slow vibrations may differ between arms next to one
-# another: those that are weighed, and those that are looked at in the end [rad]
-_WEIGHED, _LOOKED_AT = np.pi, np.pi / 2
+# another that are weighed [rad]; as many stiffnesses between are looked at in the end, too
+_WEIGHED = np.pi
 _MOST_LEVELS = 12
 
 
@@ -48,9 +48,11 @@ def differing_parameters(given: PhysicalParameters, stiffness: float,
 
 
 def other_execution(nominal: Execution, dynamics: ArmDynamics,
-                    parameters: PhysicalParameters) -> Execution:
+                    parameters: PhysicalParameters, rest: Array | None = None) -> Execution:
     """
     Return the same trajectory carried out by another arm.
+
+    Where the first one would be at rest at the start (n_t,) is found if it is not given.
 
     Raises
     ------
@@ -59,7 +61,14 @@ def other_execution(nominal: Execution, dynamics: ArmDynamics,
 
     """
     return replace(nominal, dynamics=dynamics, parameters=parameters,
-                   start=_other_start(nominal, dynamics, parameters))
+                   start=_other_start(nominal, dynamics, parameters,
+                                      rest_at_start(nominal) if rest is None else rest))
+
+
+def rest_at_start(execution: Execution) -> Array:
+    """Return the coordinates (n_t,) of an arm at rest with the joint angles of its start."""
+    angles = execution.start[:execution.dynamics.arm.n_joints]
+    return equilibrium(execution.dynamics, angles, execution.parameters)[0]
 
 
 def weighed_errors(robustness: Robustness, nominal: Execution, *, finely: bool = False) -> Array:
@@ -76,13 +85,13 @@ def weighed_errors(robustness: Robustness, nominal: Execution, *, finely: bool =
     nominal : Execution
         By the arm of the model.
     finely : bool
-        Whether to take them so close that the worst is not missed by much.
+        Whether to take as many stiffnesses between, so that the worst is not missed by much.
 
     """
     given = nominal.parameters
     payload = robustness.payload_error if given.payload_mass or given.payload_inertia else 0.0
     drift = _slow_frequency(nominal) * nominal.duration * robustness.stiffness_error / 2
-    levels = min(int(np.ceil(drift / (_LOOKED_AT if finely else _WEIGHED))), _MOST_LEVELS)
+    levels = min(int(np.ceil(drift / _WEIGHED)), _MOST_LEVELS) * (2 if finely else 1)
     shares = np.arange(-levels, levels + 1) / max(levels, 1)
     if levels:
         shares = shares[shares != 0]
@@ -111,12 +120,11 @@ def _ways_to_bend(link: Link | SpatialLink) -> int:
     return sum(count > 0 for count in (*link.beam.modes, link.beam.twist_modes))
 
 
-def _other_start(nominal: Execution, dynamics: ArmDynamics,
-                 parameters: PhysicalParameters) -> Array:
+def _other_start(nominal: Execution, dynamics: ArmDynamics, parameters: PhysicalParameters,
+                 rest: Array) -> Array:
     """Return where another arm starts: as far from its rest as the one that was planned for."""
     planned, arm = nominal.dynamics.arm, dynamics.arm
     angles = nominal.start[:planned.n_joints]
-    rest, _ = equilibrium(nominal.dynamics, angles, nominal.parameters)
     other, _ = equilibrium(dynamics, angles, parameters)
     start = np.concatenate([other, np.zeros_like(other)])
     away = nominal.start - np.concatenate([rest, np.zeros_like(rest)])

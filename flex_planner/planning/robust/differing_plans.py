@@ -6,6 +6,7 @@ from flex_planner.base.errors import NoEquilibriumError
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
 from flex_planner.control.default_gains import default_gains
+from flex_planner.control.held_periods import HeldPeriods
 from flex_planner.control.joint_controller import JointController
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.planning.execution import Execution
@@ -14,6 +15,7 @@ from flex_planner.planning.robust.arrivals import Arrival, Ringing, tabulate_ref
 from flex_planner.planning.robust.differing_arms import (
     differing_parameters,
     other_execution,
+    rest_at_start,
     weighed_errors,
 )
 from flex_planner.planning.robust.objective import Robustness
@@ -53,6 +55,7 @@ class DifferingArms:
             gains=default_gains(plan.model))
         self.nominal = Execution.of(plan, self.controller)
         self._dynamics = dynamics or self.nominal.dynamics
+        self._rest = rest_at_start(self.nominal)
         self._goal = plan.problem.goal[:plan.arm.n_joints]
         self._hold = plan.problem.holding_torque
         self.weighed = weighed_errors(robustness, self.nominal)
@@ -64,7 +67,8 @@ class DifferingArms:
         if errors not in self._arms:
             parameters = differing_parameters(self.nominal.parameters, *errors)
             try:
-                execution = other_execution(self.nominal, self._dynamics, parameters)
+                execution = other_execution(self.nominal, self._dynamics, parameters,
+                                            self._rest)
                 self._arms[errors] = execution, Ringing.of(execution, self._goal, self._hold)
             except NoEquilibriumError:
                 self._arms[errors] = None
@@ -73,7 +77,7 @@ class DifferingArms:
 
 class CarriedOut:
     """
-    A plan that arms carry out; arrivals are kept.
+    A plan that arms carry out; arrivals and residuals are kept.
 
     Parameters
     ----------
@@ -88,8 +92,10 @@ class CarriedOut:
 
     def __init__(self, plan: Plan, arms: DifferingArms, monitor: Monitor) -> None:
         self._arms, self._monitor = arms, monitor
-        self._reference = tabulate_reference(plan, arms.controller)
+        self._trajectory = HeldPeriods(tabulate_reference(plan, arms.controller),
+                                       arms.controller, arms.nominal.duration)
         self._arrivals = dict[Errors, Arrival | None]()
+        self._residuals = dict[Errors, float]()
 
     def arrival(self, errors: Errors) -> Arrival | None:
         """Return how the arm with these errors arrives; None if it buckles."""
@@ -97,13 +103,15 @@ class CarriedOut:
             self._monitor.check()
             arm = self._arms.arm(errors)
             self._arrivals[errors] = None if arm is None else Arrival.of(
-                *arm, self._reference, self._monitor)
+                *arm, self._trajectory, self._monitor)
         return self._arrivals[errors]
 
     def residual(self, errors: Errors) -> float:
         """Return the residual of that arm; infinite if it buckles or runs away [m]."""
-        arrival = self.arrival(errors)
-        return np.inf if arrival is None else arrival.residual
+        if errors not in self._residuals:
+            arrival = self.arrival(errors)
+            self._residuals[errors] = np.inf if arrival is None else arrival.residual
+        return self._residuals[errors]
 
     def residuals(self, errors: Array) -> Array:
         """Return those of arms with errors (k, 2), shape (k,) [m]."""

@@ -64,7 +64,7 @@ class Robustness:
         ------
         InvalidTaskError
             If nothing of the arm bends, nothing is there of which an error is given, the motion
-            does not end at rest, or it has via points.
+            does not end at rest, it has via points, or rates of torques have a price or a bound.
 
         """
         if not task.arm.n_passive:
@@ -75,6 +75,10 @@ class Robustness:
         if task.via_points:
             raise InvalidTaskError('max_residual is given, but the motion has via points: motions '
                                    'that forgive errors of the model are not found through them')
+        for name in ('torque_rate_weight', 'max_torque_rate'):
+            if getattr(task, name).size:
+                raise InvalidTaskError(f'{name} is given, but must be left out of motions that '
+                                       'forgive errors of the model (max_residual)')
         if not task.arm.n_modes and self.stiffness_error:
             raise InvalidTaskError('stiffness_error is given, but the links of the arm are rigid, '
                                    'and springs of joints are taken as known: give payload_error '

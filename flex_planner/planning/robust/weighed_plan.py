@@ -83,7 +83,7 @@ class WeighedPlan:
         assert self.plan.solution is not None
         offset = step.make_offset(weight)
         problem = OffsetProblem(self.plan.model, self.plan.task, self.plan.problem.parameters,
-                                offset)
+                                offset, ends=self.plan.problem.ends)
         found = plan_problem(problem, solver, (warm_start(self.plan.solution, 'robust'),))
         solver.monitor.check()
         if not found.certified or (self.plan.solved and not found.solved):

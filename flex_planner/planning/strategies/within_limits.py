@@ -41,7 +41,9 @@ STAGES, _FEWEST = 4, 40
 # mu in units of the cost per time of the motion that it starts from: at first, with the smallest
 # slacks then, where a motion is told from others, and at last; the second of each where the first
 # leads to nothing
-_FIRST, COARSE, _LAST = ((1e-2, 0.1), (1.0, 0.01)), 1e-3, (1e-4, 1e-3)
+FIRST, COARSE, _LAST = ((1e-2, 0.1), (1.0, 0.01)), 1e-3, (1e-4, 1e-3)
+# at first, too: a barrier as large as the cost leads far from limits, and so to other kinds
+STRONG = ((1.0, 0.1),)
 # iterations on a mesh: of the interior point, at the end, of a first look from a motion like it
 _PATIENCE, _FINISH, _FIRST_LOOK = 60, 30, 10
 # iterations after which multipliers need not have settled, see `BarrierSchedule`
@@ -58,12 +60,17 @@ _COARSE_ERROR = 1e-4
 _MOST_INTERVALS, _MOST_MESHES = 1000, 8
 # positions in an interval
 _BETWEEN = 17
+# mu from one motion to the next, where only one with a larger mu was found at first
+_LOWER = 0.3
 # of the smallest slacks, below which multipliers grow no more than linearly at the end
 _FLOOR = 0.3
+# floors below one another, of a motion that passes its limits
+_MOST_FLOORS = 8
 
 
 def approach_limits(problem: MotionProblem, slacks: PathSlacks, near: CollocationSolution,
-                    solver: Solver) -> BarrierOutcome:
+                    solver: Solver,
+                    first: tuple[tuple[float, float], ...] = FIRST) -> BarrierOutcome:
     """
     Return a motion that keeps its limits at the points of a coarse mesh.
 
@@ -77,6 +84,9 @@ def approach_limits(problem: MotionProblem, slacks: PathSlacks, near: Collocatio
         A motion of the same task, which may leave the limits.
     solver : Solver
         Its monitor may interrupt the work.
+    first : tuple of (float, float)
+        mu at first, in units of the cost per time, and the smallest slacks then, one after the
+        other where those before lead to nothing.
 
     Raises
     ------
@@ -86,8 +96,8 @@ def approach_limits(problem: MotionProblem, slacks: PathSlacks, near: Collocatio
     """
     barrier, rate = limit_states(problem, slacks), find_cost_rate(problem, near)
     guess = near.on_mesh(first_mesh(problem, solver), GaussRule.of(STAGES))
-    for first, slack in _FIRST:
-        schedule = _schedule(first * rate, COARSE * rate, solver)
+    for share, slack in first:
+        schedule = _schedule(share * rate, COARSE * rate, solver)
         y = barrier.guess(guess, schedule.first, slack)
         met = solve_barrier(barrier, guess, y, schedule, solver.monitor)
         if met.converged:
@@ -129,8 +139,9 @@ def solve_within_limits(problem: MotionProblem, slacks: PathSlacks, met: Barrier
         # where the interior point goes to and fro, Newton's method may still settle
         result = _finish(limited, finer.solution, solver)
         if result.converged and not _keeps(limited, result.solution):
-            limited = limited.floored(result.solution, _FLOOR)
-            result = _finish(limited, result.solution, solver)
+            limited, result = _lower_floor(limited, result, solver)
+        if result.converged and not coarse:
+            limited, result = _lower(limited, result, _LAST[0] * rate, solver)
         limited, result = _at_best_times(limited, result, solver)
         if result.converged or result.status in INTERRUPTED:
             return limited, result
@@ -230,6 +241,38 @@ def _finish(limited: ConstrainedMotion, near: CollocationSolution,
     if result.converged or result.status in INTERRUPTED:
         return result
     return quick.with_settings(exact=True).solve(limited, near)
+
+
+def _lower_floor(limited: ConstrainedMotion, soft: CollocationResult,
+                 solver: Solver) -> tuple[ConstrainedMotion, CollocationResult]:
+    """Return the motion that keeps its limits, from one whose slacks are below their floor."""
+    lower = limited.floored(soft.solution, _FLOOR)
+    result = _finish(lower, soft.solution, solver)
+    for _ in range(_MOST_FLOORS):
+        if result.status in INTERRUPTED or (
+                result.converged and _keeps(lower, result.solution)):
+            break
+        # step by step, which is slower than at once
+        lower = ConstrainedMotion(limited, limited.slacks, limited.mu, _FLOOR * limited.floor,
+                                  smooth=limited.smooth)
+        result = _finish(lower, soft.solution, solver)
+        if not result.converged:
+            break
+        limited, soft = lower, result
+    return lower, result
+
+
+def _lower(limited: ConstrainedMotion, result: CollocationResult, least: float,
+           solver: Solver) -> tuple[ConstrainedMotion, CollocationResult]:
+    """Return the motion with a smaller barrier, as small as it can still be solved with."""
+    while limited.mu > least:
+        mu = max(least, _LOWER * limited.mu)
+        lower = limited.with_mu(mu).floored(result.solution, _FLOOR * mu / limited.mu)
+        found = _finish(lower, result.solution, solver)
+        if not (found.converged and _keeps(lower, found.solution)):
+            break
+        limited, result = lower, found
+    return limited, result
 
 
 def _at_best_times(limited: ConstrainedMotion, result: CollocationResult,

@@ -35,6 +35,7 @@ from flex_planner.reports.recording.findings import CheckLimits, Finding, Motion
 from flex_planner.reports.recording.forgiveness import recorded_offset
 from flex_planner.reports.recording.optimality import optimality_findings
 from flex_planner.reports.recording.torque_rates import RecordedRates, torque_rate_findings
+from flex_planner.reports.recording.way_limits import limit_findings
 import numpy as np
 
 _MICROMETRE = 1e-6
@@ -85,6 +86,7 @@ def check_motion(request: RecordedRequest, model: ArmModel | None = None,
         *_way(motion, states, tip, request.arm, limits),
         *_deviation_at_ends(request, motion, ends, limits),
         *_deviation_from_request(request, motion, limits),
+        *limit_findings(request, motion, limits),
         *_optimality(request, motion, model, limits)))
 
 

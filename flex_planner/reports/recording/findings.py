@@ -32,6 +32,9 @@ class CheckLimits:
         Spread of H relative to its largest term.
     end_error : float
         Of the first and the last sample [rad, m, rad/s, m/s].
+    limit_passed, limit_difference : float
+        By how much a sample may pass a limit on the way, and have less left of it than the report
+        says of the motion; as shares of its scale.
 
     """
 
@@ -43,6 +46,8 @@ class CheckLimits:
     shifted_torque_error: float = 1e-2
     hamiltonian_drift: float = 0.02
     end_error: float = 1e-6
+    limit_passed: float = 1e-5
+    limit_difference: float = 1e-5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

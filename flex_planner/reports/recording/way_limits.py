@@ -1,12 +1,14 @@
-"""Limits on the way of a recorded motion: how near it comes to them, and when."""
+"""Limits on the way of a recorded motion: how near it comes, when, and whether it keeps them."""
 
 from __future__ import annotations
 
 from typing import Any
 
+from flex_planner.base.validation import Array
 from flex_planner.optimal_control.path_constraints import PathSlacks
 from flex_planner.planning.constraint_margins import ACTIVE, find_active
 from flex_planner.reports.recording.contents import RecordedMotion, RecordedRequest
+from flex_planner.reports.recording.findings import CheckLimits, Finding
 from flex_planner.reports.recording.report_table import Cells, ReportTable
 import numpy as np
 
@@ -34,12 +36,54 @@ def find_active_limits(request: RecordedRequest,
     shares = np.asarray(getattr(request.report, 'limit_shares', ()), dtype=float)
     if not (shares < ACTIVE).any():  # nothing needs to be compiled to know it
         return []
-    slacks, moving = PathSlacks(request.arm, request.path_constraints), motion.moving
-    if not slacks.count:
+    times, (names, values) = motion.times[motion.moving], _recorded_slacks(request, motion)
+    return [(name, find_active(times, column))
+            for name, column in zip(names, values.T, strict=True)]
+
+
+def limit_findings(request: RecordedRequest, motion: RecordedMotion,
+                   limits: CheckLimits) -> list[Finding]:
+    """
+    Return whether the samples of a motion keep its limits on the way, as the report says.
+
+    Parameters
+    ----------
+    request : RecordedRequest
+        Its arm and its task have the limits, its report what is left of them.
+    motion : RecordedMotion
+        Its samples are looked at, not what is between them.
+    limits : CheckLimits
+        What must be kept.
+
+    Returns
+    -------
+    list of Finding
+        By how much the limit is passed that is nearest to it; and what the report says too much
+        is left of any, where it is of the same limits. Empty without limits.
+
+    """
+    names, values = _recorded_slacks(request, motion)
+    if not names:
         return []
-    values = slacks(np.hstack([motion.coordinates, motion.rates])[moving])
-    return [(label.name, find_active(motion.times[moving], column))
-            for label, column in zip(slacks.labels, values.T, strict=True)]
+    least, report = values.min(axis=0), request.report
+    worst = int(least.argmin())
+    found = [Finding(name=f'nearest limit, {names[worst]}, passed by', unit='',
+                     limit=limits.limit_passed, value=max(-float(least[worst]), 0.0))]
+    # after them a report has limits of the motors, where torques are states
+    if list(getattr(report, 'limit_names', ()))[:len(names)] == names:
+        said = np.asarray(report.limit_shares, dtype=np.float64)[:len(names)]
+        found.append(Finding(name='limits on the way, less left than reported', unit='',
+                             limit=limits.limit_difference,
+                             value=max(float((said - least).max()), 0.0)))
+    return found
+
+
+def _recorded_slacks(request: RecordedRequest,
+                     motion: RecordedMotion) -> tuple[list[str], Array]:
+    """Return the names of all limits, and their slacks (k, n_c) at the samples of the motion."""
+    slacks = PathSlacks(request.arm, request.path_constraints)
+    states = np.hstack([motion.coordinates, motion.rates])[motion.moving]
+    return [label.name for label in slacks.labels], slacks(states)
 
 
 def limit_tables(request: RecordedRequest) -> list[ReportTable]:

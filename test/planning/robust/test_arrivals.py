@@ -15,7 +15,7 @@ from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.robust.arrivals import tabulate_reference
-from flex_planner.planning.robust.differing_plans import CarriedOut, DifferingArms
+from flex_planner.planning.robust.differing_plans import as_keys, CarriedOut, DifferingArms
 from flex_planner.planning.robust.objective import Robustness
 from flex_planner.simulation.settling import bending_peak_to_peak
 import numpy as np
@@ -65,6 +65,8 @@ def test_arms_that_are_looked_at_are_closer_where_vibrations_are_fast(
     assert len(slow.weighed) == 4 and len(fast.weighed) > 8
     assert len(fast.looked_at) > len(slow.looked_at) > 4
     for arms in (slow, fast):
+        assert set(as_keys(arms.weighed)) < set(as_keys(arms.looked_at))
+    for arms in (slow, fast):
         assert np.abs(arms.looked_at).max() == pytest.approx(0.1)
 
 
@@ -92,5 +94,10 @@ def test_linearisation_against_differences_and_the_exponential(clamped_plan: Pla
     system[:size, :size], system[:size, size:] = A[0], B[0]
     exact = expm(system * 1e-3)
     free, forced = hold_inputs(A, B, 1e-3)
+    # velocities in other units than angles, which is no reason for more terms
+    units = np.array([1.0] * (size // 2) + [1e4] * (size // 2))
+    other = hold_inputs(A * (units[:, None] / units), B * units[:, None], 1e-3)[0]
+    np.testing.assert_allclose(other * (units / units[:, None]), free, rtol=1e-9,
+                               atol=1e-9 * np.abs(exact).max())
     np.testing.assert_allclose(free[0], exact[:size, :size], atol=1e-7 * np.abs(exact).max())
     np.testing.assert_allclose(forced[0], exact[:size, size:], atol=1e-7 * np.abs(exact).max())

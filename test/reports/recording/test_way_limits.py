@@ -7,12 +7,23 @@ from types import SimpleNamespace
 from typing import Any
 
 from flex_planner.base.errors import RecordingError
+from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.path_constraints import Circle
 from flex_planner.planning.region_outlines import outline_region
-from flex_planner.reports.recording import contents, RecordedRequest, report_page
+from flex_planner.reports.recording import (
+    check_motion,
+    contents,
+    RecordedRequest,
+    report_page,
+)
 from flex_planner.reports.recording.contents import RecordedMotion
+from flex_planner.reports.recording.findings import CheckLimits
 from flex_planner.reports.recording.tables import tables
-from flex_planner.reports.recording.way_limits import find_active_limits, limit_tables
+from flex_planner.reports.recording.way_limits import (
+    find_active_limits,
+    limit_findings,
+    limit_tables,
+)
 import numpy as np
 import pytest
 from report_support import Page, recorded
@@ -68,6 +79,36 @@ def test_table_has_each_limit_with_its_margin(request_within: RecordedRequest) -
                   for way in ('forwards', 'backwards'))
     assert nearest == pytest.approx(2 - turned, abs=1e-3)
     assert rows['speed of joint 2 forwards'][-1] == '–'
+
+
+def test_check_finds_limits_that_the_samples_do_not_keep(request_within: RecordedRequest,
+                                                         rigid_model: ArmModel) -> None:
+    check = check_motion(request_within, rigid_model)
+    assert check.passed, [str(one) for one in check.findings if not one.passed]
+    passed, less = limit_findings(request_within, motion_of(request_within), CheckLimits())
+    assert passed.name == 'nearest limit, tip from post, passed by'
+    assert passed.value == 0 and less.value < 1e-6
+    texts = request_within.task.path_constraints
+    request_within.task.path_constraints = [*texts[:1], 'joint_speed:2,0.9', *texts[2:]]
+    try:
+        failed = [one for one in check_motion(request_within, rigid_model).findings
+                  if not one.passed]
+    finally:
+        request_within.task.path_constraints = texts
+    fastest = np.abs(motion_of(request_within).rates[:, 1]).max()
+    assert [one.name.partition(' joint')[0] for one in failed] == [
+        'nearest limit, speed of', 'limits on the way, less left than reported']
+    assert failed[0].value == pytest.approx(fastest / 0.9 - 1, rel=1e-9)
+
+
+def test_check_finds_a_report_that_claims_more_room(request_within: RecordedRequest) -> None:
+    shares = request_within.report.limit_shares
+    request_within.report.limit_shares = np.asarray(shares) + 0.01
+    try:
+        found = limit_findings(request_within, motion_of(request_within), CheckLimits())
+    finally:
+        request_within.report.limit_shares = shares
+    assert [one.passed for one in found] == [True, False]
 
 
 def test_page_draws_regions_bounds_and_active_times(request_within: RecordedRequest) -> None:
