@@ -111,9 +111,9 @@ def turn_body(body: FlexibleBody, axes: Array) -> FlexibleBody:
         return body
     vectors: dict[str, Any] = {name: clean(axes.T @ getattr(body, name)) for name in (
         'first_moment', 'displacement', 'moment', 'tip', 'tip_displacement', 'tip_turn', 'spin')}
-    matrices: dict[str, Any] = {name: clean(axes.T @ getattr(body, name) @ axes)
-                for name in ('inertia', 'inertia_slope', 'inertia_bend')}
-    bent: dict[str, Any] = {name: np.einsum('ab,ajk->bjk', axes, getattr(body, name))
-            for name in ('shortening', 'tip_shortening')}
+    matrices: dict[str, Any] = {name: clean(axes.T @ getattr(body, name) @ axes) for name in (
+        'inertia', 'inertia_slope', 'inertia_bend')}
+    bent: dict[str, Any] = {name: np.einsum('ab,ajk->bjk', axes, getattr(body, name)) for name in (
+        'shortening', 'tip_shortening')}
     return replace(body, cross_moment=clean(body.cross_moment @ axes), **vectors, **matrices,
                    **bent)
