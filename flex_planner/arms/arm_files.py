@@ -25,7 +25,7 @@ from flex_planner.arms.plain_spatial_arm import (
 )
 from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.arms.spatial_files import is_spatial, read_spatial_arm
-from flex_planner.arms.urdf import UrdfError
+from flex_planner.arms.urdf_files import UrdfError
 from flex_planner.base.errors import FlexPlannerError, InvalidValueError
 from flex_planner.base.paths import expand_path, PathError, STANDARD_INPUT
 from flex_planner.base.suggestions import did_you_mean

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 import math
-import os
 from pathlib import Path
 import xml.etree.ElementTree as ElementTree
 from xml.etree.ElementTree import Element
@@ -25,8 +24,9 @@ from flex_planner.arms.spatial_body import (
     SpatialBody,
     turn_rpy,
 )
-from flex_planner.base.errors import FlexPlannerError, InvalidValueError
-from flex_planner.base.text_files import read_text, say_file, TextFileError
+from flex_planner.arms.urdf_files import expand_urdf, find_urdf, UrdfError
+from flex_planner.base.errors import InvalidValueError
+from flex_planner.base.text_files import say_file
 from flex_planner.base.validation import Array
 import numpy as np
 
@@ -34,11 +34,6 @@ MOVING = ('revolute', 'continuous', 'prismatic')
 _KINDS = (*MOVING, 'fixed', 'floating', 'planar')
 # of entries of rotations: angles are written with few digits, 1.5708 for a right angle
 _SNAP, _FINE = 2e-5, 1e-9
-_PACKAGE = 'package://'
-
-
-class UrdfError(FlexPlannerError):
-    """A URDF file cannot be read; the message names it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -143,9 +138,8 @@ def read_urdf(given: str, folder: Path) -> Urdf:
         If it cannot be found, read or expanded, or as `read_urdf_text`.
 
     """
-    path = _find(given, folder)
-    return read_urdf_text(_expand(path) if path.suffix == '.xacro' else _text(path),
-                          say_file(path))
+    path = find_urdf(given, folder)
+    return read_urdf_text(expand_urdf(path), say_file(path))
 
 
 def read_urdf_text(text: str, source: str) -> Urdf:
@@ -198,39 +192,6 @@ def parse_urdf(text: str) -> Urdf:
     joints = tuple(_joint(element, notes) for element in root.findall('joint'))
     _check_tree(bodies, joints)
     return Urdf(name=root.get('name', ''), bodies=bodies, joints=joints, notes=tuple(notes))
-
-
-def _find(given: str, folder: Path) -> Path:
-    """Return the path of a URDF file."""
-    if not given.startswith(_PACKAGE):
-        return folder / Path(given).expanduser()
-    package, _, inner = given[len(_PACKAGE):].partition('/')
-    prefixes = [entry for entry in os.environ.get('AMENT_PREFIX_PATH', '').split(':') if entry]
-    for prefix in prefixes:
-        share = Path(prefix) / 'share' / package
-        if share.is_dir():
-            return share / inner
-    raise UrdfError(f'{given}: no package {package} is installed; is its workspace sourced?')
-
-
-def _text(path: Path) -> str:
-    try:
-        return read_text(path)
-    except TextFileError as error:
-        raise UrdfError(str(error)) from None
-
-
-def _expand(path: Path) -> str:
-    """Return the text that xacro makes of a file."""
-    try:
-        import xacro  # type: ignore[import-not-found,unused-ignore]
-    except ImportError:
-        raise UrdfError(f'{say_file(path)}: xacro is not installed: expand it elsewhere, with '
-                        'xacro FILE > robot.urdf, or install the Python package xacro') from None
-    try:
-        return str(xacro.process_file(str(path)).toxml())
-    except Exception as error:  # xacro has errors of many kinds
-        raise UrdfError(f'{say_file(path)}: xacro: {error}') from None
 
 
 def _check_tree(bodies: dict[str, SpatialBody], joints: Sequence[UrdfJoint]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
+from flex_planner.arms.urdf_files import expand_urdf, find_urdf
 from launch import LaunchContext, SomeSubstitutionsType
 from launch.actions import DeclareLaunchArgument
 from launch.substitutions import LaunchConfiguration
@@ -24,9 +25,9 @@ def declare_arguments() -> list[DeclareLaunchArgument]:
             'params_file', default_value='', description='Parameters of the nodes; default: '
             'config/paper.yaml, or none if there is an arm'),
         DeclareLaunchArgument(
-            'urdf', default_value='', description='URDF file for the nodes, in place of the one '
-            'that the arm file names, and for a robot_state_publisher; without an arm file every '
-            'link is rigid'),
+            'urdf', default_value='', description='URDF or xacro file for the nodes, in place of '
+            'the one that the arm file names, and for a robot_state_publisher; without an arm '
+            'file every link is rigid'),
         DeclareLaunchArgument(
             'use_sim_time', default_value='false', choices=['true', 'false'],
             description='Whether the nodes follow /clock')]
@@ -88,4 +89,4 @@ def create_views(context: LaunchContext) -> list[Node]:
 
 
 def _description(urdf: str) -> ParameterValue:
-    return ParameterValue(Path(urdf).expanduser().read_text(encoding='utf-8'), value_type=str)
+    return ParameterValue(expand_urdf(find_urdf(urdf, Path())), value_type=str)

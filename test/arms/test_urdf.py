@@ -10,7 +10,8 @@ from xml.dom import minidom
 
 from flex_planner.arms.arm_files import arm_from_mapping, ArmFileError, load_arm
 from flex_planner.arms.spatial_arm import SpatialArm
-from flex_planner.arms.urdf import parse_urdf, read_urdf, UrdfError
+from flex_planner.arms.urdf import parse_urdf, read_urdf
+from flex_planner.arms.urdf_files import UrdfError
 from flex_planner.base.errors import InvalidValueError
 import numpy as np
 import pytest

@@ -8,7 +8,9 @@ import runpy
 import signal
 import subprocess
 import sys
+from types import SimpleNamespace
 from typing import Any
+from xml.dom import minidom
 
 from ament_index_python.packages import get_package_share_directory
 from flex_planner.arms.arm_files import load_arm
@@ -92,6 +94,16 @@ def test_urdf_goes_to_the_nodes_and_to_a_robot_state_publisher() -> None:
     # alone, it is the arm: no preset and none of its parameters
     (planner,) = started('planner.launch.py', urdf=str(urdf))[1]
     assert [list(entry) for entry in planner['parameters']] == [['robot_description']]
+
+
+def test_xacro_file_is_expanded_for_the_nodes(tmp_path: Path,
+                                              monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, 'xacro', SimpleNamespace(process_file=minidom.parse))
+    file = tmp_path / 'arm.urdf.xacro'
+    file.write_text('<robot name="arm"><!-- a comment --><link name="base"/></robot>')
+    (planner,) = started('planner.launch.py', urdf=str(file))[1]
+    sent = planner['parameters'][-1]['robot_description'].value
+    assert sent == minidom.parse(str(file)).toxml()
 
 
 def test_rviz_shows_topics_that_are_there() -> None:

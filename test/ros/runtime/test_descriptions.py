@@ -8,7 +8,7 @@ from typing import Any
 
 from flex_planner.arms.arm_files import ArmFileError, load_arm
 from flex_planner.arms.spatial_arm import SpatialArm
-from flex_planner.arms.urdf import UrdfError
+from flex_planner.arms.urdf_files import UrdfError
 from flex_planner.base.errors import FlexPlannerError, InvalidValueError
 from flex_planner.dynamics.cache_key import describe_fields
 from flex_planner.ros.runtime import descriptions
