@@ -153,6 +153,8 @@ class PayloadEnds:
         self._bent = bends and not task.start_modal_displacements.size, bends
         # that were found last, from which others are found soon
         self._near: list[Array | None] = [None, None]
+        # for the same payload the same to the last digit, wherever the search for rest began
+        self._last: list[tuple[float, tuple[Array, Array, Array]] | None] = [None, None]
 
     def at(self, end: int, payload: float) -> tuple[Array, Array, Array]:
         """
@@ -170,9 +172,14 @@ class PayloadEnds:
         given = self._given[end]
         if not self._bent[end]:
             return given, np.zeros_like(given), np.zeros_like(given)
-        here, less, more = (self._state(end, payload + change)
-                            for change in (0.0, -_NUDGE, _NUDGE))
-        return here, (more - less) / (2 * _NUDGE), (more - 2 * here + less) / _NUDGE**2
+        last = self._last[end]
+        if last is None or last[0] != payload:
+            here, less, more = (self._state(end, payload + change)
+                                for change in (0.0, -_NUDGE, _NUDGE))
+            last = payload, (here, (more - less) / (2 * _NUDGE),
+                             (more - 2 * here + less) / _NUDGE**2)
+            self._last[end] = last
+        return last[1]
 
     def _state(self, end: int, payload: float) -> Array:
         parameters = replace(self._parameters, payload_mass=payload)
