@@ -223,7 +223,8 @@ def _search(target: _Target, near: ArrayLike | None) -> tuple[Array, float]:
     wanted = np.zeros(n) if near is None else vector('near', near, n)
     best, least = wanted, np.inf
     for i, start in enumerate(_starts(target.arm, wanted)):
-        posture = _descend(target, start, wanted, _OTHER_WEIGHTS if i else _WEIGHTS)
+        posture = _without_turns(target.arm, _descend(
+            target, start, wanted, _OTHER_WEIGHTS if i else _WEIGHTS), wanted)
         miss = float(np.linalg.norm(target.miss(posture)))
         if miss < least:
             best, least = posture, miss
@@ -245,6 +246,15 @@ def _descend(target: _Target, start: Array, wanted: Array,
             lambda q, w=weight: np.vstack([target.slope(q), w * np.eye(q.size)]),
             bounds=(lower, upper), max_nfev=40, xtol=1e-13, ftol=1e-15, gtol=1e-15).x
     return np.asarray(posture, dtype=float)
+
+
+def _without_turns(arm: SpatialArm, posture: Array, wanted: Array) -> Array:
+    """Return a posture turned by whole turns as near to a wanted one as the limits allow."""
+    lower, upper = arm.angle_limits()
+    turns = np.clip(np.round((wanted - posture) / (2 * np.pi)),
+                    np.ceil((lower - posture) / (2 * np.pi)),
+                    np.floor((upper - posture) / (2 * np.pi)))
+    return np.where([joint.slides for joint in arm.joints], posture, posture + 2 * np.pi * turns)
 
 
 def _starts(arm: SpatialArm, wanted: Array) -> Iterator[Array]:

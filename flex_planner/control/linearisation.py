@@ -68,7 +68,7 @@ def _balance(matrices: Array) -> Array:
     from scipy.linalg import matrix_balance  # see `ArmDynamics.prepare`
 
     size = matrices.shape[-1]
-    largest = np.abs(matrices).reshape(-1, size, size).max(axis=0)
+    largest = np.abs(matrices).reshape(-1, size, size).max(axis=0, initial=0.0)
     _, (scale, _) = matrix_balance(largest, permute=False, separate=True)
     return np.asarray(scale, dtype=np.float64)
 

@@ -44,6 +44,21 @@ def test_redundant_arm_stays_near_a_posture() -> None:
     assert np.abs(found - near).max() < 0.2
 
 
+@pytest.mark.parametrize('limit', [np.inf, 4.0])
+def test_no_joint_is_a_whole_turn_farther_away_than_it_must_be(limit: float) -> None:
+    arm, rng = ur5(), np.random.default_rng(3)
+    arm = replace(arm, joints=tuple(
+        replace(joint, lower_limit=-limit, upper_limit=limit) for joint in arm.joints))
+    for inside, near in rng.uniform(-2, 2, (8, 2, arm.n_joints)):
+        place, axes = tip_frame(arm, inside)
+        found = spatial_inverse_kinematics(arm, place, near, orientation=axes)
+        np.testing.assert_allclose(tip_frame(arm, found)[1], axes, atol=1e-8)
+        assert np.abs(found).max() <= limit
+        for turned in (found - 2 * np.pi, found + 2 * np.pi):
+            nearer = (np.abs(turned) <= limit) & (np.abs(turned - near) < np.abs(found - near))
+            assert not nearer.any(), (found, near)
+
+
 def test_limits_are_kept() -> None:
     arm = oblique()
     limited = replace(arm, joints=tuple(
