@@ -8,6 +8,7 @@ import sys
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parent)]
 
+from docutils.nodes import document  # noqa: E402
 from flex_planner.base.version import VERSION  # noqa: E402
 from site_pages.source_links import (  # noqa: E402
     link_sources,
@@ -60,6 +61,18 @@ def read_source(app: Sphinx, page: str, content: list[str]) -> None:
     content[0] = title_links(link_sources(content[0], page, ADDRESS))
 
 
+def leave_out_of_navigation(app: Sphinx, tree: document) -> None:
+    """
+    Take the pages of functions and classes out of the tree beside every page.
+
+    Their names stand on the page of their part of the library. In the tree there would be hundreds,
+    and to draw it on hundreds of pages would take most of the time of a build.
+
+    """
+    for node in [*tree.findall(autosummary.autosummary_toc)]:
+        node.parent.remove(node)
+
+
 def write_generated(app: Sphinx, config: Config) -> None:
     """Write the pages that are made from the sources, before Sphinx looks for pages."""
     write_pages(HERE / 'generated', ROOT)
@@ -69,3 +82,4 @@ def setup(app: Sphinx) -> None:
     """Connect what is done before and while pages are read."""
     app.connect('config-inited', write_generated)
     app.connect('source-read', read_source)
+    app.connect('doctree-read', leave_out_of_navigation, priority=1)
