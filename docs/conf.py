@@ -65,8 +65,8 @@ def leave_out_of_navigation(app: Sphinx, tree: document) -> None:
     """
     Take the pages of functions and classes out of the tree beside every page.
 
-    Their names stand on the page of their part of the library. In the tree there would be hundreds,
-    and to draw it on hundreds of pages would take most of the time of a build.
+    Their names stand on the page of their part of the library. In the tree there would be
+    hundreds, and to draw it on hundreds of pages would take most of the time of a build.
 
     """
     for node in [*tree.findall(autosummary.autosummary_toc)]:
