@@ -18,8 +18,8 @@ from applied_torques import Case, crane_plan
 from factories import PlanFactory, TaskFactory
 from flex_planner.arms.arm import Arm, Joint, Link, Motor, Node
 from flex_planner.arms.arm_files import load_arm
+from flex_planner.base.compiled_library import load_once
 from flex_planner.collocation import core
-from flex_planner.dynamics import compiled_integration
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.task import postures_from_points, Task
 from flex_planner.planning.plan import Plan
@@ -67,7 +67,7 @@ def failed_compilations_are_forgotten() -> Iterator[None]:
     """Let what one test could not compile be compiled by the next; what is there is read again."""
     yield
     core.LOADED.clear()
-    compiled_integration._load.cache_clear()
+    load_once.cache_clear()
 
 
 @pytest.fixture(scope='session')

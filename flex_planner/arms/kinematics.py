@@ -9,7 +9,7 @@ other.
 
 from __future__ import annotations
 
-from flex_planner.arms.arm import Arm
+from flex_planner.arms.arm import Arm, Link
 from flex_planner.arms.planar_only import require_planar
 from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.arms.spatial_joint import slides
@@ -109,8 +109,7 @@ def link_deflections(arm: Arm, index: int, vectors: Array) -> Array:
         distances: Array = np.linalg.norm(arm.links[index].displace(modal, _STATIONS), axis=-1).T
         return distances
     link, part, n = arm.links[index], arm.modal_slices[index], arm.n_joints
-    shapes = link.mode_shapes().shape(np.linspace(0, link.length, _STATIONS, dtype=np.float64))
-    deflections: Array = shapes @ vectors[part.start - n:part.stop - n]
+    deflections: Array = _shape_at(link, _STATIONS) @ vectors[part.start - n:part.stop - n]
     return deflections
 
 
@@ -139,8 +138,7 @@ def link_bends(arm: Arm, index: int, modal: Array, stations: int = _STATIONS) ->
     if isinstance(arm, SpatialArm):
         shapes = arm.links[index].bend_shapes(np.linspace(0, 1, stations, dtype=np.float64))
     else:
-        places = np.linspace(0, link.length, stations, dtype=np.float64)
-        shapes = link.mode_shapes().shape(places)[:, None]
+        shapes = _shape_at(link, stations)[:, None]
     bends: Array = shapes @ modal
     return bends
 
@@ -186,8 +184,13 @@ def bent_distances(arm: Arm, index: int, modal: Array, stations: int) -> Array:
     if isinstance(arm, SpatialArm):
         distances: Array = np.linalg.norm(arm.links[index].displace(modal, stations), axis=-1)
         return distances
+    return np.abs(modal @ _shape_at(link, stations).T)
+
+
+def _shape_at(link: Link, stations: int) -> Array:
+    """Return the modes of a link of a planar arm at evenly spaced points, (stations, modes)."""
     places = np.linspace(0, link.length, stations, dtype=np.float64)
-    return np.abs(modal @ link.mode_shapes().shape(places).T)
+    return link.mode_shapes().shape(places)
 
 
 def tip_position(arm: Arm, coordinates: Array) -> Array:

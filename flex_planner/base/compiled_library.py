@@ -104,6 +104,34 @@ def build_library(key: str, source: str, load: Callable[[Path], Loaded], *,
     raise CompilerError(reason)
 
 
+@cache
+def load_once(path: Path, options: tuple[str, ...], load: Callable[[Path], Loaded],
+              otherwise: str) -> Loaded | None:
+    """
+    Return the library of a file of C code; it is kept in memory, also that there is none.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    options : tuple of str
+        Of the compiler.
+    load : callable
+        Loads the library.
+    otherwise : str
+        What follows where there is no compiler, which is warned of; None is returned then.
+
+    """
+    source = path.read_text()
+    key = content_key(source, *options)
+    try:
+        return find_library(key, lambda library, record: load(library)) or build_library(
+            key, source, load, record={}, options=options)
+    except CompilerError as error:
+        warn_once(f'{error}: {otherwise}')
+        return None
+
+
 def _keep(key: str, library: Path, record: dict[str, Any], reason: str) -> None:
     """Keep a new library, unless there is a reason not to, and say so."""
     try:

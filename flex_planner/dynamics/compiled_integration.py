@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import ctypes
-from functools import cache
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
-from flex_planner.base.compiled_library import build_library, content_key, find_library
-from flex_planner.base.compiler import CompilerError
-from flex_planner.base.library_cache import warn_once
+from flex_planner.base.compiled_library import load_once
 from flex_planner.base.validation import Array
 import numpy as np
 
@@ -113,17 +110,9 @@ class _Calls:
         return 0
 
 
-@cache
-def _load() -> Any:
+def _load() -> ctypes.CDLL | None:
     """Return the library, None without a compiler."""
-    source = _SOURCE.read_text()
-    key = content_key(source, *_OPTIONS)
-    try:
-        return find_library(key, lambda library, record: _open(library)) or build_library(
-            key, source, _open, record={}, options=_OPTIONS)
-    except CompilerError as error:
-        warn_once(f'{error}: a plan is certified several times slower')
-        return None
+    return load_once(_SOURCE, _OPTIONS, _open, 'a plan is certified several times slower')
 
 
 def _open(library: Path) -> ctypes.CDLL:
