@@ -51,17 +51,24 @@ LONG: dict[str, Any] = {
     'start_modal_displacements': [0.02, 0.0, 0.02, 0.0], 'duration': 100.0}
 SomeClient = TypeVar('SomeClient', bound='Client')
 _NUMBERS = itertools.count(1)
+_CLAIMS: list[socket.socket] = []  # held until this process ends
+_RUNNING: set[str] = set()  # full names of the planners that this process has started
 
 
 def free_domain() -> int:
     """Return a domain that no other node on this machine is in, as far as one can see."""
     for number in range(os.getpid(), os.getpid() + 101):
         domain = 1 + number % 101
+        claim = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
             try:
+                # other tests that begin now have no node yet; a name of Linux, and no file
+                claim.bind(f'\0flex_planner test domain {domain}')
                 probe.bind(('', 7410 + 250 * domain))  # of its first node, by the DDSI standard
             except OSError:
+                claim.close()
                 continue
+        _CLAIMS.append(claim)
         return domain
     raise RuntimeError('every ROS domain from 1 to 101 is in use')
 
@@ -214,6 +221,8 @@ class Planner(Client):
                  remappings: Mapping[str, str] | None = None, **parameters: object) -> None:
         super().__init__()
         self.name, self._log = f'{space}/{name}', folder / f'{name}.log'
+        assert self.name not in _RUNNING, f'either of two planners {self.name} may answer'
+        _RUNNING.add(self.name)
         self._log.parent.mkdir(parents=True, exist_ok=True)
         self.recordings = folder / 'recordings'
         given = {'arm': arm, 'recording_folder': self.recordings, **parameters}
@@ -295,6 +304,7 @@ class Planner(Client):
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:
         self.process.stop()
+        _RUNNING.remove(self.name)
         super().__exit__(kind, error, trace)
 
 

@@ -94,7 +94,6 @@ class PlanTopics:
         assert reference is not None
         if track is None or not outcome.start_ns:  # which begins now
             track = self.track(outcome)
-        begin_ns = (outcome.start_ns or track.begin_ns) + round(reference.start_hold * 1e9)
         markers: MarkerArray | None = None  # before anything is published, should they fail
         if not outcome.replaces or self._markers.get_subscription_count():
             markers = motion_markers(plan.arm, reference, settings.base_frame,
@@ -102,18 +101,19 @@ class PlanTopics:
         if outcome.gains is not None:  # first: a controller has them when it begins
             self._gains.publish(feedback_message(outcome.gains, plan, settings.joint_names,
                                                  settings.base_frame))
-        self.running.begin(RunningPlan(plan_id=outcome.report.plan_id, plan=plan,
-                                       begin_ns=begin_ns, track=track))
         joints = self.trajectory(outcome, track)
         self._record(joints, settings)
+        if not outcome.start_ns:  # all that follows it has to begin when a controller gets it
+            track = replace(track, begin_ns=self._now_ns())
+        begin_ns = (outcome.start_ns or track.begin_ns) + round(reference.start_hold * 1e9)
+        self.running.begin(RunningPlan(plan_id=outcome.report.plan_id, plan=plan,
+                                       begin_ns=begin_ns, track=track))
         self.joints.publish(joints)
         self._flexible.publish(outcome.trajectory)
         if markers is not None:
             self._markers.publish(markers)
         if outcome.replaces:
             track = track.part(self._now_ns())
-        elif not outcome.start_ns:
-            track = replace(track, begin_ns=self._now_ns())
         self.streamer.start(plan, track, settings)
 
     def _now_ns(self) -> int:

@@ -59,7 +59,7 @@ def test_map_that_is_damaged_costs_nothing_but_time(tmp_path: Path) -> None:
 def test_node_does_not_start_with_a_map_that_is_none_of_its_own(
         store: Path, tmp_path: Path, arm: str, name: str, reason: str) -> None:
     path = tmp_path / name if name else store
-    with Planner(tmp_path, arm, map_store=path) as planner:
+    with Planner(tmp_path, arm, 'stranger', map_store=path) as planner:
         assert planner.process.process.wait(60) == 1
         assert f"map_store is '{path}', but" in planner.log()
         assert reason in planner.log()
