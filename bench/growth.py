@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 
+from bench.battery import cpu_seconds
 from bench.model import uniform_arm
 from bench.solver import paper_problem
 from flex_planner import Arm, Monitor, Plan, plan_path, Task
@@ -30,11 +31,19 @@ CLAMPED = [(n, m, setting) for setting in ('horizontal', 'gravity') for n in ran
            for m in range(4) if n * (1 + m) <= 12]
 CLAMPED_LIMIT = 15.0
 _GRAVITY = 9.81
+# seconds of plans after which no more is measured
+_ENOUGH = 4.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Growth:
-    """A plan of an arm of equal links; memory is what the whole process took at most [MB]."""
+    """
+    A plan of an arm of equal links.
+
+    Memory is what the whole process took at most [MB]; CPU time that of the process and of helpers
+    that have ended [s].
+
+    """
 
     links: int
     modes: int
@@ -46,6 +55,7 @@ class Growth:
     intervals: int
     memory: float
     setting: str = ''
+    cpu: float = float('nan')
 
 
 def growth_task(links: int, modes: int, setting: str = '') -> Task:
@@ -79,15 +89,19 @@ def report(links: int, modes: int, setting: str = '') -> None:
     task, limit = growth_task(links, modes, setting), CLAMPED_LIMIT if setting else TIME_LIMIT
     model = ArmModel(task.arm)
     plans: list[Plan] = []
-    while len(plans) < 5 and sum(plan.planning_time for plan in plans) < 10:
+    times: list[float] = []
+    while len(plans) < 5 and sum(plan.planning_time for plan in plans) < _ENOUGH:
+        began = cpu_seconds()
         plans.append(plan_path(task, model=model, monitor=Monitor(time_limit=limit)))
+        times.append(cpu_seconds() - began)
     peak = next(line for line in open('/proc/self/status') if line.startswith('VmHWM'))
     last = plans[-1]
     print(json.dumps({
         'links': links, 'modes': modes, 'setting': setting, 'unknowns': 4 * task.arm.n_coordinates,
         'solved': last.solved, 'strategy': last.strategy, 'iterations': last.iterations,
         'seconds': statistics.median(plan.planning_time for plan in plans),
-        'intervals': last.mesh_intervals, 'memory': int(peak.split()[1]) / 1024}))
+        'cpu': statistics.median(times), 'intervals': last.mesh_intervals,
+        'memory': int(peak.split()[1]) / 1024}))
 
 
 def table(rows: list[Growth]) -> str:
@@ -103,11 +117,12 @@ def table(rows: list[Growth]) -> str:
 
 def clamped_table(rows: list[Growth]) -> str:
     """Return the rows of clamped links as Markdown, lying and hanging side by side."""
-    lines = ['| links x modes | coordinates | horizontal [s] | strategy | gravity [s] '
-             '| strategy |', '|' + '---|' * 6]
+    lines = ['| links x modes | coordinates | horizontal: time [s] | CPU [s] | strategy '
+             '| gravity: time [s] | CPU [s] | strategy |', '|' + '---|' * 8]
     found = {(row.links, row.modes, row.setting): row for row in rows}
     for links, modes in dict.fromkeys((row.links, row.modes) for row in rows):
-        cells = [f'{row.seconds:.3g} | {row.strategy if row.solved else "not solved"}'
+        cells = [f'{row.seconds:.3g} | {row.cpu:.3g} | '
+                 f'{row.strategy if row.solved else "not solved"}'
                  for setting in ('horizontal', 'gravity')
                  for row in [found[links, modes, setting]]]
         lines.append(f'| {links} x {modes} | {links * (1 + modes)} | {" | ".join(cells)} |')

@@ -31,8 +31,8 @@ _MOST_INTERVALS = 600
 
 
 def certify_reached(parameter: FreeParameter, problem: MotionProblem, reached: ReachedLimit,
-                    accuracy: float,
-                    solver: Solver) -> tuple[ReachedLimit, float, Plan] | None:
+                    accuracy: float, solver: Solver, *,
+                    ringing: bool = False) -> tuple[ReachedLimit, float, Plan] | None:
     """
     Return what was reached, and that or a value a little easier with its plan; None without.
 
@@ -49,6 +49,8 @@ def certify_reached(parameter: FreeParameter, problem: MotionProblem, reached: R
         To which the limit is wanted [kg, s].
     solver : Solver
         Its monitor may interrupt the work.
+    ringing : bool
+        Whether Newton's method is known to fail, because torques switch too often.
 
     Raises
     ------
@@ -56,33 +58,39 @@ def certify_reached(parameter: FreeParameter, problem: MotionProblem, reached: R
         If the monitor stopped it.
 
     """
-    def plan_at(limit: MotionProblem, slacks: PathSlacks) -> Plan | None:
-        return plan_from_barrier(limit, slacks, reached.lower_price(limit), solver)
-
-    def certify(*shares: float) -> tuple[float, Plan] | None:
-        return _certify_eased(parameter, problem, reached.value, plan_at, shares)
-
     if reached.met is None:
         found = _certify_near(parameter, problem, reached.value, reached.motion, accuracy, solver)
-    else:
-        found = certify(accuracy / (3 * reached.value))
-        smooth = None if found else _certify_smooth(problem, reached, solver)
-        if smooth is not None:
-            return smooth
-        found = found or certify(*_EASED)
-    return None if found is None else (reached, *found)
+        return None if found is None else (reached, *found)
+    finer = _refine(problem, reached, accuracy, solver)
+    limit = finer or reached
+
+    def plan_at(near: MotionProblem, slacks: PathSlacks) -> Plan | None:
+        return plan_from_barrier(near, slacks, reached.lower_price(near), solver)
+
+    def certify(*shares: float) -> tuple[ReachedLimit, float, Plan] | None:
+        found = _certify_eased(parameter, problem, limit.value, plan_at, shares)
+        return None if found is None else (limit, *found)
+
+    sharp = None if ringing and finer else certify(accuracy / (3 * limit.value))
+    if sharp is not None:
+        return sharp
+    smooth = None if finer is None else _certify_smooth(problem, finer, solver)
+    return smooth or certify(*_EASED)
 
 
-def _certify_smooth(problem: MotionProblem, reached: ReachedLimit,
-                    solver: Solver) -> tuple[ReachedLimit, float, Plan] | None:
-    """Return payload and plan of the motion as the barrier has it on a finer mesh, or None."""
+def _refine(problem: MotionProblem, reached: ReachedLimit, accuracy: float,
+            solver: Solver) -> ReachedLimit | None:
+    """Return what was reached on a mesh on which it stands; None without one."""
     slacks = None if problem.layout.torques else slacks_of(problem)
     if slacks is None:
         return None
-    finer = refine_limit(drop_weights(problem), relieve_ends(problem, slacks), reached, solver)
-    if finer is None:
-        return None
+    return refine_limit(drop_weights(problem), relieve_ends(problem, slacks), reached, solver,
+                        accuracy)
 
+
+def _certify_smooth(problem: MotionProblem, finer: ReachedLimit,
+                    solver: Solver) -> tuple[ReachedLimit, float, Plan] | None:
+    """Return payload and plan of the motion as the barrier has it on a fine mesh, or None."""
     def plan_there(limit: MotionProblem, slacks: PathSlacks) -> Plan | None:
         return plan_smoothly(limit, slacks, finer.unloaded(), solver)
 
