@@ -44,7 +44,7 @@ def walk_barrier(family: Family, met: BarrierOutcome, monitor: Monitor) -> Barri
     Returns
     -------
     BarrierOutcome
-        Settled for the last one, or not converged.
+        Settled for the last one; not converged where that is the last of them that was met.
 
     Raises
     ------

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.planning.strategies.friction_homotopy import soften_friction
@@ -12,25 +13,24 @@ from flex_planner.planning.strategies.friction_homotopy import soften_friction
 _STIFFER, _SLOWLY = 10.0, 4.0
 
 
-def ease_arm(problem: MotionProblem) -> Callable[[float], MotionProblem] | None:
-    """
-    Return problems of easier arms; None where nothing of the arm could be easier.
+Easier = Callable[[float], MotionProblem]
+"""From a share to a problem: of the easiest arm at 0, of the arm itself at 1."""
 
-    Returns
-    -------
-    callable or None
-        From a share to a problem: the easiest at 0, that of the arm at 1.
 
-    """
+def ease_arm(problem: MotionProblem) -> Iterator[Easier]:
+    """Yield problems of easier arms: with smoother friction, if there is any, then stiffer too."""
     softened = soften_friction(problem, _SLOWLY)
-    if softened is None and not problem.model.arm.n_modes:
-        return None
+    if softened is not None:
+        yield softened
+    if problem.model.arm.n_modes:
+        yield partial(_stiffen, softened or (lambda share: problem))
 
-    def at(share: float) -> MotionProblem:
-        if share == 1:
-            return problem
-        parameters = (problem if softened is None else softened(share)).parameters
-        stiffer = replace(parameters, rigidity=_STIFFER ** (1 - share) * parameters.rigidity)
-        return MotionProblem(problem.model, problem.task, stiffer, via_times=problem.junctions)
 
-    return at
+def _stiffen(softened: Easier, share: float) -> MotionProblem:
+    """Return one of some problems with stiffer links."""
+    problem = softened(share)
+    if share == 1:
+        return problem
+    stiffer = _STIFFER ** (1 - share) * problem.parameters.rigidity
+    return MotionProblem(problem.model, problem.task, replace(
+        problem.parameters, rigidity=stiffer), via_times=problem.junctions)

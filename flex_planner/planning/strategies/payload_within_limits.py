@@ -26,7 +26,7 @@ from flex_planner.optimal_control.barrier_problem import PayloadBarrier
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.path_barrier import PathBarrier
 from flex_planner.optimal_control.path_constraints import PathSlacks
-from flex_planner.planning.strategies.easier_arm import ease_arm
+from flex_planner.planning.strategies.easier_arm import ease_arm, Easier
 from flex_planner.planning.strategies.interior_point import applies
 from flex_planner.planning.strategies.limit_barrier import barrier_price, moved_mass
 from flex_planner.planning.strategies.reached_limit import ReachedLimit
@@ -38,6 +38,8 @@ _FIRST, _LAST = 0.15, (1e-6, 1e-4)
 # of the accuracy, that the barrier may keep
 _SHARE, _ACCURACY = 0.5, 1e-3
 _TOLERANCE, _PATIENCE = 1e-3, 80
+# of mu at first, where a motion counts though mu falls no further
+_ENOUGH = 0.01
 # where Newton's method goes on without slacks and multipliers
 _SETTLED = 1e-6
 # mu from which it falls on a finer mesh, by that at last; iterations to come to it; meshes that
@@ -95,7 +97,7 @@ def reach_from_easier_arm(problem: MotionProblem, slacks: PathSlacks, solver: So
     Return what `reach_largest_payload` does, from the motion of an arm that is easier to move.
 
     The barrier of soft links, or of friction that jumps, has no way from a straight line; that of
-    the same arm ten times as stiff has, and leads there.
+    the same arm ten times as stiff, or with smoother friction, has, and leads there.
 
     Raises
     ------
@@ -103,25 +105,37 @@ def reach_from_easier_arm(problem: MotionProblem, slacks: PathSlacks, solver: So
         If the monitor stopped it.
 
     """
-    at, price = ease_arm(problem), barrier_price(problem)
-    if at is None or not _is_reachable(problem, solver):
+    if not _is_reachable(problem, solver):
         return None
-    mu = _first_mu(problem)
+    for easier in ease_arm(problem):
+        try:
+            found = _reach_from(easier, problem, slacks, solver, accuracy)
+        except FlexPlannerError:  # a payload that no equilibrium carries
+            continue
+        if found is not None:
+            return found
+    return None
+
+
+def _reach_from(easier: Easier, problem: MotionProblem, slacks: PathSlacks, solver: Solver,
+                accuracy: float) -> ReachedLimit | None:
+    """Return the limit from that of easier arms, perhaps with a larger barrier than is wanted."""
+    price, mu = barrier_price(problem), _first_mu(problem)
 
     def family(share: float) -> tuple[BarrierProblem, float]:
-        return PathBarrier(PayloadBarrier(at(share), price), slacks), mu
+        return PathBarrier(PayloadBarrier(easier(share), price), slacks), mu
 
-    try:
-        easiest = PayloadBarrier(at(0.0), price)
-        met = _settle_on_line(PathBarrier(easiest, slacks), easiest, mu, solver)
-        if met.converged:
-            met = walk_barrier(family, met, solver.monitor)
-        barrier, both = _barriers(problem, slacks)
-        if met.converged:
-            met = lower_slowly(both, met, _schedule(both, met.y, accuracy).last, solver.monitor)
-    except FlexPlannerError:  # a payload that no equilibrium carries
+    easiest = PayloadBarrier(easier(0.0), price)
+    met = _settle_on_line(PathBarrier(easiest, slacks), easiest, mu, solver)
+    if met.converged:
+        met = walk_barrier(family, met, solver.monitor)
+    if not met.converged:
         return None
-    return _reached(barrier, met, both.free) if met.converged else None
+    barrier, both = _barriers(problem, slacks)
+    met = lower_slowly(both, met, _schedule(both, met.y, accuracy).last, solver.monitor)
+    if met.mu > _ENOUGH * mu:
+        return None
+    return _reached(barrier, replace(met, converged=True), both.free)  # it is, at its mu
 
 
 def _settle_on_line(both: PathBarrier, barrier: PayloadBarrier, mu: float,
