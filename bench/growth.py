@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 import json
+import os
 import statistics
 import subprocess
 import sys
@@ -15,6 +16,7 @@ from bench.model import uniform_arm
 from bench.solver import paper_problem
 from flex_planner import Arm, Monitor, Plan, plan_path, Task
 from flex_planner.arms.arm import Motor
+from flex_planner.base.processes import PROCESSES
 from flex_planner.collocation import Solver, SolverSettings
 from flex_planner.collocation.equations import collocation_residual, factorise, linearise
 from flex_planner.collocation.estimate import estimate_error
@@ -29,7 +31,7 @@ TIME_LIMIT = 20.0
 # of clamped links, lying and hanging: at most 12 coordinates; their limit is one of CPU time
 CLAMPED = [(n, m, setting) for setting in ('horizontal', 'gravity') for n in range(1, 5)
            for m in range(4) if n * (1 + m) <= 12]
-CLAMPED_LIMIT = 15.0
+CLAMPED_LIMIT = 10.0
 _GRAVITY = 9.81
 # seconds of plans after which no more is measured
 _ENOUGH = 4.0
@@ -40,8 +42,8 @@ class Growth:
     """
     A plan of an arm of equal links.
 
-    Memory is what the whole process took at most [MB]; CPU time that of the process and of helpers
-    that have ended [s].
+    Memory is what the whole process took at most [MB]; CPU time that of the process and of its
+    children that have ended [s].
 
     """
 
@@ -77,10 +79,11 @@ def growth_task(links: int, modes: int, setting: str = '') -> Task:
 
 
 def measure(links: int, modes: int, setting: str = '') -> Growth:
-    """Return a row, measured in a process of its own."""
+    """Return a row, measured in a process of its own; of clamped links without helpers."""
+    alone = {PROCESSES: '0'} if setting else {}  # so that its CPU time is all there is
     code = f'from bench.growth import report; report({links}, {modes}, {setting!r})'
     done = subprocess.run([sys.executable, '-c', code], check=True, capture_output=True,
-                          text=True)
+                          text=True, env={**os.environ, **alone})
     return Growth(**json.loads(done.stdout.splitlines()[-1]))
 
 

@@ -33,7 +33,7 @@ from flex_planner.planning.bending import limits_of_model
 import numpy as np
 
 _DEGREE, _INTERVALS, _FINEST = 5, 40, 160
-_ITERATIONS, _TIME_LIMIT = 250, 60.0
+_ITERATIONS, _SECONDS, _TIME_LIMIT = 250, 60.0, 60.0
 # of a payload: two meshes that say the same, and what beats an answer; how many are confirmed
 STANDS, WORSE, _CONFIRMED = 0.005, 0.005, 2
 # of the torques' squares, by the motors', which singular arcs need [kg]
@@ -122,10 +122,10 @@ class Adversary:
         arm = self._task.arm
         chain, values = build_chain(arm), Parameters.of(arm)
         mass, a = ca.SX.sym('m'), ca.SX.sym('a', arm.n_coordinates)
-        numbers = [(chain.payload_mass, mass), (chain.payload_inertia, 0.0),
-                   (chain.rigidity, values.rigidity),
-                   (chain.coulomb_friction, values.coulomb_friction),
-                   (chain.coulomb_speed, values.coulomb_speed)]
+        numbers: Any = [(chain.payload_mass, mass), (chain.payload_inertia, 0.0),
+                        (chain.rigidity, values.rigidity),
+                        (chain.coulomb_friction, values.coulomb_friction),
+                        (chain.coulomb_speed, values.coulomb_speed)]
         symbols = [symbol for symbol, _ in numbers]
         forces = ca.substitute([chain.inverse_dynamics(a)], symbols,
                                [ca.SX(value) for _, value in numbers])[0]
@@ -153,7 +153,8 @@ class Adversary:
             'x': ca.vertcat(ca.vec(q), ca.vec(v), ca.vec(a), bent, mass),
             'f': -mass + _EFFORT * used, 'g': ca.vertcat(equal, unequal)}
         options: Any = {'ipopt': {'print_level': 0, 'sb': 'yes', 'tol': 1e-6,
-                                  'max_iter': _ITERATIONS}, 'print_time': False}
+                                  'max_iter': _ITERATIONS, 'max_cpu_time': _SECONDS},
+                        'print_time': False}
         return (ca.nlpsol('adversary', 'ipopt', programme, options),
                 (equal.numel(), unequal.numel()))
 
@@ -211,7 +212,7 @@ def random_starts(task: Task, times: Array, seed: int) -> Iterator[tuple[Array, 
 
 
 def find_heaviest(task: Task, starts: int, enough: float, seed: int = 0) -> float:
-    """Return the largest payload that is found; what is more than enough stands on a finer mesh."""
+    """Return the largest payload found; what is more than enough stands on a finer mesh."""
     coarse = Adversary(task, _INTERVALS)
     pairs = random_starts(task, coarse.times, seed)
     found = [one for _, (start, payload) in zip(range(starts), pairs, strict=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from barrier_cart import Cart, pass_barrier, SCHEDULE
-from flex_planner.base.progress import Monitor, StopReason, StoppedError
+from flex_planner.base.progress import Monitor, StoppedError, StopReason
 from flex_planner.collocation import barrier_walk
 from flex_planner.collocation.barrier_walk import lower_slowly, walk_barrier
 from flex_planner.collocation.interior_point import BarrierOutcome, BarrierProblem

@@ -1,4 +1,4 @@
-"""The same motion of an arm that is easier to move: stiffer, and with friction that is smoother."""
+"""The motion of an arm that is easier to move: stiffer, and with friction that is smoother."""
 
 from __future__ import annotations
 
