@@ -93,25 +93,34 @@ def report(links: int, modes: int, setting: str = '') -> None:
     model = ArmModel(task.arm)
     plans: list[Plan] = []
     times: list[float] = []
-    while len(plans) < 5 and sum(plan.planning_time for plan in plans) < _ENOUGH:
-        began = cpu_seconds()
-        plans.append(plan_path(task, model=model, monitor=_limit(began, setting)))
-        times.append(cpu_seconds() - began)
+    while len(plans) < 5 and sum(times) < _ENOUGH:
+        began = time.perf_counter()
+        plans.append(plan_path(task, model=model, monitor=_limit(setting)))
+        times.append(time.perf_counter() - began)
     peak = next(line for line in open('/proc/self/status') if line.startswith('VmHWM'))
     last = plans[-1]
     print(json.dumps({
         'links': links, 'modes': modes, 'setting': setting, 'unknowns': 4 * task.arm.n_coordinates,
         'solved': last.solved, 'strategy': last.strategy, 'iterations': last.iterations,
-        'seconds': statistics.median(plan.planning_time for plan in plans),
-        'cpu': statistics.median(times), 'intervals': last.mesh_intervals,
+        'seconds': statistics.median(times), 'intervals': last.mesh_intervals,
+        'cpu': statistics.median(plan.planning_time for plan in plans) if setting else np.nan,
         'memory': int(peak.split()[1]) / 1024}))
 
 
-def _limit(began: float, setting: str) -> Monitor:
+class _CpuMonitor(Monitor):
+    """Counts CPU time from its creation instead of time."""
+
+    @property
+    def elapsed(self) -> float:
+        """CPU time since creation [s]."""
+        return cpu_seconds() - self.started
+
+
+def _limit(setting: str) -> Monitor:
     """Return a monitor that ends a plan in time: of clamped links in CPU time."""
     if not setting:
         return Monitor(time_limit=TIME_LIMIT)
-    return Monitor(canceled=lambda: cpu_seconds() - began > CLAMPED_LIMIT)
+    return _CpuMonitor(time_limit=CLAMPED_LIMIT, started=cpu_seconds())
 
 
 def table(rows: list[Growth]) -> str:
@@ -131,10 +140,11 @@ def clamped_table(rows: list[Growth]) -> str:
              '| gravity: time [s] | CPU [s] | strategy |', '|' + '---|' * 8]
     found = {(row.links, row.modes, row.setting): row for row in rows}
     for links, modes in dict.fromkeys((row.links, row.modes) for row in rows):
-        cells = [f'{row.seconds:.3g} | {row.cpu:.3g} | '
+        cells = ['- | - | not run' if row is None else
+                 f'{row.seconds:.3g} | {row.cpu:.3g} | '
                  f'{row.strategy if row.solved else "not solved"}'
                  for setting in ('horizontal', 'gravity')
-                 for row in [found[links, modes, setting]]]
+                 for row in [found.get((links, modes, setting))]]
         lines.append(f'| {links} x {modes} | {links * (1 + modes)} | {" | ".join(cells)} |')
     return '\n'.join(lines)
 
