@@ -11,9 +11,11 @@ from typing import Any
 from flex_planner.arms.arm import Arm, Joint, Link, Motor
 from flex_planner.base.progress import Monitor, StopReason
 from flex_planner.capacity.max_payload import find_max_payload
-from flex_planner.collocation import Solver, SolverStatus
+from flex_planner.collocation import GaussRule, Solver, SolverStatus
+from flex_planner.collocation.core import prepare_core
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.direct.ipopt import DirectProblem
+from flex_planner.optimal_control.free_payload import FreePayloadProblem
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import Task
 from flex_planner.optimal_control.totals import integrate_totals
@@ -82,6 +84,10 @@ class Watched(Monitor):
 
 @pytest.mark.parametrize('limit', [0.0, 0.5])
 def test_search_stops_in_time(problem: MotionProblem, limit: float) -> None:
+    ahead = FreePayloadProblem(problem, 300.0)
+    start = ahead.extend(problem.straight_line(2, GaussRule.of(5)))
+    # what is stopped is the search, not the compiler
+    prepare_core(ahead.size, ahead.left(start.nodes[0])[0].size, ahead.explicit.size, 5)
     monitor = Watched(time_limit=limit)
     extremals = list(continue_by_ipopt(problem, 300.0, Solver(monitor=monitor), lambda value: 0.0))
     assert extremals[-1].result.status is SolverStatus.TIMEOUT
