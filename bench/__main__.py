@@ -92,7 +92,9 @@ CLAMPED = """
 ### Growth with clamped links
 
 The same motion with clamped links, lying and under gravity, of at most 12 coordinates. *Not
-solved* is within {limit:.0f} s of time.
+solved* is within {limit:.0f} s of CPU time, without helper processes; other work on the machine
+makes the time longer. Links have no rotors at their joints: the torque of a motor drives the
+bending of its own link alone.
 
 {table}
 """
