@@ -81,7 +81,23 @@ class OutcomeRecorder:
         self._gains = Topic(name('feedback_gains'), f'{interfaces}FeedbackGains', LATCHED)
         self._states = Topic(name('reference_states'), JOINT_STATE, DEFAULT)
 
-    def write(self, task: MotionTask, state: RequestState, outcome: Outcome) -> Path:
+    def find_place(self, state: RequestState, outcome: Outcome) -> Path:
+        """
+        Return a folder for the recording of a request, and enter it into the report.
+
+        Parameters
+        ----------
+        state, outcome : RequestState, Outcome
+            As of `write`.
+
+        """
+        kind = 'plan_path' if outcome.search is None else 'find_max_payload'
+        path = state.settings.output_folder() / self._name(state.stamp_ns, kind)
+        outcome.report.recording = printable(str(path))
+        return path
+
+    def write(self, task: MotionTask, state: RequestState, outcome: Outcome,
+              place: Path | None = None) -> Path:
         """
         Write a recording and return its folder.
 
@@ -95,6 +111,8 @@ class OutcomeRecorder:
         outcome : Outcome
             Of the request; the recording's path is entered into the report. A search for the
             maximum payload gives the folder another name.
+        place : Path, optional
+            From `find_place`, if that was called before.
 
         Raises
         ------
@@ -104,9 +122,7 @@ class OutcomeRecorder:
         """
         settings, stamp, report = state.settings, state.stamp_ns, outcome.report
         ready = stamp + report.planning_time.sec * 10**9 + report.planning_time.nanosec
-        path = settings.output_folder() / self._name(
-            stamp, 'plan_path' if outcome.search is None else 'find_max_payload')
-        report.recording = printable(str(path))
+        path = place or self.find_place(state, outcome)
         with Recording.create(path.parent, path.name, TYPES,
                               custom_data={'flex_planner': VERSION},
                               max_bytes=settings.max_recording_size or None) as recording:
