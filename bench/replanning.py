@@ -72,21 +72,23 @@ class Rate:
 class Chaser(Client):
     """Moves the goal of an arm on its way."""
 
-    def __init__(self, seed: int = 0) -> None:
+    def __init__(self, pid: int, seed: int = 0) -> None:
         super().__init__()
+        self._pid = pid
         self._plans = self.node.create_client(PlanPath, f'{NODE}/plan_path')
         self._plans.wait_for_service(PATIENCE)
         self._random = np.random.default_rng(seed)
         self.answers: list[float] = []
         self.services: list[float] = []
         self.codes: list[int] = []
-        self.chased = 0.0  # [s]
+        self.chased = self.spent = 0.0  # [s], of time, and of CPU time of the node
 
     def chase(self, rate: float) -> None:
         """Plan a motion, and again at a rate [Hz] while it goes on."""
         report = self._ask(task(duration=DURATION, publish=True))
         assert report.error_code == PlanReport.NONE, report.error_msg
         goal, began, due = np.array([0.5, 0.5]), time.monotonic(), time.monotonic()
+        spent = _cpu_seconds(self._pid)
         while due < began + CHASE:
             place = goal + self._random.uniform(-MOST, MOST, 2)
             sent = time.monotonic()
@@ -99,7 +101,8 @@ class Chaser(Client):
             due = max(due + 1 / rate, time.monotonic())
             self._idle(due)
         self.chased += time.monotonic() - began
-        self._idle(began + DURATION + 0.1)
+        self._idle(began + DURATION + 0.1)  # what is left to record is written by then
+        self.spent += _cpu_seconds(self._pid) - spent
 
     def _ask(self, message: MotionTask, looks: bool = False) -> PlanReport:
         """Return the report of a plan; with `looks`, read a parameter meanwhile."""
@@ -123,17 +126,16 @@ def measure(arm: str, recorded: bool, motions: int = MOTIONS) -> Rate:
             'flex_planner.ros.planner.node',
             {'arm': arm, 'record': recorded, 'recording_folder': f'{name}/recordings'},
             log=Path(name, 'planner.log')) as node:
-        client, asked = Chaser(), RATES[arm]
+        client, asked = Chaser(node.process.pid), RATES[arm]
         client.chase(asked)  # functions are loaded by then
-        client.__dict__.update(answers=[], services=[], codes=[], chased=0.0)
-        began = _cpu_seconds(node.process.pid)
+        client.__dict__.update(answers=[], services=[], codes=[], chased=0.0, spent=0.0)
         for _ in range(motions):
             client.chase(asked)
-        spent, count = _cpu_seconds(node.process.pid) - began, len(client.codes)
+        count = len(client.codes)
         client.close()
     return Rate(arm=arm, recorded=recorded, asked=asked, reached=count / client.chased,
                 planned=client.codes.count(PlanReport.NONE), requests=count,
-                cpu=spent / count * 1e3, answers=_spread(client.answers),
+                cpu=client.spent / count * 1e3, answers=_spread(client.answers),
                 services=_spread(client.services))
 
 

@@ -169,6 +169,11 @@ class RequestPlanner:
 
         return self._conclude(search_payload, request.task, state, search_without_result(request))
 
+    @property
+    def records_later(self) -> bool:
+        """Return whether plans that replace others are recorded after the answer."""
+        return self._late.ready
+
     def close(self, timeout: float) -> None:
         """Write what is to be recorded after its answer; what takes longer is lost [s]."""
         left = self._late.close(timeout)
@@ -311,7 +316,7 @@ class RequestPlanner:
         if not state.settings.record or given_up:
             return outcome
         if (outcome.replaces and outcome.publishable and message.publish
-                and self._late.ready and not state.settings.recording_required):
+                and self.records_later and not state.settings.recording_required):
             return self._record_later(message, state, outcome)
         self._report_in_work = outcome.report
         try:
