@@ -69,6 +69,7 @@ def _of_task(options: argparse.Namespace) -> int:
     with translate_errors():
         errors = given_uncertainty(options, request.uncertainty)
         settings = _settings(options, errors, request.task.payload_mass)
+        request = replace(request, uncertainty=errors)  # of all that is recorded
 
     def work(model: ArmModel, monitor: Monitor) -> tuple[Plan, FeedbackGains | None]:
         with translate_errors():

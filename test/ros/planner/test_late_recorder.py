@@ -10,8 +10,10 @@ import time
 from factories import PlanFactory
 from flex_planner.base.errors import RecordingError
 from flex_planner.planning.plan import Plan
+from flex_planner.planning.residuals import find_motion_residuals
 from flex_planner.planning.sampling import sample_plan, SamplingSettings
 from flex_planner.reports.recording.contents import RecordedRequest
+from flex_planner.reports.recording.execution import carried_motion
 from flex_planner.ros.planner.late_recorder import LateRecorder, once
 from flex_planner.ros.planner.outcome import Outcome
 from flex_planner.ros.planner.recorder import OutcomeRecorder
@@ -116,7 +118,13 @@ def test_plan_in_motion_is_recorded_once_it_is_answered(arm: Arm, tmp_path: Path
 def test_plan_that_must_be_recorded_is_so_before_the_answer(arm: Arm, tmp_path: Path) -> None:
     outcome = arm.ask(recording_required=True)
     assert outcome.record is None
-    assert RecordedRequest.read(outcome.report.recording).report.plan_id == outcome.report.plan_id
+    recorded = RecordedRequest.read(outcome.report.recording)
+    assert recorded.report.plan_id == outcome.report.plan_id
+    # and can be carried out again, from where the arm moved
+    assert outcome.plan is not None
+    left = find_motion_residuals(carried_motion(recorded, outcome.plan.model)).responses[0]
+    assert left.bending == pytest.approx(outcome.report.executed_residual_vibration, abs=1e-5)
+    assert left.tip_error < 1e-3
 
 
 def test_failure_is_told_by_the_plan_after_it(arm: Arm, tmp_path: Path) -> None:
