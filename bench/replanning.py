@@ -8,11 +8,10 @@ page. The figures are those of a machine with nothing else to do.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 import os
 from pathlib import Path
-import sys
 import tempfile
 import time
 from typing import Any
@@ -78,6 +77,10 @@ class Chaser(Client):
         self._plans = self.node.create_client(PlanPath, f'{NODE}/plan_path')
         self._plans.wait_for_service(PATIENCE)
         self._random = np.random.default_rng(seed)
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin to measure."""
         self.answers: list[float] = []
         self.services: list[float] = []
         self.codes: list[int] = []
@@ -128,7 +131,7 @@ def measure(arm: str, recorded: bool, motions: int = MOTIONS) -> Rate:
             log=Path(name, 'planner.log')) as node:
         client, asked = Chaser(node.process.pid), RATES[arm]
         client.chase(asked)  # functions are loaded by then
-        client.__dict__.update(answers=[], services=[], codes=[], chased=0.0, spent=0.0)
+        client.forget()
         for _ in range(motions):
             client.chase(asked)
         count = len(client.codes)
@@ -159,7 +162,7 @@ def measure_all() -> list[dict[str, Any]]:
     return rows
 
 
-def table(rows: list[Mapping[str, Any]] | list[dict[str, Any]]) -> str:
+def table(rows: Sequence[Mapping[str, Any]]) -> str:
     """Return the rates as Markdown."""
     head = ['| arm | recorded | asked | reached | planned | CPU | answer: median, 95 % '
             '| service: median, 95 % |', '|---|---|---|---|---|---|---|---|']
@@ -172,4 +175,3 @@ def table(rows: list[Mapping[str, Any]] | list[dict[str, Any]]) -> str:
 
 if __name__ == '__main__':
     print(table(measure_all()))
-    sys.exit()

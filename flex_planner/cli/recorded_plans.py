@@ -83,4 +83,5 @@ def _refuse_motion(options: argparse.Namespace) -> None:
     for name, value in {**plain, **others}.items():
         given = getattr(options, name)
         if name not in ('arm', 'time_limit') and given != value:
-            raise InvalidValueError({'limits': '--limit'}.get(name, name), given, 'left out: the recording has the motion')
+            raise InvalidValueError('--limit' if name == 'limits' else name, given,
+                                    'left out: the recording has the motion')

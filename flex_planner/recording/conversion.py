@@ -33,7 +33,7 @@ DTYPES: Final = {
 ACCEPTED_KINDS: Final = {'b': 'b', 'i': 'iu', 'u': 'iu', 'f': 'fiu'}
 LONGEST_SHOWN: Final = 80  # characters
 _SizedT = TypeVar('_SizedT', bound=Sized)
-_Converter = Callable[[Any], object]
+_Converter = Callable[[Any], Any]
 
 
 def convert_message(store: Typestore, type_name: str, message: object, path: str) -> object:
@@ -101,35 +101,35 @@ def _plain_converter(store: Typestore, description: FieldDesc) -> _Converter:
     return _plain_numbers if item == (Nodetype.BASE, ('float64', 0)) else _refuse
 
 
-def _refuse(value: object) -> object:
+def _refuse(value: object) -> Any:
     raise _NotPlainError
 
 
-def _plain_float(value: object) -> object:
+def _plain_float(value: object) -> Any:
     if type(value) is not float:
         raise _NotPlainError
     return value
 
 
-def _plain_integer(value: object) -> object:
+def _plain_integer(value: object) -> Any:
     if type(value) is not int or not 0 <= value < 2**31:
         raise _NotPlainError
     return value
 
 
-def _plain_text(value: object) -> object:
+def _plain_text(value: object) -> Any:
     if type(value) is not str or not value.isascii():
         raise _NotPlainError
     return value
 
 
-def _plain_numbers(value: object) -> object:
+def _plain_numbers(value: object) -> Any:
     if type(value) is not array or value.typecode != 'd':
         raise _NotPlainError
     return np.array(value)
 
 
-def _plain_list(convert: _Converter, value: object) -> object:
+def _plain_list(convert: _Converter, value: object) -> Any:
     if type(value) is not list:
         raise _NotPlainError
     return [convert(entry) for entry in value]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import chain
 import sys
@@ -44,8 +44,9 @@ def add_command(commands: Commands) -> None:
     """Add ``flex-planner gains``."""
     parser = commands.add_parser(
         'gains', help='find gains of feedback for a motion',
-        description='Plan a motion, or take a recorded one, and find gains for its controller: of a PD of each joint, of '
-        'all joints together, and of a regulator that estimates how links bend. Gains are '
+        description='Plan a motion, or take a recorded one, and find gains for its controller: of '
+        'a PD of each joint, of all joints together, and of a regulator that estimates how links '
+        'bend. Gains are '
         'handed out where they are stable on arms that differ from the model, with two more '
         'modes per link and at the rate of the controller.')
     add_task(parser, payload='mass at the tip (default: 0)', recorded=True)
@@ -116,7 +117,7 @@ def _settings(options: argparse.Namespace, errors: Uncertainty, payload: float) 
                         payload_error=errors.payload_error(payload))
 
 
-def _finish(gains: FeedbackGains, files: Iterable[Row]) -> int:
+def _finish(gains: FeedbackGains, files: Iterator[Row]) -> int:
     """Print what gains leave, and files as they are written where there are gains."""
     print(f'\n{feedback_table(gains)}\n')
     if not gains.found:

@@ -41,9 +41,9 @@ def add_command(commands: Commands) -> None:
     parser = commands.add_parser(
         'robustness', help='say what a motion leaves behind if the arm is not quite its model',
         description='Plan a motion, or take a recorded one, and carry it out in simulation with a '
-        'controller on arms that differ: in stiffness, in payload, in both, and with two more modes per link. The '
-        'errors are those of an identification where there is one beside the arm file, else a '
-        'tenth.')
+        'controller on arms that differ: in stiffness, in payload, in both, and with two more '
+        'modes per link. The errors are those of an identification where there is one beside the '
+        'arm file, else a tenth.')
     add_task(parser, payload='mass at the tip (default: 0)', recorded=True)
     add_controller(parser)
     parser.add_argument(

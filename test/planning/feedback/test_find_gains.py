@@ -15,7 +15,7 @@ from flex_planner.control.linear_feedback import LinearFeedback, pd_feedback
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.integration import HeldTorqueIntegrator
 from flex_planner.optimal_control.torque_limits import TorqueLimits
-from flex_planner.planning.execution import Execution, UNSTABLE_GROWTH
+from flex_planner.planning.execution import UNSTABLE_GROWTH
 from flex_planner.planning.feedback.carried_motion import CarriedMotion
 from flex_planner.planning.feedback.differing_arm import Difference, DifferingArm
 from flex_planner.planning.feedback.find_gains import (

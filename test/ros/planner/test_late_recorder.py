@@ -25,6 +25,7 @@ from flex_planner.ros.settings.planner import PlannerSettings
 from flex_planner_interfaces.msg import MotionTask, PlanReport
 import pytest
 
+
 def test_all_that_waits_is_written_in_order_before_the_end() -> None:
     recorder, gate, written = LateRecorder(), threading.Event(), list[int]()
     recorder.add(lambda: gate.wait(10))
