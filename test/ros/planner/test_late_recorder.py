@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 import threading
 import time
+from typing import Any
 
 from factories import PlanFactory
 from flex_planner.base.errors import RecordingError
@@ -88,10 +89,10 @@ class Arm:
                                       replanner=Replanner(running, lambda: 0))
         self._goal = (plan.problem.goal[:2] + 0.05).tolist()
 
-    def ask(self, **parameters: object) -> Outcome:
+    def ask(self, **parameters: Any) -> Outcome:
         """Return another plan."""
         message = MotionTask(replaces='first', publish=True, goal_positions=self._goal)
-        state = RequestState(settings=replace(self._settings, **parameters))  # type: ignore[arg-type]
+        state = RequestState(settings=replace(self._settings, **parameters))
         outcome = self.planner.plan(message, state)
         assert outcome.report.error_code == PlanReport.NONE, outcome.report.error_msg
         return outcome
