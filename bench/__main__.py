@@ -12,7 +12,17 @@ import subprocess
 import sys
 from typing import Any
 
-from bench import battery, earlier, growth, model, payload, soak, solver, spatial
+from bench import (
+    battery,
+    earlier,
+    growth,
+    model,
+    payload,
+    replanning,
+    soak,
+    solver,
+    spatial,
+)
 import numpy as np
 
 DOCS = Path(__file__).parents[1] / 'docs'
@@ -199,6 +209,23 @@ One planner of the arm with EI 50 N m², recordings on, is asked for everything 
 """
 
 
+REPLANNING = """
+## Planning again over ROS
+
+A motion of {duration:g} s whose goal moves by up to {most:g} m with every request, from a client
+in Python that reads a parameter beside each request and asks again once it has the answer, at most
+at the rate asked for. CPU time of the node per request, recording included; times to the answers,
+of plans and of parameters, in milliseconds. {load}
+
+{table}
+"""
+
+
+def measured_replanning() -> dict[str, object]:
+    """Measure how often a planner plans again."""
+    return {'replanning': {'rows': replanning.measure_all(), 'load': os.getloadavg()[0]}}
+
+
 def measured_soak() -> dict[str, object]:
     """Measure what a planner answers, costs and leaves."""
     print(f'soak: {soak.SECONDS:g} s', flush=True)
@@ -255,7 +282,8 @@ def text(figures: dict[str, Any]) -> str:
         cold_1=cold_1, warm_1=warm_1, cold_2=cold_2, warm_2=warm_2, limit=growth.TIME_LIMIT,
         growth=growth.table([growth.Growth(**row) for row in figures['growth']])) + (
         clamped_text(figures) + payload_text(figures) + earlier_text(figures)
-        + battery_text(figures) + spatial_text(figures) + soak_text(figures))
+        + battery_text(figures) + spatial_text(figures) + soak_text(figures)
+        + replanning_text(figures))
 
 
 def earlier_text(figures: dict[str, Any]) -> str:
@@ -308,13 +336,24 @@ def soak_text(figures: dict[str, Any]) -> str:
     return SOAK.format(table=soak.table(measured), summary=soak.summary(measured))
 
 
+def replanning_text(figures: dict[str, Any]) -> str:
+    """Return the part on planning again, once it was measured."""
+    if 'replanning' not in figures:
+        return ''
+    found = figures['replanning']
+    return REPLANNING.format(
+        duration=replanning.DURATION, most=replanning.MOST, table=replanning.table(found['rows']),
+        load=f'Load of the machine when it ended: {found["load"]:.1f}.')
+
+
 def main() -> None:
     """Run the benchmarks named on the command line, or all; the others keep their figures."""
     kept = DOCS / 'benchmarks.json'
     figures = json.loads(kept.read_text()) if kept.exists() else {}
     parts = {'model': measured_model, 'solver': measured_solver, 'clamped': measured_clamped,
              'payload': measured_payload, 'earlier': measured_earlier, 'speed': measured_speed,
-             'battery': measured_battery, 'spatial': measured_spatial, 'soak': measured_soak}
+             'battery': measured_battery, 'spatial': measured_spatial, 'soak': measured_soak,
+             'replanning': measured_replanning}
     for name in sys.argv[1:] or parts:
         figures |= parts[name]()
     figures['versions'] = versions()
