@@ -2,7 +2,8 @@
 What it costs to forgive errors of the model, against the plain plan.
 
 ``python -m bench.robust`` plans four motions with and without a limit of residual bending, by
-turns, and prints CPU times (the least of some rounds), with a search for one kind of motion.
+turns, and prints CPU times, the least of some rounds; ``python -m bench.robust 7 fast`` keeps to
+one kind of motion.
 
 """
 
@@ -47,7 +48,7 @@ CASES: dict[str, Callable[[], tuple[Task, Robustness]]] = {
     'muroran_vertical': lambda: _muroran(2e-3)}
 
 
-def measure(name: str, rounds: int = ROUNDS) -> str:
+def measure(name: str, rounds: int, search: str) -> str:
     """Return a row of the table."""
     task, robustness = CASES[name]()
     spent: dict[str, list[float]] = {'plain': [], 'robust': []}
@@ -55,7 +56,7 @@ def measure(name: str, rounds: int = ROUNDS) -> str:
     for _ in range(rounds + 1):  # the first ones compile
         for kind, objectives in (('plain', None), ('robust', Objectives(robustness=robustness))):
             began = time.process_time()
-            plans[kind] = plan_path(task, objectives=objectives, search='fast')
+            plans[kind] = plan_path(task, objectives=objectives, search=search)
             spent[kind].append(time.process_time() - began)
     plain, robust = (min(spent[kind][1:]) for kind in ('plain', 'robust'))
     found = plans['robust']
@@ -67,13 +68,14 @@ def measure(name: str, rounds: int = ROUNDS) -> str:
             f'| {plain:.3f} | {robust:.3f} | {robust / plain:.1f} |')
 
 
-def main(rounds: int) -> None:
+def main(rounds: int, search: str) -> None:
     """Print the table."""
     print('| arm | residual [mm] | forgiving | more J | plans more | arms | plain [s] '
           '| forgiving [s] | ratio |\n|---|---|---|---|---|---|---|---|---|')
     for name in CASES:
-        print(measure(name, rounds), flush=True)
+        print(measure(name, rounds, search), flush=True)
 
 
 if __name__ == '__main__':
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else ROUNDS)
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else ROUNDS,
+         sys.argv[2] if len(sys.argv) > 2 else 'normal')
