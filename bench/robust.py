@@ -2,14 +2,14 @@
 What it costs to forgive errors of the model, against the plain plan.
 
 ``python -m bench.robust`` plans four motions with and without a limit of residual bending, by
-turns, and prints CPU times, the least of some rounds; ``python -m bench.robust 7 fast`` keeps to
-one kind of motion.
+turns, and prints CPU times, the least of some rounds.
 
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
 import sys
 import time
 
@@ -48,8 +48,39 @@ CASES: dict[str, Callable[[], tuple[Task, Robustness]]] = {
     'muroran_vertical': lambda: _muroran(2e-3)}
 
 
-def measure(name: str, rounds: int, search: str) -> str:
-    """Return a row of the table."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """
+    A motion with and without a limit of residual bending.
+
+    Attributes
+    ----------
+    arm, search : str
+        Name of the preset; search effort.
+    before, after : float
+        Residual bending of the plain and the forgiving motion [m].
+    growth : float
+        Share by which the forgiving one costs more.
+    trials, arms : int
+        Plans that were made besides the plain one; arms that were simulated with the last one.
+    plain, forgiving : float
+        CPU times of the requests [s].
+
+    """
+
+    arm: str
+    search: str
+    before: float
+    after: float
+    growth: float
+    trials: int
+    arms: int
+    plain: float
+    forgiving: float
+
+
+def measure_case(name: str, rounds: int, search: str) -> Row:
+    """Return the row of a case."""
     task, robustness = CASES[name]()
     spent: dict[str, list[float]] = {'plain': [], 'robust': []}
     plans = dict[str, Plan]()
@@ -58,24 +89,31 @@ def measure(name: str, rounds: int, search: str) -> str:
             began = time.process_time()
             plans[kind] = plan_path(task, objectives=objectives, search=search)
             spent[kind].append(time.process_time() - began)
-    plain, robust = (min(spent[kind][1:]) for kind in ('plain', 'robust'))
     found = plans['robust']
     assert found.objectives is not None and found.objectives.robust is not None
-    search = found.objectives.robust
-    growth = found.cost / plans['plain'].cost - 1
-    return (f'| `{name}` | {1e3 * search.plain_residual:.3g} | {1e3 * search.residual:.3g} '
-            f'| {100 * growth:.2g} % | {len(search.trials) - 1} | {len(search.errors)} '
-            f'| {plain:.3f} | {robust:.3f} | {robust / plain:.1f} |')
+    report = found.objectives.robust
+    return Row(arm=name, search=search, before=report.plain_residual, after=report.residual,
+               growth=found.cost / plans['plain'].cost - 1, trials=len(report.trials) - 1,
+               arms=len(report.errors), plain=min(spent['plain'][1:]),
+               forgiving=min(spent['robust'][1:]))
 
 
-def main(rounds: int, search: str) -> None:
-    """Print the table."""
-    print('| arm | residual [mm] | forgiving | more J | plans more | arms | plain [s] '
-          '| forgiving [s] | ratio |\n|---|---|---|---|---|---|---|---|---|')
-    for name in CASES:
-        print(measure(name, rounds, search), flush=True)
+def table(rows: Sequence[Row]) -> str:
+    """Return the rows as a table."""
+    return '\n'.join([
+        '| arm | search | residual bending [mm] | asked to forgive [mm] | more J | plans more '
+        '| arms | plain, CPU [s] | forgiving [s] | ratio |', '|---|---|---|---|---|---|---|---|---|---|',
+        *(f'| `{one.arm}` | {one.search} | {1e3 * one.before:.3g} | {1e3 * one.after:.3g} '
+          f'| {100 * one.growth:.2g} % | {one.trials} | {one.arms} | {one.plain:.3f} '
+          f'| {one.forgiving:.3f} | {one.forgiving / one.plain:.1f} |' for one in rows)])
+
+
+def measure(rounds: int = ROUNDS) -> list[dict[str, object]]:
+    """Return the rows of all cases and search efforts."""
+    return [asdict(measure_case(name, rounds, search))
+            for search in ('normal', 'fast') for name in CASES]
 
 
 if __name__ == '__main__':
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else ROUNDS,
-         sys.argv[2] if len(sys.argv) > 2 else 'normal')
+    measured = measure(int(sys.argv[1]) if len(sys.argv) > 1 else ROUNDS)
+    print(table([Row(**row) for row in measured]))  # type: ignore[arg-type]

@@ -133,7 +133,7 @@ class _Drive:
         samples, n = plan.sample(times), plan.arm.n_joints
         assert plan.solution is not None
         wanted = plan.problem.controls(times, plan.solution(times)).free_torque
-        free = _limit(plan.arm, wanted, samples.rates[:, :n])[0].astype(np.float64)
+        free = limits_in_force(plan.arm, wanted, samples.rates[:, :n])[0].astype(np.float64)
         states = np.hstack([samples.coordinates, samples.rates])
         return cls(dynamics=plan.model, physical=plan.problem.parameters.physical, states=states,
                    torques=samples.torques, inside=np.ones_like(free),
@@ -149,7 +149,7 @@ class _Drive:
         feedback = _feedback(execution.controller.gains, n_t)
         asked = planned.torques + (planned.states - states) @ feedback.T
         arm, speeds = execution.dynamics.arm, states[:, n_t:n_t + n]
-        inside, by_speed = _limit(arm, asked, speeds)
+        inside, by_speed = limits_in_force(arm, asked, speeds)
         return cls(dynamics=execution.dynamics, physical=execution.parameters.physical,
                    states=states, torques=TorqueLimits.of(arm).bound(asked, speeds),
                    inside=inside, by_speed=by_speed, feedback=feedback)
@@ -170,7 +170,7 @@ class _Drive:
         return A - C, B, C
 
 
-def _limit(arm: Arm, asked: Array, speeds: Array) -> tuple[Array, Array]:
+def limits_in_force(arm: Arm, asked: Array, speeds: Array) -> tuple[Array, Array]:
     """Return which torques (g, n) are within the limits, and how the limits move with speeds."""
     limits = TorqueLimits.of(arm)
     (lower, upper), (lowest, highest) = limits.bounds(speeds), limits.lines(speeds)
