@@ -96,8 +96,9 @@ def test_half_a_step_goes_half_the_way(plain: WeighedPlan, other: WeighedPlan) -
     step, times = other.linearise(), np.linspace(0, 1, 60)
     both = [step.make_offset(3.0, share)(times) for share in (0.0, 0.5, 1.0)]
     np.testing.assert_allclose(both[1], (both[0] + both[2]) / 2, atol=1e-9)
+    # fitted again, from the middles of steps on to both ends
     size = np.abs(both[0]).max()
-    np.testing.assert_allclose(both[0], other.offset(times), atol=1e-3 * size)
+    np.testing.assert_allclose(both[0], other.offset(times), atol=3e-3 * size)
 
 
 def test_offset_of_an_earlier_recording_has_the_degree_of_then() -> None:
