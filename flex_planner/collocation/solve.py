@@ -89,9 +89,7 @@ class _MeshRefinement:
                                           self._monitor)
             except StoppedError as error:
                 return self._fail(replace(outcome, stopped=error.reason, message=str(error)))
-            wanted = self._newton_tolerance(estimate.worst)
-            # its last correction may be smaller than was asked for
-            if tolerance > 3 * wanted and outcome.correction > wanted:
+            if tolerance > 3 * self._newton_tolerance(estimate.worst):
                 self._expected = estimate.worst  # the mesh deserves a better solution
                 continue
             if estimate.worst <= settings.error_tolerance:

@@ -146,4 +146,4 @@ def test_thin_layers_take_no_more_intervals(eps: float, intervals: int) -> None:
 def test_mesh_that_is_much_too_fine_is_kept_if_it_serves() -> None:
     # good enough as it is: another solve would cost more than it saves
     result = solved(mc_14(1e-4), intervals=400)
-    assert (result.meshes, result.iterations, result.solution.intervals) == (1, 1, 400)
+    assert (result.meshes, result.iterations, result.solution.intervals) == (1, 2, 400)
