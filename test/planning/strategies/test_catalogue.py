@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from factories import PlanFactory, TaskFactory
 from flex_planner.base.progress import Monitor
-from flex_planner.collocation import Solver, SolverSettings, SolverStatus
+from flex_planner.collocation import Solver, SolverStatus
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.totals import integrate_totals
