@@ -43,19 +43,20 @@ paper: setup
 test: lint
 	$(call run_tests,not thorough)
 
-# in the order of the files: one that is long but a single test would otherwise come last, by itself
 test-thorough: setup
-	$(call run_tests,thorough,--no-loadscope-reorder)
+	$(call run_tests,thorough)
 
 # where the tests are that start other processes; to read the files of all others would take long
 ALONE := test/ros test/system
 
-# run_tests MARKS,OPTIONS: first what runs beside any number of others, then what starts processes of
-# its own, two files at a time; the second also if the first fails
+# run_tests MARKS: first what runs beside any number of others, then what starts processes of
+# its own, two files at a time; the second also if the first fails. In the order of the files: one
+# that is long but a single test would otherwise come last, by itself.
 define run_tests
 @failed=0; \
-tools/run python -m pytest -n auto --dist loadfile $(2) -m '$(1) and not alone' || failed=1; \
-tools/run python -m pytest -n 2 --dist loadfile $(2) $(ALONE) -m '$(1) and alone' || failed=1; \
+tools/run python -m pytest -n auto --dist loadfile --no-loadscope-reorder -m '$(1) and not alone' || failed=1; \
+tools/run python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(ALONE) \
+	-m '$(1) and alone' || failed=1; \
 exit $$failed
 endef
 

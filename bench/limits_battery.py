@@ -12,7 +12,7 @@ docs/benchmarks.md.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 import sys
 import time
 
@@ -156,6 +156,76 @@ def summarise(found: Sequence[Outcome]) -> str:
             f'{np.median([one.seconds for one in found]):.2f} s, most '
             f'{max(one.seconds for one in found):.2f} s; seeds to '
             f'{max(one.seed for one in found)}')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """
+    What became of the random tasks of one kind of limit.
+
+    Attributes
+    ----------
+    arm, limit
+        Rigid or flexible; the kind of the first limit.
+    tasks, by_ipopt, planned : int
+        All, those that IPOPT solves, and those of these that have a plan.
+    dearer, cheaper : int
+        Plans that cost more, and less, than IPOPT's motion by more than 1e-3.
+    slack : float
+        The smallest of all plans.
+    median, most : float
+        CPU times [s].
+
+    """
+
+    arm: str
+    limit: str
+    tasks: int
+    by_ipopt: int
+    planned: int
+    dearer: int
+    cheaper: int
+    slack: float
+    median: float
+    most: float
+
+    @classmethod
+    def of(cls, arm: str, limit: str, found: Sequence[Outcome]) -> Row:
+        """Return the row of some outcomes."""
+        solvable = [one for one in found if one.solvable]
+        seconds = [one.seconds for one in found]
+        return cls(arm=arm, limit=limit, tasks=len(found), by_ipopt=len(solvable),
+                   planned=sum(one.solved for one in solvable),
+                   dearer=sum(one.dearer for one in found),
+                   cheaper=sum(one.solved and one.cost < (1 - WORSE) * one.by_ipopt
+                               for one in found),
+                   slack=min(one.slack for one in found),
+                   median=float(np.median(seconds)), most=max(seconds))
+
+
+def tabulate(found: Sequence[Outcome]) -> list[Row]:
+    """Return a row for each kind of limit of rigid and of flexible arms, and one for all."""
+    groups: dict[tuple[str, str], list[Outcome]] = {}
+    for one in found:
+        groups.setdefault((one.arm, one.kind.removesuffix(', 2')), []).append(one)
+    return [*(Row.of(*names, group) for names, group in groups.items()),
+            Row.of('all', '', found)]
+
+
+def table(rows: Sequence[Row]) -> str:
+    """Return the rows as a table."""
+    return '\n'.join([
+        '| arm | limit | tasks | solved by IPOPT | of these planned | dearer by 1e-3 '
+        '| cheaper by 1e-3 | smallest slack | CPU median [s] | most [s] |',
+        '|---|---|---|---|---|---|---|---|---|---|',
+        *(f'| {one.arm} | {one.limit} | {one.tasks} | {one.by_ipopt} | {one.planned} '
+          f'| {one.dearer} | {one.cheaper} | {one.slack:.1e} | {one.median:.2f} '
+          f'| {one.most:.2f} |' for one in rows)])
+
+
+def measure() -> list[dict[str, object]]:
+    """Return the rows of 100 tasks."""
+    return [asdict(row) for row in tabulate([*collect('rigid', 70), *collect('flexible', 30)])]
 
 
 def main(rigid: int, flexible: int) -> None:

@@ -18,6 +18,14 @@
 #include <string.h>
 #include <time.h>
 
+/*
+ * Of what GCC has at -O3, this is all that makes loops of fixed size faster: with -O2 it takes half
+ * the time to compile, and exact stages of middling size are faster than with -O3. Clang has it.
+ */
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC optimize("vect-cost-model=dynamic", "peel-loops", "tree-partial-pre")
+#endif
+
 #define UP(n) (((n) + 3) / 4 * 4)  /* whole vectors */
 
 /*

@@ -31,7 +31,7 @@ _SOURCE = Path(__file__).with_name('core.c')
 # with vectors of 512 bits GCC 12 stores as if an array on the stack were aligned, and is not
 _VECTORS = ('-mprefer-vector-width=256',) if platform.machine() in ('x86_64', 'AMD64') else ()
 # no -ffast-math: it makes the whole process round tiny numbers to zero
-_OPTIONS = ('-O3', '-fno-math-errno', '-fno-trapping-math', *_VECTORS)
+_OPTIONS = ('-O2', '-fno-math-errno', '-fno-trapping-math', *_VECTORS)
 
 
 _address, _number, _real = ctypes.c_void_p, ctypes.c_longlong, ctypes.c_double

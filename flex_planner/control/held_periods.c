@@ -12,6 +12,9 @@ typedef int batch(long long n, int chain, const double *const *in, double *const
 
 enum { STAGES = 6, NO_MEMORY = -1 };
 
+/* steps twice as long have an error so many times as large, with some margin */
+static const double HALVED = 1.0 / 48;
+
 static const double A[STAGES][STAGES - 1] = {
     {0},
     {1.0 / 5},
@@ -36,9 +39,15 @@ struct periods {
     double *states; /* (count + 1, size), the first one given */
 };
 
+/* comparisons, where fmin and fmax are calls of the mathematical library */
 static double clip(double value, double lower, double upper)
 {
-    return fmin(fmax(value, lower), upper);
+    return value < lower ? lower : value > upper ? upper : value;
+}
+
+static void add_multiple(long long size, double *sum, double factor, const double *values)
+{
+    for (long long i = 0; i < size; ++i) sum[i] += factor * values[i];
 }
 
 /* torques at a share of a period, within the limits of the motors at the speeds of a state */
@@ -64,32 +73,30 @@ static double take_step(const struct periods *g, const double *row, const double
     const double step = part * g->length;
     double *slopes = memory, *at = slopes + STAGES * size, *torques = at + size;
     for (int s = 0; s < STAGES; ++s) {
-        for (long long i = 0; i < size; ++i) {
-            double sum = 0;
-            for (int r = 0; r < s; ++r) sum += A[s][r] * slopes[r * size + i];
-            at[i] = x[i] + step * sum;
-        }
+        memcpy(at, x, size * sizeof *at);
+        for (int r = 0; r < s; ++r) add_multiple(size, at, step * A[s][r], slopes + r * size);
         find_torques(g, row, feedback, begin + C[s] * part, at, torques);
         const double *in[] = {at, torques, g->physical};
         double *out[] = {slopes + s * size};
         if (g->rate(1, 0, in, out)) return NAN;
     }
-    double error = 0;
+    double *wrong = at, error = 0;
+    memcpy(after, x, size * sizeof *after);
+    memset(wrong, 0, size * sizeof *wrong);
+    for (int s = 0; s < STAGES; ++s) {
+        add_multiple(size, after, step * B[s], slopes + s * size);
+        add_multiple(size, wrong, step * E[s], slopes + s * size);
+    }
     for (long long i = 0; i < size; ++i) {
-        double sum = 0, wrong = 0;
-        for (int s = 0; s < STAGES; ++s) {
-            sum += B[s] * slopes[s * size + i];
-            wrong += E[s] * slopes[s * size + i];
-        }
-        after[i] = x[i] + step * sum;
-        double scale = g->atol + g->rtol * fmax(fabs(x[i]), fabs(after[i]));
-        error += step * wrong / scale * (step * wrong / scale);
+        double before = fabs(x[i]), now = fabs(after[i]);
+        double share = wrong[i] / (g->atol + g->rtol * (before > now ? before : now));
+        error += share * share;
     }
     return sqrt(error / size);
 }
 
-/* cross a period in equal steps; whether all of them keep the tolerances */
-static int cross(const struct periods *g, const double *row, const double *state, long long steps,
+/* cross a period in equal steps; the largest error of one, above 1 if it breaks the tolerances */
+static double cross(const struct periods *g, const double *row, const double *state, long long steps,
                  double *after, double *memory)
 {
     const long long n = g->joints, size = g->size;
@@ -98,12 +105,14 @@ static int cross(const struct periods *g, const double *row, const double *state
         feedback[i] = g->controller[i] * (row[i] - state[i])
                       + g->controller[n + i] * (row[n + i] - state[size / 2 + i]);
     memcpy(x, state, size * sizeof *x);
+    double worst = 0;
     for (long long k = 0; k < steps; ++k) {
-        if (!(take_step(g, row, feedback, (double)k / steps, 1.0 / steps, x, after, rest) <= 1))
-            return 0;
+        double error = take_step(g, row, feedback, (double)k / steps, 1.0 / steps, x, after, rest);
+        if (!(error <= 1)) return INFINITY;
+        if (error > worst) worst = error;
         memcpy(x, after, size * sizeof *x);
     }
-    return 1;
+    return worst;
 }
 
 /* fill in the states after the periods; returns how many were crossed */
@@ -115,10 +124,12 @@ long long cross_periods(const struct periods *g)
     for (; done < g->count; ++done) {
         const double *row = g->reference + 4 * g->joints * done;
         double *state = g->states + g->size * done;
-        while (steps <= g->most_steps && !cross(g, row, state, steps, state + g->size, memory))
+        double error;
+        while ((error = cross(g, row, state, steps, state + g->size, memory)) > 1
+               && steps < g->most_steps)
             steps *= 2;
-        if (steps > g->most_steps) break;
-        if (steps > 1) steps /= 2;
+        if (error > 1) break;
+        if (steps > 1 && error < HALVED) steps /= 2;
     }
     free(memory);
     return done;

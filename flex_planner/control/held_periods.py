@@ -22,7 +22,7 @@ from flex_planner.control.joint_reference import Reference
 import numpy as np
 
 _SOURCE = Path(__file__).with_name('held_periods.c')
-_OPTIONS = ('-O2', '-fno-math-errno')
+_OPTIONS = ('-O2', '-ftree-vectorize', '-fno-math-errno')
 _TOLERANCES = 1e-5, 1e-8
 # in a period: the arm must have run away
 _MOST_STEPS = 256

@@ -15,7 +15,7 @@ import time
 
 from flex_planner.base.errors import FlexPlannerError, SingularError, UnreachableError
 from flex_planner.base.processes import return_memory
-from flex_planner.base.progress import Monitor, StoppedError
+from flex_planner.base.progress import Monitor, StoppedError, StopReason
 from flex_planner.capacity.extrapolation import step_ratio
 from flex_planner.capacity.results import MinDuration
 from flex_planner.maps.axes import Block
@@ -104,6 +104,8 @@ class _BlockRun:
     def _solve(self, index: Index, monitor: Monitor) -> CellResult:
         """Solve a cell; whatever happens is a result."""
         try:
+            if monitor.canceled():  # here: a search that is canceled still proves its bounds
+                raise StoppedError(StopReason.CANCELED)
             task = self._study.task(index)
             start = self._starts[index] = _near_cells(self._study, index, task, self._done)
             found = self._solver.solve(index, task, monitor, start)

@@ -15,22 +15,22 @@ from flex_planner.optimal_control.task import Task
 from flex_planner.optimal_control.torque_conditions import ChosenTorque
 import numpy as np
 
-DEGREE = 5
+# so smooth, its knots cost the collocation no intervals: of degree 5 they do, of 9 fits are less
+# exact than certificates ask for
+DEGREE = 7
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TorqueOffset:
     """
-    A torque w(t) from which effort is measured: a spline with four continuous derivatives.
-
-    So smooth, its knots cost the collocation no intervals.
+    A torque w(t) from which effort is measured: a spline.
 
     Parameters
     ----------
     breaks : numpy.ndarray, shape (k + 1,)
-        Where its polynomials of degree 5 meet, from 0 to the duration of the motion [s].
-    coefficients : numpy.ndarray, shape (k + 5, n)
-        Of B-splines [N m].
+        Where its polynomials meet, from 0 to the duration of the motion [s].
+    coefficients : numpy.ndarray, shape (k + degree, n)
+        Of B-splines [N m], of degree 7 where they are fitted here.
 
     """
 
@@ -42,19 +42,24 @@ class TorqueOffset:
         """
         Return the offset nearest to torques (m, n) at increasing times (m,), least squares.
 
-        The first and last time must be those of the breaks (k + 1,), with m > k + 5 times spread
+        The first and last time must be those of the breaks (k + 1,), with m > k + 7 times spread
         over all of its intervals.
 
         """
         from scipy.interpolate import make_lsq_spline  # see `ArmDynamics.prepare`
 
-        spline = make_lsq_spline(times, torques, _knots(breaks), DEGREE)
+        spline = make_lsq_spline(times, torques, _knots(breaks, DEGREE), DEGREE)
         return cls(breaks=breaks, coefficients=spline.c)
 
     @classmethod
     def zero(cls, duration: float, joints: int) -> TorqueOffset:
         """Return the offset zero."""
         return cls(breaks=np.array([0.0, duration]), coefficients=np.zeros((DEGREE + 1, joints)))
+
+    @property
+    def degree(self) -> int:
+        """Return the degree of its polynomials."""
+        return len(self.coefficients) - len(self.breaks) + 1
 
     def __call__(self, times: Array) -> Array:
         """Return the offset at times (m,), shape (m, n) [N m]."""
@@ -67,9 +72,9 @@ class TorqueOffset:
         return values
 
 
-def _knots(breaks: Array) -> Array:
+def _knots(breaks: Array, degree: int) -> Array:
     """Return the knots of the B-splines."""
-    return np.concatenate([np.full(DEGREE, breaks[0]), breaks, np.full(DEGREE, breaks[-1])])
+    return np.concatenate([np.full(degree, breaks[0]), breaks, np.full(degree, breaks[-1])])
 
 
 @lru_cache(maxsize=8)
@@ -77,7 +82,7 @@ def _spline(offset: TorqueOffset) -> Any:
     """Return the spline of an offset."""
     from scipy.interpolate import BSpline  # see `ArmDynamics.prepare`
 
-    return BSpline(_knots(offset.breaks), offset.coefficients, DEGREE)
+    return BSpline(_knots(offset.breaks, offset.degree), offset.coefficients, offset.degree)
 
 
 class OffsetProblem(MotionProblem):

@@ -304,6 +304,9 @@ class _Search:
             if free.solved:  # which passes no obstacle that could be passed on its other side
                 for other in pass_otherwise(home, start, self._obstacles(start)):
                     yield _Start(home, other, bound)
+            if free.solved and not self._near and bound < (1 - _CHEAPER) * free.cost:
+                for one in self._start_far_from_limits(home, start):
+                    yield replace(one, bound=bound)
 
     def _start_far_from_limits(self, problem: MotionProblem,
                                near: CollocationSolution) -> Iterator[_Start]:

@@ -95,7 +95,11 @@ class PublishedMotion:
 
     def motion(self, times: Array) -> tuple[Array, Array]:
         """Return positions [rad] and velocities [rad/s] at times (m,), shape (m, n)."""
-        n, samples = self.plan.arm.n_joints, self.samples(times)
+        return self.joints_of(self.samples(times), times)
+
+    def joints_of(self, samples: Samples, times: Array) -> tuple[Array, Array]:
+        """Return positions and velocities as `motion`, of samples at these times."""
+        n = self.plan.arm.n_joints
         moving = (times < self.end) & ((times > self.begin) | (self.begin == 0))
         return samples.coordinates[:, :n], np.where(moving[:, None], samples.rates[:, :n], 0.0)
 

@@ -75,8 +75,8 @@ def test_arm_moves_as_scipy_has_it_period_by_period(
                                                      parameters.physical)[0]
             return rates
 
-        # steps that never cross the end of a limit by more than 10 us
-        solved = solve_ivp(state_rate, (0, 1 / rate), state, method='DOP853', max_step=1e-5)
+        # steps that never cross the end of a limit by more than 50 us
+        solved = solve_ivp(state_rate, (0, 1 / rate), state, method='DOP853', max_step=5e-5)
         state = solved.y[:, -1]
         beyond = np.array([wanted != np.clip(wanted, *limits.bounds(speeds))
                            for speeds in solved.y[n_t:n_t + 2].T])

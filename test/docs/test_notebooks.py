@@ -14,7 +14,7 @@ import pytest
 FOLDER = ROOT / 'examples' / 'notebooks'
 NOTEBOOKS = sorted(FOLDER.glob('*.ipynb'))
 SAID = {'first_plan': ('solved and certified', 'kind of motion: '),
-        'payload_map': ('54 cells in', '49 cells: SOLVED', 'from the map: ')}
+        'payload_map': ('30 cells in', '27 cells: SOLVED', 'from the map: ')}
 PICTURES = {'first_plan': 3, 'payload_map': 1}
 
 

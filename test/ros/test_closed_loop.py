@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -68,11 +66,16 @@ class Table(Planner):
         return self.vibrations[-1].data, sorted(self.recordings.glob('motion_*'))[-1]
 
 
-@contextmanager
-def table(*arguments: Any) -> Iterator[Table]:
-    """Start a planner and an arm; end both."""
-    with Table(*arguments) as there, there.arm:
-        yield there
+def moved(folder: Path, arm: str, true_arm: Path, offsets: Any, payload: float,
+          *ways: tuple[int, int]) -> list[tuple[float, Path]]:
+    """Make motions on the table; all anew where other work held up the arm, which is none then."""
+    for attempt in 'first', 'second', 'third':
+        with Table(folder / attempt, arm, true_arm, offsets) as there, there.arm:
+            motions = [there.move(*way, payload) for way in ways]
+        said = (folder / attempt / 'arm.log').read_text()
+        if 'this machine is too slow' not in said:
+            return motions
+    raise AssertionError(f'the arm was late each time: {said}')
 
 
 def write_arm(path: Path, arm: Arm) -> Path:
@@ -83,8 +86,8 @@ def write_arm(path: Path, arm: Arm) -> Path:
 
 def test_identified_arm_swings_less_than_a_third(tmp_path: Path) -> None:
     true_arm = write_arm(tmp_path / 'true.yaml', arm_with(load_arm('clamped_motors'), TRUTH))
-    with table(tmp_path / 'before', 'clamped_motors', true_arm, TRUTH[-3:-1]) as there:
-        motions = [there.move(*places, 1.0) for places in ((0, 1), (1, 0))]
+    motions = moved(tmp_path / 'before', 'clamped_motors', true_arm, TRUTH[-3:-1], 1.0,
+                    (0, 1), (1, 0))
     (tmp_path / 'drive.yaml').write_text(
         ''.join(f'{name}: {gain}\n' for name, gain in DRIVE.items())
         + f'rate: 1000\nspeed_filter: 50\nresolution: {LSB}\n')
@@ -98,6 +101,6 @@ def test_identified_arm_swings_less_than_a_third(tmp_path: Path) -> None:
         TRUTH[1:3], rel=0.01)
     # the zero of the encoders is corrected by what was found
     offsets = TRUTH[-3:-1] - [0.0, values['joints[1].encoder_offset']]
-    with table(tmp_path / 'after', str(found), true_arm, offsets) as there:
-        left, _ = there.move(0, 1, values['payload_mass'])
+    ((left, _),) = moved(tmp_path / 'after', str(found), true_arm, offsets,
+                         values['payload_mass'], (0, 1))
     assert left < motions[0][0] / 3

@@ -224,9 +224,10 @@ def test_new_plan_takes_the_place_of_the_one_before(planner: Planner, heard: lis
     (change,) = np.flatnonzero(np.abs(np.diff(stamps[:-1]) - 10**7) > 1e4)
     assert stamps == sorted(stamps)
     assert change < 499
-    # all of the new plan, but for a state that was due before the last one of the plan before
+    # all of the new plan, but for states that were due before the last one of the plan before: it
+    # begins when it is published, and is streamed by a process that hears of it a moment later
     count = len(stamps) - (change + 1)
-    assert count in (100, 101)
+    assert 90 < count <= 101
     assert stamps[-1] - stamps[change + 1] == (count - 1) * 10**7 + 10**6  # without a hole
 
 

@@ -29,13 +29,14 @@ _STRIDE = 4
 
 def tabulate_reference(plan: Plan, controller: JointController) -> JointReference:
     """Return the trajectory of a plan with a point at every update of its controller."""
-    motion = PublishedMotion.of(plan, controller, controller.period)
+    motion, n = PublishedMotion.of(plan, controller, controller.period), plan.arm.n_joints
     count = int(np.ceil(plan.task.duration / controller.period - 1e-6)) + _PERIODS_AFTER
     times = np.arange(count, dtype=np.float64) * controller.period
-    positions, velocities = motion.motion(times)
-    accelerations = motion.samples(times).accelerations[:, :plan.arm.n_joints]
+    samples = motion.samples(times)
+    positions, velocities = motion.joints_of(samples, times)
     return JointReference(times=times, positions=positions, velocities=velocities,
-                          accelerations=accelerations, torques=motion.torque(times))
+                          accelerations=samples.accelerations[:, :n],
+                          torques=motion.torque(times))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -47,9 +48,12 @@ class Ringing:
     ----------
     rest : numpy.ndarray, shape (2 n_t,)
         The state that the controller leads it to.
-    passive : numpy.ndarray, shape (n_f, instants, 2 n_t)
-        From a state less `rest` to the coordinates without a motor in the second after it, at
-        updates of the controller.
+    near : numpy.ndarray, shape (l, 2 n_t, 2 n_t)
+        What 0 to l - 1 periods of the controller make of a state less `rest`.
+    far : numpy.ndarray, shape (l, n_f, 2 n_t)
+        What so many times l periods make of the coordinates without a motor.
+    instants : int
+        Of the second after it, a period apart; at most l^2.
     shapes : tuple of numpy.ndarray, shape (k, 1 to 3, n_f)
         From these coordinates to the deflections of k points: of links, along a line or in a
         plane, of the stretched arm's tip by elastic joints, and of the tip in space of an arm
@@ -58,7 +62,9 @@ class Ringing:
     """
 
     rest: Array
-    passive: Array
+    near: Array
+    far: Array
+    instants: int
     shapes: tuple[Array, ...]
 
     @classmethod
@@ -73,19 +79,21 @@ class Ringing:
 
         """
         arm = execution.dynamics.arm
-        rest, power = _rest_and_period(execution, goal, hold)
-        rows = np.eye(rest.size)[arm.n_joints:arm.n_coordinates, None]
-        count = int(np.ceil(WATCHED / execution.controller.period - 1e-6)) + 1
-        while rows.shape[1] < count:  # twice as many instants each time
-            rows = np.concatenate([rows, rows @ power], axis=1)
-            power = power @ power
-        return cls(rest=rest, passive=rows[:, :count], shapes=tuple(_deflections(arm, rest)))
+        rest, period = _rest_and_period(execution, goal, hold)
+        instants = int(np.ceil(WATCHED / execution.controller.period - 1e-6)) + 1
+        with np.errstate(over='ignore', invalid='ignore'):  # of a controller that is unstable
+            near = _powers(period, int(np.ceil(np.sqrt(instants))))
+            far = _powers(near[-1] @ period, len(near))[:, arm.n_joints:arm.n_coordinates]
+        return cls(rest=rest, near=near, far=far, instants=instants,
+                   shapes=tuple(_deflections(arm, rest)))
 
     def residual(self, away: Array) -> float:
         """Return the largest peak-to-peak deflection from a state less the rest (2 n_t,) [m]."""
         if not np.isfinite(away).all():
             return np.inf
-        passive = self.passive @ away
+        with np.errstate(over='ignore', invalid='ignore'):
+            passive = (self.far @ (self.near @ away).T).transpose(1, 0, 2).reshape(
+                self.far.shape[1], -1)[:, :self.instants]
         extents = [peak_to_peak((part @ passive).transpose(2, 0, 1)) for part in self.shapes]
         return float(np.nan_to_num(extents, nan=np.inf).max())
 
@@ -137,6 +145,15 @@ class Arrival:
     def residual(self) -> float:
         """Return the peak-to-peak deflection in the second after it, where it is largest [m]."""
         return self.ringing.residual(self.away)
+
+
+def _powers(matrix: Array, count: int) -> Array:
+    """Return the powers 0 to count - 1 of a matrix (m, m), shape (count, m, m)."""
+    powers = np.eye(len(matrix))[None]
+    while len(powers) < count:  # twice as many each time
+        powers = np.concatenate([powers, powers @ matrix])
+        matrix = matrix @ matrix
+    return powers[:count]
 
 
 def _rest_and_period(execution: Execution, goal: Array, hold: Array) -> tuple[Array, Array]:

@@ -26,8 +26,10 @@ import numpy as np
 
 # weights are looked for between these, by factors, then more finely [1/J]
 _LEAST_WEIGHT, _MOST_WEIGHT, _FACTOR, _BISECTIONS = 1e-2, 1e5, 10.0, 4
-# of the largest residual: what is aimed at
+# of the largest residual: what is aimed at first
 _AIM = 0.98
+# of what is predicted at least this share is counted on, where less came about before
+_LEAST_PROMISE = 0.5
 # by which share of it effort may grow in one trial: further off nothing is linear
 _GROWTH = 0.06
 _MOST_TRIALS, _MOST_FAILURES, _GAIN = 10, 3, 0.98
@@ -99,6 +101,7 @@ class _Search:
         postures = plan.uniform_samples(_POSTURES).coordinates[:, :plan.arm.n_joints]
         self._growth = feedback_growth(self._arms.nominal.arm, postures)
         self._plain = self._best = WeighedPlan.plain(plan, self._arms, solver)
+        self._promise = 1.0
         self._note(self._best)
 
     def run(self) -> None:
@@ -137,35 +140,44 @@ class _Search:
 
     def _improve(self) -> bool:
         """Raise the weight until the arms that are weighed forgive enough; return whether."""
-        failures, growth = 0, _GROWTH
+        failures, share, step = 0, 1.0, self._best.linearise()
         while len(self._trials) <= _MOST_TRIALS and failures < _MOST_FAILURES:
             self._solver.monitor.check()
-            found = self._attempt(growth)
-            if found is None:
-                failures, growth = failures + 1, growth / 4
-                continue
-            gained = found.residual < _GAIN * self._best.residual
-            if found.residual < self._best.residual:
+            before = self._best.residual
+            found = self._attempt(step, share)
+            if found is not None and found.residual < before:
                 self._best = found
-            if self._best.residual <= self._limit:
-                return True
+                if found.residual <= self._limit:
+                    return True
+                step = found.linearise()
+            gained = self._best.residual < _GAIN * before
             failures = 0 if gained else failures + 1
-            growth = _GROWTH if gained else growth / 4
+            share = min(2 * share, 1.0) if gained else share / 2
         return False
 
-    def _attempt(self, growth: float) -> WeighedPlan | None:
-        """Return the plan with the weight that should do; None if there is none."""
-        step = self._best.linearise()
-        weight = self._choose(step, growth)
-        found = self._best.solve(step, weight, self._solver)
+    def _attempt(self, step: OffsetStep, share: float) -> WeighedPlan | None:
+        """Return a share of the step to the weight that should do; None if there is no plan."""
+        before = self._best.residual
+        weight, predicted = self._choose(step, before)
+        found = self._best.solve(step, weight, self._solver, share)
         if found is None:
             self._trials.append(RobustTrial(weight=weight, cost=np.inf, residual=np.inf))
-        else:
-            self._note(found)
+            return None
+        self._note(found)
+        if share == 1 and predicted < before:
+            kept = (before - found.residual) / (before - predicted)
+            self._promise = min(max(kept, _LEAST_PROMISE), 1.0)
         return found
 
-    def _choose(self, step: OffsetStep, growth: float) -> float:
-        """Return the least weight that should do, or else the one that should do best."""
+    def _choose(self, step: OffsetStep, before: float) -> tuple[float, float]:
+        """
+        Return the least weight that should do, or else the one that should do best.
+
+        And what residual it should lead to, from the one before, if all that is predicted came
+        about [m].
+
+        """
+        aim = _AIM * (before - (before - self._limit) / self._promise)
         torques = self._best.plan.sample(step.responses.times).torques
         tried = dict[float, float]()
 
@@ -174,19 +186,20 @@ class _Search:
             return tried[weight]
 
         weight = _LEAST_WEIGHT
-        while residual(weight) > _AIM * self._limit and weight * _FACTOR <= _MOST_WEIGHT:
-            if step.predict_effort(weight, torques) > growth:
+        while residual(weight) > aim and weight * _FACTOR <= _MOST_WEIGHT:
+            if step.predict_effort(weight, torques) > _GROWTH:
                 break
             weight *= _FACTOR
         low, high = weight / _FACTOR, weight
         for _ in range(_BISECTIONS):
-            middle = np.sqrt(low * high)
-            enough = (residual(middle) <= _AIM * self._limit
-                      or step.predict_effort(middle, torques) > growth)
+            middle = float(np.sqrt(low * high))
+            enough = (residual(middle) <= aim
+                      or step.predict_effort(middle, torques) > _GROWTH)
             low, high = (low, middle) if enough else (middle, high)
-        allowed = [one for one in tried if step.predict_effort(one, torques) <= growth]
-        adequate = [one for one in allowed if tried[one] <= _AIM * self._limit]
-        return min(adequate) if adequate else min(allowed or tried, key=lambda one: tried[one])
+        allowed = [one for one in tried if step.predict_effort(one, torques) <= _GROWTH]
+        adequate = [one for one in allowed if tried[one] <= aim]
+        chosen = min(adequate) if adequate else min(allowed or tried, key=lambda one: tried[one])
+        return chosen, tried[chosen]
 
     def _predict(self, step: OffsetStep, weight: float) -> float:
         """Return the residual that a weight should lead to [m]."""

@@ -15,7 +15,7 @@ within the limits of the motors, whatever was linearised.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from flex_planner.base.validation import Array
 from flex_planner.optimal_control.torque_offset import TorqueOffset
@@ -41,6 +41,8 @@ class OffsetStep:
         Diagonal of R.
     offset : numpy.ndarray, shape (g, n)
         w of the plan at the middles of the steps [N m].
+    rows : numpy.ndarray, shape (r, g n)
+        G over N.
     gram : numpy.ndarray, shape (r, r)
         (G; N) R^-1 (G; N)^T over the steps in which motors are between their limits.
     drift : numpy.ndarray, shape (r,)
@@ -51,23 +53,30 @@ class OffsetStep:
     responses: Responses
     effort_weights: Array
     offset: Array
+    rows: Array
     gram: Array
     drift: Array
+    _multipliers: dict[float, Array] = field(default_factory=dict[float, Array], repr=False)
 
     @classmethod
     def of(cls, responses: Responses, effort_weights: Array, offset: TorqueOffset) -> OffsetStep:
         """Return the system of a plan with an offset."""
-        both = _stack(responses)
-        free = (both * responses.free[:, None, :])
-        w = offset(responses.times)
-        flat = both.transpose(1, 0, 2).reshape(both.shape[1], -1)
-        masked = free.transpose(1, 0, 2).reshape(both.shape[1], -1)
-        price = np.tile(effort_weights * responses.step, len(both))
-        return cls(responses=responses, effort_weights=effort_weights, offset=w,
-                   gram=(masked / price) @ flat.T, drift=-masked @ w.ravel())
+        w, free = offset(responses.times), responses.free.ravel()
+        rows = np.ascontiguousarray(responses.all.transpose(1, 0, 2)).reshape(
+            responses.all.shape[1], -1)
+        root = free / np.sqrt(np.tile(effort_weights * responses.step, len(w)))
+        weighed = rows * root
+        return cls(responses=responses, effort_weights=effort_weights, offset=w, rows=rows,
+                   gram=_gram(weighed, responses.roots.shape[-1]),
+                   drift=-_combine(rows, free * w.ravel()))
 
     def multipliers(self, weight: float) -> Array:
         """Return m and l' for a weight > 0 [1/J], shape (r,)."""
+        if weight not in self._multipliers:
+            self._multipliers[weight] = self._solve(weight)
+        return self._multipliers[weight]
+
+    def _solve(self, weight: float) -> Array:
         count = self.responses.misses.size
         system, right = self.gram.copy(), self.drift.copy()
         system[:count, :count] += np.eye(count) / weight
@@ -91,22 +100,35 @@ class OffsetStep:
 
     def wanted(self, weight: float) -> Array:
         """Return the offset at the middles of the steps, shape (g, n) [N m]."""
-        both = _stack(self.responses)
-        wanted: Array = -np.einsum('gik,i->gk', both, self.multipliers(weight)) / (
-            self.effort_weights * self.responses.step)
+        pulls = _combine(self.rows.T, self.multipliers(weight)).reshape(self.offset.shape)
+        wanted: Array = -pulls / (self.effort_weights * self.responses.step)
         return wanted
 
-    def make_offset(self, weight: float) -> TorqueOffset:
-        """Return the offset for a weight."""
+    def make_offset(self, weight: float, share: float = 1.0) -> TorqueOffset:
+        """Return the offset for a weight, or a share of the way from that of the plan to it."""
         times, step = self.responses.times, self.responses.step
-        wanted, duration = self.wanted(weight), times[-1] + step / 2
+        wanted = self.offset + share * (self.wanted(weight) - self.offset)
+        duration = times[-1] + step / 2
         ends = [1.5 * wanted[i] - 0.5 * wanted[j] for i, j in ((0, 1), (-1, -2))]
         breaks = np.linspace(0, duration, int(_PIECES * times.size) + 1, dtype=np.float64)
         return TorqueOffset.fit(np.concatenate([[0.0], times, [duration]]),
                                 np.vstack([ends[0], wanted, ends[1]]), breaks)
 
 
-def _stack(responses: Responses) -> Array:
-    """Return G over N, shape (g, r, n)."""
-    both: Array = np.concatenate([responses.differing, responses.nominal], axis=1)
-    return both
+def _gram(rows: Array, size: int) -> Array:
+    """
+    Return the products of rows (r, k), in blocks of a size that r is a multiple of.
+
+    What is so small NumPy's linear algebra does in one thread: others would take longer to wake.
+
+    """
+    blocks = rows.reshape(-1, size, rows.shape[1])
+    products = blocks[:, None] @ blocks.transpose(0, 2, 1)
+    gram: Array = products.transpose(0, 2, 1, 3).reshape(len(rows), -1)
+    return gram
+
+
+def _combine(matrix: Array, vector: Array) -> Array:
+    """Return their product, in one thread."""
+    product: Array = np.einsum('ij,j->i', matrix, vector)
+    return product

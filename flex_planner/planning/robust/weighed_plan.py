@@ -70,9 +70,12 @@ class WeighedPlan:
         return OffsetStep.of(Responses.of(self.plan, self.arrivals),
                              self.plan.task.effort_weights, self.offset)
 
-    def solve(self, step: OffsetStep, weight: float, solver: Solver) -> WeighedPlan | None:
+    def solve(self, step: OffsetStep, weight: float, solver: Solver,
+              share: float = 1.0) -> WeighedPlan | None:
         """
         Return the plan with another weight; None where it is not solved, or the arm may not do it.
+
+        Or a share of the way to it, with the offset that belongs there.
 
         Raises
         ------
@@ -81,7 +84,7 @@ class WeighedPlan:
 
         """
         assert self.plan.solution is not None
-        offset = step.make_offset(weight)
+        offset = step.make_offset(weight, share)
         problem = OffsetProblem(self.plan.model, self.plan.task, self.plan.problem.parameters,
                                 offset, ends=self.plan.problem.ends)
         found = plan_problem(problem, solver, (warm_start(self.plan.solution, 'robust'),))

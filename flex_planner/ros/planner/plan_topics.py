@@ -109,12 +109,12 @@ class PlanTopics:
         self.running.begin(RunningPlan(plan_id=outcome.report.plan_id, plan=plan,
                                        begin_ns=begin_ns, track=track))
         self.joints.publish(joints)
+        # what is left of a plan that was replaced is not streamed anew
+        self.streamer.start(plan, track.part(self._now_ns()) if outcome.replaces else track,
+                            settings)
         self._flexible.publish(outcome.trajectory)
         if markers is not None:
             self._markers.publish(markers)
-        if outcome.replaces:
-            track = track.part(self._now_ns())
-        self.streamer.start(plan, track, settings)
 
     def _now_ns(self) -> int:
         return int(self._node.get_clock().now().nanoseconds)

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from flex_planner.arms.arm_files import load_arm
 from flex_planner.collocation import Solver
 from flex_planner.control.joint_controller import JointController
+from flex_planner.optimal_control.torque_limits import TorqueLimits
 from flex_planner.optimal_control.torque_offset import TorqueOffset
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.robust.differing_plans import DifferingArms
 from flex_planner.planning.robust.objective import Robustness
-from flex_planner.planning.robust.responses import Responses
+from flex_planner.planning.robust.responses import limits_in_force, Responses
 from flex_planner.planning.robust.weighed_plan import WeighedPlan
 import numpy as np
 import pytest
+from scipy.interpolate import make_lsq_spline
 
 
 @pytest.fixture(scope='module')
@@ -76,6 +79,36 @@ def test_small_weight_changes_nothing(plain: WeighedPlan) -> None:
     step = plain.linearise()
     assert np.abs(step.wanted(1e-9)).max() < 1e-6
     assert step.predict_effort(1e-9, np.ones_like(step.offset)) == pytest.approx(0, abs=1e-6)
+
+
+def test_limits_move_with_the_speed_where_they_hold() -> None:
+    arm, move = load_arm('clamped_motors'), 1e-6
+    limits, rng = TorqueLimits.of(arm), np.random.default_rng(5)
+    asked, speeds = rng.uniform(-12, 12, (200, 2)), rng.uniform(-3, 3, (200, 2))
+    inside, by_speed = limits_in_force(arm, asked, speeds)
+    ahead, behind = (limits.bound(asked, speeds + sign * move) for sign in (1, -1))
+    np.testing.assert_allclose(by_speed, (ahead - behind) / (2 * move), atol=1e-6)
+    np.testing.assert_array_equal(inside, limits.bound(asked, speeds) == asked)
+    assert 20 < inside.sum() < 380 and np.abs(by_speed).max() > 0.1
+
+
+def test_half_a_step_goes_half_the_way(plain: WeighedPlan, other: WeighedPlan) -> None:
+    step, times = other.linearise(), np.linspace(0, 1, 60)
+    both = [step.make_offset(3.0, share)(times) for share in (0.0, 0.5, 1.0)]
+    np.testing.assert_allclose(both[1], (both[0] + both[2]) / 2, atol=1e-9)
+    # fitted again, from the middles of steps on to both ends
+    size = np.abs(both[0]).max()
+    np.testing.assert_allclose(both[0], other.offset(times), atol=3e-3 * size)
+
+
+def test_offset_of_an_earlier_recording_has_the_degree_of_then() -> None:
+    breaks = np.linspace(0, 2, 6)
+    knots = np.concatenate([np.zeros(5), breaks, np.full(5, 2.0)])
+    times = np.linspace(0, 2, 41)
+    then = make_lsq_spline(times, np.stack([times**5, np.cos(times)], axis=1), knots, 5)
+    offset = TorqueOffset(breaks=breaks, coefficients=then.c)
+    assert offset.degree == 5
+    np.testing.assert_allclose(offset(times), then(times), rtol=1e-12)
 
 
 def test_offset_is_a_smooth_spline() -> None:
