@@ -102,7 +102,8 @@ class Display:
 
 
 def run_with_progress(arm: Arm, time_limit: float,
-                      work: Callable[[ArmModel, Monitor], Result]) -> Result:
+                      work: Callable[[ArmModel, Monitor], Result],
+                      prepare: Callable[[Arm], None] | None = None) -> Result:
     """
     Return the result of work on an arm, showing its progress.
 
@@ -114,6 +115,8 @@ def run_with_progress(arm: Arm, time_limit: float,
         Of the work [s].
     work : callable
         Obeys the monitor that it is given.
+    prepare : callable, optional
+        Compiles what else the work takes, which is no part of its time.
 
     Raises
     ------
@@ -125,6 +128,8 @@ def run_with_progress(arm: Arm, time_limit: float,
     try:
         display.begin(f'preparing the dynamics of {arm.name}')
         model = ArmModel(arm)
+        if prepare is not None:
+            prepare(arm)
         with SIGNALS.patient() as canceled:
 
             def stopping() -> bool:

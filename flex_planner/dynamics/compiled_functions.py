@@ -29,8 +29,9 @@ from flex_planner.dynamics.function_source import (
 )
 import numpy as np
 
-# straight-line code gains nothing from more, and -O1 takes up to five times as long
-_OPTIONS = ('-Og',)
+# straight-line code gains nothing from more, and -O1 takes up to five times as long; nor does it
+# gain from tables of the values that are in use together, which take GCC half its time
+_OPTIONS = ('-Og', '--param', 'ira-max-conflict-table-size=0')
 
 _POINTERS = ctypes.POINTER(ctypes.c_void_p)
 

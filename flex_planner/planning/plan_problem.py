@@ -18,7 +18,7 @@ from flex_planner.planning.kinds.clusters import are_alike, MOST_KINDS
 from flex_planner.planning.kinds.effort import SearchEffort
 from flex_planner.planning.largest_rates import find_largest_rates
 from flex_planner.planning.plan import Plan, PlanStatus
-from flex_planner.planning.strategies.catalogue import CATALOGUE
+from flex_planner.planning.strategies.catalogue import CATALOGUE, order_strategies
 from flex_planner.planning.strategies.initial_guesses import SMOOTHED, WARM_START
 from flex_planner.planning.strategies.price_continuation import free_duration
 from flex_planner.planning.strategies.strategy import Attempt, Strategy
@@ -60,13 +60,14 @@ def plan_problem(problem: MotionProblem, solver: Solver,
     solver : Solver
         Its monitor may interrupt the work.
     strategies : sequence of Strategy
-        In the order in which they are tried, at least one.
+        At least one, in the order in which they are tried, see `order_strategies`.
     effort : SearchEffort
         Whether cheaper kinds of motion are looked for.
 
     """
     tried: list[TriedStrategy] = []
     try:
+        strategies = order_strategies(problem, solver, strategies)
         if problem.task.time_weight:
             problem, strategy, attempt = _solve_in_any_time(problem, solver, strategies, tried)
         elif free_times(problem.task.via_points):

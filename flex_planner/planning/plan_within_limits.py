@@ -234,7 +234,7 @@ class _Search:
         """Come near to a motion from a start."""
         self._starts += 1
         met = approach_limits(start.problem, self._slacks, start.solution, self._solver,
-                              start.first)
+                              start.first, solved=start.solution is self._free.solution)
         if met.converged:
             self._add(start.problem, met)
         elif self._failed is None:

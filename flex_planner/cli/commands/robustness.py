@@ -76,14 +76,13 @@ def _of_task(options: argparse.Namespace) -> int:
             plan = plan_path(request.task, model=model, monitor=monitor)
             if not plan.solved:
                 return plan, None
-            prepare_robustness(plan.arm)
             monitor.phase = 'carrying it out on other arms'
             controller = request.sampling.controller or JointController(
                 gains=default_gains(plan.model))
             return plan, find_residuals(plan, controller, uncertainty=uncertainty,
                                         resolution=options.encoder_resolution, monitor=monitor)
 
-    plan, found = run_with_progress(arm, request.time_limit, work)
+    plan, found = run_with_progress(arm, request.time_limit, work, prepare_robustness)
     payload = float(plan.problem.parameters.payload_mass)
     rows = [('arm', arm.name), ('motion', str(request)), *plan_rows(plan)]
     print(table([*rows, *(residual_rows(found, payload) if found else [])]), flush=True)

@@ -20,6 +20,7 @@ from flex_planner.collocation import (
     Solver,
 )
 from flex_planner.collocation.barrier_mesh import follow_barrier
+from flex_planner.collocation.equations import magnitudes
 from flex_planner.collocation.interior_point import (
     BarrierOutcome,
     BarrierSchedule,
@@ -38,6 +39,9 @@ import numpy as np
 
 # of the method, and intervals of its first mesh
 STAGES, _FEWEST = 4, 40
+# root mean square of what such a mesh may miss of a motion, relative to the unknowns, where it is
+# much coarser than one on which nothing can be overlooked
+_SHOWN, _FEWER = 0.1, 0.5
 # mu in units of the cost per time of the motion that it starts from: at first, with the smallest
 # slacks then, where a motion is told from others, and at last; the second of each where the first
 # leads to nothing
@@ -70,7 +74,8 @@ _MOST_FLOORS = 8
 
 def approach_limits(problem: MotionProblem, slacks: PathSlacks, near: CollocationSolution,
                     solver: Solver,
-                    first: tuple[tuple[float, float], ...] = FIRST) -> BarrierOutcome:
+                    first: tuple[tuple[float, float], ...] = FIRST, *,
+                    solved: bool = False) -> BarrierOutcome:
     """
     Return a motion that keeps its limits at the points of a coarse mesh.
 
@@ -87,6 +92,9 @@ def approach_limits(problem: MotionProblem, slacks: PathSlacks, near: Collocatio
     first : tuple of (float, float)
         mu at first, in units of the cost per time, and the smallest slacks then, one after the
         other where those before lead to nothing.
+    solved : bool
+        Whether the motion shows what rings: where a coarser mesh than the first one shows it, too,
+        that is tried before.
 
     Raises
     ------
@@ -95,13 +103,17 @@ def approach_limits(problem: MotionProblem, slacks: PathSlacks, near: Collocatio
 
     """
     barrier, rate = limit_states(problem, slacks), find_cost_rate(problem, near)
-    guess = near.on_mesh(first_mesh(problem, solver), GaussRule.of(STAGES))
-    for share, slack in first:
-        schedule = _schedule(share * rate, COARSE * rate, solver)
-        y = barrier.guess(guess, schedule.first, slack)
-        met = solve_barrier(barrier, guess, y, schedule, solver.monitor)
-        if met.converged:
-            break
+    meshes = [first_mesh(problem, solver)]
+    if solved:
+        meshes[:0] = _coarser_meshes(problem, near, meshes[0].size)
+    for mesh in meshes:
+        guess = near.on_mesh(mesh, GaussRule.of(STAGES))
+        for share, slack in first:
+            schedule = _schedule(share * rate, COARSE * rate, solver)
+            y = barrier.guess(guess, schedule.first, slack)
+            met = solve_barrier(barrier, guess, y, schedule, solver.monitor)
+            if met.converged:
+                return met
     return met
 
 
@@ -212,6 +224,23 @@ def first_mesh(problem: MotionProblem, solver: Solver) -> Array:
     times = np.linspace(0, problem.task.duration, first_count(problem, solver) + 1,
                         dtype=np.float64)
     return double_nodes(times, problem.junctions)
+
+
+def _coarser_meshes(problem: MotionProblem, near: CollocationSolution, size: int) -> list[Array]:
+    """Return the coarsest even mesh of fewer nodes that shows a motion nearly, if there is one."""
+    between, count = np.linspace(0, 1, STAGES + 1, dtype=np.float64), _FEWEST
+    scale = magnitudes(problem, near)
+    while count < _FEWER * size:
+        mesh = double_nodes(np.linspace(0, problem.task.duration, count + 1, dtype=np.float64),
+                            problem.junctions)
+        shown = near.on_mesh(mesh, GaussRule.of(STAGES))
+        there = shown.steps > 0
+        values = near(shown.times_at(between)[there].ravel()).reshape(-1, between.size, scale.size)
+        gaps = (shown.values_at(between)[there] - values) / scale
+        if np.sqrt(np.mean(gaps**2)) < _SHOWN:
+            return [mesh]
+        count *= 2
+    return []
 
 
 def _schedule(first: float, last: float, solver: Solver) -> BarrierSchedule:

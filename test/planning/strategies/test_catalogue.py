@@ -6,9 +6,11 @@ from factories import PlanFactory, TaskFactory
 from flex_planner.base.progress import Monitor
 from flex_planner.collocation import Solver, SolverStatus
 from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.totals import integrate_totals
-from flex_planner.planning.strategies.catalogue import CATALOGUE
+from flex_planner.planning.strategies.catalogue import CATALOGUE, order_strategies
 from flex_planner.planning.strategies.strategy import Strategy
+import numpy as np
 from plan_checks import problem_of, SAME_COST
 import pytest
 
@@ -47,3 +49,20 @@ def test_continuation_in_what_a_task_has_not_adds_nothing(
         rigid_model: ArmModel, paper_task: TaskFactory, label: str) -> None:
     problem = problem_of(rigid_model, paper_task(rigid_model.arm, payload_mass=0.0))
     assert BY_NAME[label].attempt(problem, Solver()) is None
+
+
+@pytest.mark.parametrize(('intervals', 'weight', 'first'), [
+    (101, 3.0, ['rigid motion first', 'cold start']), (100, 3.0, ['cold start']),
+    (101, 0.0, ['cold start'])])
+def test_what_rings_many_times_under_gravity_starts_from_the_rigid_motion(
+        ei5_model: ArmModel, paper_task: TaskFactory,
+        monkeypatch: pytest.MonkeyPatch, intervals: int, weight: float, first: list[str]) -> None:
+    problem = problem_of(ei5_model, paper_task(ei5_model.arm))
+    monkeypatch.setattr(MotionProblem, 'fewest_intervals', lambda *given: intervals)
+    problem.holding_torque = np.array([weight, 0.0])
+    ordered = order_strategies(problem, Solver(), CATALOGUE)
+    assert [each.name for each in ordered[:len(first)]] == first
+    assert set(ordered) == set(CATALOGUE)
+    assert ordered[2:] == list(CATALOGUE[2:])
+    alone = order_strategies(problem, Solver(), CATALOGUE[:1])
+    assert alone == [BY_NAME['cold start']]
