@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 import json
+import os
 import statistics
 import subprocess
 import sys
 import time
 
+from bench.battery import cpu_seconds
 from bench.model import uniform_arm
 from bench.solver import paper_problem
 from flex_planner import Arm, Monitor, Plan, plan_path, Task
 from flex_planner.arms.arm import Motor
+from flex_planner.base.processes import PROCESSES
 from flex_planner.collocation import Solver, SolverSettings
 from flex_planner.collocation.equations import collocation_residual, factorise, linearise
 from flex_planner.collocation.estimate import estimate_error
@@ -25,16 +28,24 @@ import numpy as np
 
 SIZES = [(n, m) for n in range(1, 5) for m in range(5) if n * m <= 8]
 TIME_LIMIT = 20.0
-# of clamped links, lying and hanging: at most 12 coordinates
+# of clamped links, lying and hanging: at most 12 coordinates; their limit is one of CPU time
 CLAMPED = [(n, m, setting) for setting in ('horizontal', 'gravity') for n in range(1, 5)
            for m in range(4) if n * (1 + m) <= 12]
-CLAMPED_LIMIT = 15.0
+CLAMPED_LIMIT = 10.0
 _GRAVITY = 9.81
+# seconds of plans after which no more is measured
+_ENOUGH = 4.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Growth:
-    """A plan of an arm of equal links; memory is what the whole process took at most [MB]."""
+    """
+    A plan of an arm of equal links.
+
+    Memory is what the whole process took at most [MB]; CPU time that of the process and of its
+    children that have ended [s].
+
+    """
 
     links: int
     modes: int
@@ -46,6 +57,7 @@ class Growth:
     intervals: int
     memory: float
     setting: str = ''
+    cpu: float = float('nan')
 
 
 def growth_task(links: int, modes: int, setting: str = '') -> Task:
@@ -67,27 +79,48 @@ def growth_task(links: int, modes: int, setting: str = '') -> Task:
 
 
 def measure(links: int, modes: int, setting: str = '') -> Growth:
-    """Return a row, measured in a process of its own."""
+    """Return a row, measured in a process of its own; of clamped links without helpers."""
+    alone = {PROCESSES: '0'} if setting else {}  # so that its CPU time is all there is
     code = f'from bench.growth import report; report({links}, {modes}, {setting!r})'
     done = subprocess.run([sys.executable, '-c', code], check=True, capture_output=True,
-                          text=True)
+                          text=True, env={**os.environ, **alone})
     return Growth(**json.loads(done.stdout.splitlines()[-1]))
 
 
 def report(links: int, modes: int, setting: str = '') -> None:
     """Plan a few times and print a row as JSON."""
-    task, limit = growth_task(links, modes, setting), CLAMPED_LIMIT if setting else TIME_LIMIT
+    task = growth_task(links, modes, setting)
     model = ArmModel(task.arm)
     plans: list[Plan] = []
-    while len(plans) < 5 and sum(plan.planning_time for plan in plans) < 10:
-        plans.append(plan_path(task, model=model, monitor=Monitor(time_limit=limit)))
+    times: list[float] = []
+    while len(plans) < 5 and sum(times) < _ENOUGH:
+        began = time.perf_counter()
+        plans.append(plan_path(task, model=model, monitor=_limit(setting)))
+        times.append(time.perf_counter() - began)
     peak = next(line for line in open('/proc/self/status') if line.startswith('VmHWM'))
     last = plans[-1]
     print(json.dumps({
         'links': links, 'modes': modes, 'setting': setting, 'unknowns': 4 * task.arm.n_coordinates,
         'solved': last.solved, 'strategy': last.strategy, 'iterations': last.iterations,
-        'seconds': statistics.median(plan.planning_time for plan in plans),
-        'intervals': last.mesh_intervals, 'memory': int(peak.split()[1]) / 1024}))
+        'seconds': statistics.median(times), 'intervals': last.mesh_intervals,
+        'cpu': statistics.median(plan.planning_time for plan in plans) if setting else np.nan,
+        'memory': int(peak.split()[1]) / 1024}))
+
+
+class _CpuMonitor(Monitor):
+    """Counts CPU time from its creation instead of time."""
+
+    @property
+    def elapsed(self) -> float:
+        """CPU time since creation [s]."""
+        return cpu_seconds() - self.started
+
+
+def _limit(setting: str) -> Monitor:
+    """Return a monitor that ends a plan in time: of clamped links in CPU time."""
+    if not setting:
+        return Monitor(time_limit=TIME_LIMIT)
+    return _CpuMonitor(time_limit=CLAMPED_LIMIT, started=cpu_seconds())
 
 
 def table(rows: list[Growth]) -> str:
@@ -103,13 +136,15 @@ def table(rows: list[Growth]) -> str:
 
 def clamped_table(rows: list[Growth]) -> str:
     """Return the rows of clamped links as Markdown, lying and hanging side by side."""
-    lines = ['| links x modes | coordinates | horizontal [s] | strategy | gravity [s] '
-             '| strategy |', '|' + '---|' * 6]
+    lines = ['| links x modes | coordinates | horizontal: time [s] | CPU [s] | strategy '
+             '| gravity: time [s] | CPU [s] | strategy |', '|' + '---|' * 8]
     found = {(row.links, row.modes, row.setting): row for row in rows}
-    for links, modes in dict.fromkeys((row.links, row.modes) for row in rows):
-        cells = [f'{row.seconds:.3g} | {row.strategy if row.solved else "not solved"}'
+    for links, modes in dict.fromkeys((links, modes) for links, modes, _ in CLAMPED):
+        cells = ['- | - | not run' if row is None else
+                 f'{row.seconds:.3g} | {row.cpu:.3g} | '
+                 f'{row.strategy if row.solved else "not solved"}'
                  for setting in ('horizontal', 'gravity')
-                 for row in [found[links, modes, setting]]]
+                 for row in [found.get((links, modes, setting))]]
         lines.append(f'| {links} x {modes} | {links * (1 + modes)} | {" | ".join(cells)} |')
     return '\n'.join(lines)
 

@@ -42,6 +42,7 @@ SECTIONS = {
                'flex_planner.planning.proofs'),
     'Feedback': ('flex_planner.planning.feedback.find_gains',
                  'flex_planner.planning.feedback.gains',
+                 'flex_planner.planning.feedback.carried_motion',
                  'flex_planner.planning.feedback.differing_arm',
                  'flex_planner.control.state_feedback', 'flex_planner.control.linear_feedback'),
     'Simulation': ('flex_planner.simulation.comparison', 'flex_planner.simulation.execution',

@@ -78,6 +78,9 @@ class LimitSearch:
         Whether the last one follows from searches of two neighbours, as exact as a plan.
     warm : bool
         Whether the search went on from the motion that it was given.
+    known : Extremal or None
+        A motion near the limit from a straight line, if one is known before the search: it goes on
+        from there where no kind of motion leads on.
     kinds : list of KindOfMotion
         Kinds of motion of the arm made rigid, the best first; empty if it looked for none.
     starts : int
@@ -93,6 +96,7 @@ class LimitSearch:
         self.starts = 0
         self.extremals: list[Extremal] = []
         self.extrapolated = self.warm = False
+        self.known: Extremal | None = None
 
     @property
     def solver(self) -> Solver:
@@ -233,6 +237,7 @@ class LimitSearch:
             if known is not None and not known.interrupted:
                 self._follow_kind(bare, known, solver)
                 return
+            known = known or self.known
         for problem in self._parameter.starts(bare):
             self.extremals = []
             collect_to_limit(
@@ -262,7 +267,7 @@ class LimitSearch:
         """Look for kinds of motion, and return the motion that the best one leads to."""
         home, kinds = self._find_kinds(bare)
         if home is not bare:
-            self._problem = turn_goal(self._problem, home)
+            self._problem, self.known = turn_goal(self._problem, home), None
         self._announce()
         return solve_best_kind(self._parameter, self._parameter.easiest(home), kinds, solver)
 

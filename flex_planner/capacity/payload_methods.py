@@ -8,7 +8,7 @@ motion ends if that is known. Errors of payloads that it tries stay inside.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from flex_planner.arms.spatial_arm import SpatialArm
 from flex_planner.base.errors import FlexPlannerError
@@ -37,7 +37,7 @@ from flex_planner.planning.strategies.catalogue import BARRIER, QUICK
 from flex_planner.planning.strategies.extremals import Extremal, SearchStart
 from flex_planner.planning.strategies.free_parameters import PAYLOAD
 from flex_planner.planning.strategies.homotopies import drop_weights
-from flex_planner.planning.strategies.limit_barrier import is_beyond_newton, is_cheap
+from flex_planner.planning.strategies.limit_barrier import is_cheap, reach_exactly
 from flex_planner.planning.within_model import bound_bending, bound_by_limits
 import numpy as np
 
@@ -55,9 +55,11 @@ def search_directly(problem: MotionProblem, solver: Solver, accuracy: float,
                     effort: SearchEffort,
                     start: MaxPayload | SearchStart | Neighbours | None) -> MaxPayload:
     """Follow the price to the limit, then plan there."""
-    search = LimitSearch(PAYLOAD, problem, solver, accuracy, effort)
+    search, at_once = LimitSearch(PAYLOAD, problem, solver, accuracy, effort), _AtOnce()
     try:
-        held = None if start is not None else _find_at_once(problem, solver, accuracy, effort)
+        if start is None:
+            at_once = _find_at_once(search, problem, accuracy, effort)
+        held = at_once.answer
         if held is not None and not (held.held or held.within_limits):
             return with_bound(held, problem)
         found = held or _follow(search, problem, solver, start, accuracy)
@@ -67,7 +69,7 @@ def search_directly(problem: MotionProblem, solver: Solver, accuracy: float,
     except FlexPlannerError as error:  # of a payload that was tried
         found = _certified_so_far(search, _result(
             search, problem, PlanStatus.NOT_CONVERGED, str(error)))
-    return describe(with_bound(found, problem))
+    return describe(with_bound(_heavier(found, at_once.certified), problem))
 
 
 def _follow(search: LimitSearch, problem: MotionProblem, solver: Solver,
@@ -105,29 +107,57 @@ def _follow(search: LimitSearch, problem: MotionProblem, solver: Solver,
     return found
 
 
-def _find_at_once(problem: MotionProblem, solver: Solver, accuracy: float,
-                  effort: SearchEffort) -> MaxPayload | None:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _AtOnce:
+    """The outcome where no price is followed, or else one that is certified, but not the limit."""
+
+    answer: MaxPayload | None = None
+    certified: MaxPayload | None = None
+
+
+def _find_at_once(search: LimitSearch, problem: MotionProblem, accuracy: float,
+                  effort: SearchEffort) -> _AtOnce:
     """Return the outcome where no price need be followed, or none can be."""
+    solver = search.solver
     if _bends_too_far(problem):  # so does what can be held
         found = _carry_within_model(problem, solver, accuracy, effort)
-        touched = found is not None and found.plan is not None and is_touched(found.plan)
-        return found if touched else _carry_the_most(problem, solver)
-    found = _hold_at_once(problem, solver) or _carry_the_most(problem, solver)
-    if found is not None or not _switches_often(problem, solver, accuracy):
-        return found
-    found = _carry_within_model(problem, solver, accuracy, effort)
+        if found is not None and found.solved and found.plan is not None and (
+                is_touched(found.plan)):
+            return _AtOnce(answer=found)
+        return _AtOnce(answer=_carry_the_most(problem, solver), certified=found)
+    answer = _hold_at_once(problem, solver) or _carry_the_most(problem, solver)
+    if answer is not None or not _may_ring(problem):
+        return _AtOnce(answer=answer)
+    search.known = reach_exactly(PAYLOAD, drop_weights(problem), solver,
+                                 lambda value: bracket_width(accuracy, value))
+    if search.known is not None:
+        return _AtOnce()
+    found = _carry_within_model(problem, solver, accuracy, effort, ringing=True)
     bent = found is not None and found.plan is not None and is_touched(found.plan)
-    return None if bent and problem.task.allow_large_bending else found
+    if found is None or not found.solved or (bent and problem.task.allow_large_bending):
+        return _AtOnce(certified=found)
+    return _AtOnce(answer=found)
+
+
+def _heavier(found: MaxPayload, other: MaxPayload | None) -> MaxPayload:
+    """Return the outcome of a search, or what was certified before it where that is more."""
+    if other is None or found.solved or found.status is PlanStatus.CANCELED or (
+            other.payload <= found.payload):
+        return found
+    status = PlanStatus.NOT_CONVERGED if other.solved else other.status
+    if found.status is PlanStatus.TIMEOUT:
+        return replace(other, status=found.status, message=f'{found.message}; {other.message}')
+    return replace(other, status=status)
 
 
 def _carry_within_model(problem: MotionProblem, solver: Solver, accuracy: float,
-                        effort: SearchEffort) -> MaxPayload | None:
+                        effort: SearchEffort, *, ringing: bool = False) -> MaxPayload | None:
     """
     Return the outcome by the interior-point method alone where an exact one is out of reach.
 
     Where links bend too far with less than the motors can carry, motions with much more are none
     of the arm, and hard to find: their weight pulls along the links. Where clamped links ring, the
-    torques of the largest payload switch too often. None where nothing is found.
+    torques of the largest payload switch too often. None where nothing is certified.
 
     """
     bounded = bound_bending(problem)
@@ -138,19 +168,16 @@ def _carry_within_model(problem: MotionProblem, solver: Solver, accuracy: float,
     found = carry_within_limits(bounded, solver, accuracy, MaxPayload(
         task=problem.task, method=PayloadMethod.DIRECT, status=PlanStatus.NOT_FOUND, message='',
         kinds=tuple(kinds[:MOST_KINDS]), starts=starts), [
-            as_guess(bounded, kind, solver) for kind in kinds[:_LIFTED]])
-    return found if found is not None and found.solved else None
+            as_guess(bounded, kind, solver) for kind in kinds[:_LIFTED]], ringing=ringing)
+    return found if found is not None and found.plan is not None else None
 
 
-def _switches_often(problem: MotionProblem, solver: Solver, accuracy: float) -> bool:
-    """Return whether Newton's method fails where the barrier leads to the largest payload."""
+def _may_ring(problem: MotionProblem) -> bool:
+    """Return whether torques drive the bending of their own links, on a mesh that is cheap."""
     arm = problem.model.arm
     if isinstance(arm, SpatialArm) or not (limits_of_model(arm) and is_cheap(PAYLOAD, problem)):
         return False
-    if not any(link.mode_shapes().tip_deflection.any() for link in arm.links if link.modes):
-        return False
-    return is_beyond_newton(PAYLOAD, drop_weights(problem), solver,
-                            lambda value: bracket_width(accuracy, value))
+    return any(link.mode_shapes().tip_deflection.any() for link in arm.links if link.modes)
 
 
 def _bends_too_far(problem: MotionProblem) -> bool:

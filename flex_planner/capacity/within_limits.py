@@ -19,6 +19,7 @@ from flex_planner.capacity.results import MaxPayload, MinDuration
 from flex_planner.collocation import CollocationSolution, Solver
 from flex_planner.optimal_control.constrained_motion import relieve_ends, slacks_of
 from flex_planner.optimal_control.motion_problem import MotionProblem
+from flex_planner.optimal_control.path_constraints import PathSlacks
 from flex_planner.optimal_control.task import MAX_DURATION, Task
 from flex_planner.planning.plan import Plan, PlanStatus
 from flex_planner.planning.plan_path import plan_path
@@ -26,7 +27,10 @@ from flex_planner.planning.plan_problem import STOP_STATUS
 from flex_planner.planning.strategies.free_parameters import PAYLOAD
 from flex_planner.planning.strategies.homotopies import drop_weights
 from flex_planner.planning.strategies.interior_point import applies
-from flex_planner.planning.strategies.payload_within_limits import reach_largest_payload
+from flex_planner.planning.strategies.payload_within_limits import (
+    reach_from_easier_arm,
+    reach_largest_payload,
+)
 from flex_planner.planning.strategies.reached_limit import ReachedLimit
 import numpy as np
 
@@ -37,8 +41,8 @@ _LONGER, _MOST_TRIES = (1.05, 1.2, 1.5, 2.0, 4.0), 30
 
 
 def carry_within_limits(problem: MotionProblem, solver: Solver, accuracy: float,
-                        free: MaxPayload, starts: Iterable[CollocationSolution] = (),
-                        ) -> MaxPayload | None:
+                        free: MaxPayload, starts: Iterable[CollocationSolution] = (), *,
+                        ringing: bool = False) -> MaxPayload | None:
     """
     Return the largest payload within the limits on the way.
 
@@ -55,6 +59,8 @@ def carry_within_limits(problem: MotionProblem, solver: Solver, accuracy: float,
     starts : iterable of CollocationSolution
         Motions to start from, besides a straight line, where a plan with the payload of the task
         is not to be waited for.
+    ringing : bool
+        Whether torques switch too often for Newton's method.
 
     Returns
     -------
@@ -77,15 +83,24 @@ def carry_within_limits(problem: MotionProblem, solver: Solver, accuracy: float,
         first = plan_path(problem.task, model=problem.model, solver=solver, search='fast')
         solver.monitor.check()
         nears = known_motions(first)
-    reached = [found for near in nears if (found := reach_largest_payload(
-        drop_weights(problem), slacks, solver, near, accuracy)) is not None]
-    for one in sorted(reached, key=lambda one: -one.value):
-        certified = certify_reached(PAYLOAD, problem, one, accuracy, solver)
+    for one in _reach(drop_weights(problem), slacks, solver, nears, accuracy):
+        certified = certify_reached(PAYLOAD, problem, one, accuracy, solver, ringing=ringing)
         if certified is not None:
             return _conclude(free, *certified, accuracy)
     if first is None or not (first.solved and np.isfinite(free.local_upper)):
         return None
     return carry_more(problem.task, first, solver, accuracy, free)
+
+
+def _reach(problem: MotionProblem, slacks: PathSlacks, solver: Solver,
+           nears: Iterable[CollocationSolution | None], accuracy: float) -> list[ReachedLimit]:
+    """Return the limits that some motions lead to, the heaviest payload first."""
+    reached = [found for near in nears if (found := reach_largest_payload(
+        problem, slacks, solver, near, accuracy)) is not None]
+    if not reached:
+        easier = reach_from_easier_arm(problem, slacks, solver, accuracy)
+        reached = [] if easier is None else [easier]
+    return sorted(reached, key=lambda one: -one.value)
 
 
 def is_touched(plan: Plan) -> bool:

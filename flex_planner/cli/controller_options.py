@@ -22,6 +22,8 @@ from flex_planner.planning.feedback.find_gains import RESOLUTION
 from flex_planner.planning.sampling import MAX_PERIOD, SamplingSettings
 from flex_planner.planning.uncertainty import Uncertainty
 
+_RATE = 1000.0  # [Hz]
+
 
 def add_controller(parser: argparse.ArgumentParser) -> None:
     """Add the options of the joint controller."""
@@ -29,9 +31,9 @@ def add_controller(parser: argparse.ArgumentParser) -> None:
         'joint controller', 'The controller that the trajectory is for. With it, the model '
         'carries out every plan before it is published.')
     add = group.add_argument
-    add('--controller-rate', type=number_argument, default=1000.0, metavar='HZ',
-        help='rate of its updates [Hz] (default: %(default)g)')
-    add('--effort-hold', choices=[hold.value for hold in EffortHold], default='end',
+    add('--controller-rate', type=number_argument, metavar='HZ',
+        help=f'rate of its updates [Hz] (default: {_RATE:g})')
+    add('--effort-hold', choices=[hold.value for hold in EffortHold],
         help='effort of the trajectory that it applies from one update to the next: that at the '
         'end of this time, as joint_trajectory_controller does (default), at its start, in its '
         'middle, or interpolated linearly')
@@ -42,7 +44,7 @@ def add_controller(parser: argparse.ArgumentParser) -> None:
     add('--controller-period', type=number_argument, metavar='S',
         help='time for which it holds an effort; efforts are shifted by half of it, so that '
         'their mean is right (default: 1 / rate; 0: no shift)')
-    add('--start-hold', type=number_argument, default=0.0, metavar='S',
+    add('--start-hold', type=number_argument, metavar='S',
         help='time before the motion in which the arm is held, so that the controller can lead '
         'it to the start [s] (default: 0)')
 
@@ -94,23 +96,44 @@ def sampling_settings(options: argparse.Namespace, arm: Arm) -> SamplingSettings
     """
     if not hasattr(options, 'controller_rate'):
         return SamplingSettings()
-    rate = number('--controller-rate', options.controller_rate, at_least=MIN_RATE,
-                  at_most=MAX_RATE, unit='Hz')
     period = options.controller_period
     if period is not None:
         period = number('--controller-period', period, at_least=0, at_most=MAX_PERIOD, unit='s')
-    controller = JointController(gains=_gains(options, arm, rate), rate=rate,
-                                 hold=EffortHold.named(options.effort_hold))
+    rate = _rate(options, _RATE)
+    known = JointController(gains=default_gains(ArmDynamics.of(arm), rate), rate=rate)
     try:
-        return SamplingSettings(controller=controller, controller_period=period,
-                                start_hold=options.start_hold)
+        return SamplingSettings(controller=given_controller(options, arm, known),
+                                controller_period=period, start_hold=options.start_hold or 0.0)
     except InvalidValueError as error:
         raise type(error)('--start-hold', error.value, error.bound) from None
 
 
-def _gains(options: argparse.Namespace, arm: Arm, rate: float) -> Gains:
-    """Return the gains that are given, and suitable ones where they are not."""
-    gains = default_gains(ArmDynamics.of(arm), rate)
+def given_controller(options: argparse.Namespace, arm: Arm,
+                     known: JointController) -> JointController:
+    """
+    Return the controller of a command line, as another one where there is no option.
+
+    Raises
+    ------
+    InvalidValueError
+        Naming the option.
+
+    """
+    hold = known.hold if options.effort_hold is None else EffortHold.named(options.effort_hold)
+    return JointController(gains=_gains(options, arm, known.gains), hold=hold,
+                           rate=_rate(options, known.rate))
+
+
+def _rate(options: argparse.Namespace, known: float) -> float:
+    """Return the rate that is given, else the known one [Hz]."""
+    if options.controller_rate is None:
+        return known
+    return number('--controller-rate', options.controller_rate, at_least=MIN_RATE,
+                  at_most=MAX_RATE, unit='Hz')
+
+
+def _gains(options: argparse.Namespace, arm: Arm, gains: Gains) -> Gains:
+    """Return the gains that are given, and the known ones where they are not."""
     for name in ('stiffness', 'damping'):
         if (text := getattr(options, f'controller_{name}')) is not None:
             option = f'--controller-{name}'

@@ -60,11 +60,17 @@ def integer_argument(text: str) -> int:
     return int(value)
 
 
-def add_arm(parser: argparse.ArgumentParser, *, optional: bool = False) -> None:
-    """Add the arm, which every command needs unless it says otherwise."""
+_RECORDED = ('; or the recording of a plan, of the node or of a command, which is carried out as '
+             'it was published: without options of a motion')
+
+
+def add_arm(parser: argparse.ArgumentParser, *, optional: bool = False,
+            recorded: bool = False) -> None:
+    """Add the arm, which every command needs unless it says otherwise, or a recording of it."""
     parser.add_argument('arm', metavar='ARM', nargs='?' if optional else None,
                         help='arm file, - for standard input, or a preset: '
-                        f'{", ".join(sorted(preset_files()))}')
+                        f'{", ".join(sorted(preset_files()))}'
+                        + (_RECORDED if recorded else ''))
 
 
 def add_folder(parser: argparse.ArgumentParser, default: str = 'output') -> None:

@@ -95,6 +95,8 @@ class Request:
 
         """
         arm = load_arm(options.arm)
+        if options.duration is None:
+            raise InvalidTaskError('--duration is missing: how long the motion takes [s]')
         with translate_errors():
             arm, inertia = take_payload_shape(options, arm)
             limit = number('time_limit', options.time_limit, above=0, at_most=MAX_TIME_LIMIT,
@@ -136,9 +138,14 @@ def say_failure(outcome: Plan | MaxPayload, time_limit: float) -> str:
     return list_failures(sentence, outcome) if isinstance(outcome, Plan) else sentence
 
 
-def add_task(parser: argparse.ArgumentParser, payload: str) -> None:
-    """Add the options that describe a motion; `payload` says what the payload is for."""
-    add_arm(parser)
+def add_task(parser: argparse.ArgumentParser, payload: str, *, recorded: bool = False) -> None:
+    """
+    Add the options that describe a motion; `payload` says what the payload is for.
+
+    With `recorded` a recording may be given in place of the arm, and then there are none.
+
+    """
+    add_arm(parser, recorded=recorded)
     add = parser.add_argument
     add('--from', dest='start_point', metavar='X,Y',
         help='tip at the start, where it rests as gravity bends the arm [m]; X,Y,Z of a spatial '
@@ -157,7 +164,7 @@ def add_task(parser: argparse.ArgumentParser, payload: str) -> None:
         help='modal displacements at the start, with --from-angles (default: those at rest)')
     add('--elbow', type=integer_argument, default=-1, metavar='SIGN',
         help='sign of the second joint angle at the points, 1 or -1 (default: -1)')
-    add('--duration', type=number_argument, required=True, metavar='S',
+    add('--duration', type=number_argument, required=not recorded, metavar='S',
         help='duration of the motion [s]')
     add('--payload', dest='payload_mass', type=number_argument, default=0.0, metavar='KG',
         help=payload)

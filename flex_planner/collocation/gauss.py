@@ -109,7 +109,7 @@ class GaussRule:
 
     def basis_rate(self, theta: Array) -> Array:
         """Return the Lagrange polynomials at theta, shape (k, s)."""
-        rate: Array = legendre.legvander(2 * theta - 1, self.stages - 1) @ self.transform
+        rate: Array = _legendre_polynomials(2 * theta - 1, self.stages - 1).T @ self.transform
         return rate
 
 
@@ -133,12 +133,20 @@ def differentiation_matrix(points: Array) -> Array:
 
 def _integrate_polynomials(x: Array, count: int) -> Array:
     """Return the integrals up to theta = (1 + x) / 2 of the first Legendre polynomials in x."""
-    values = legendre.legvander(x, count)
-    integrals = np.empty((x.size, count))
-    integrals[:, 0] = (1 + x) / 2
-    for k in range(1, count):
-        integrals[:, k] = (values[:, k + 1] - values[:, k - 1]) / (2 * (2 * k + 1))
-    return integrals
+    values = _legendre_polynomials(x, count)
+    integrals, k = np.empty((count, x.size)), np.arange(1, count)
+    integrals[0] = (1 + x) / 2
+    integrals[1:] = (values[2:] - values[:-2]) / (2 * (2 * k + 1))[:, None]
+    return np.ascontiguousarray(integrals.T)
+
+
+def _legendre_polynomials(x: Array, degree: int) -> Array:
+    """Return what NumPy's legvander has as columns, in rows: in half the time where x is short."""
+    values = np.empty((degree + 1, x.size), dtype=x.dtype)
+    values[0], values[1] = 1, x
+    for k in range(2, degree + 1):
+        values[k] = (values[k - 1] * x * (2 * k - 1) - values[k - 2] * (k - 1)) / k
+    return values
 
 
 def _spectrum(points: Array, weights: Array) -> Spectrum:

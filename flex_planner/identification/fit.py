@@ -82,16 +82,8 @@ def fit_parameters(model: LoopModel, experiments: Sequence[Experiment], values: 
 
     Parameters
     ----------
-    model : LoopModel
-        n joints.
-    experiments : sequence of Experiment
-        At least one.
-    values : numpy.ndarray, shape (2 + 6 n,)
-        Where to start, as `list_parameters` has them; those that are not free stay.
-    free : sequence of int
-        Indices of those to find.
-    monitor : Monitor, optional
-        May stop it.
+    model, experiments, values, free, monitor
+        As of `LogErrors`; the values as `list_parameters` has them.
     tolerance : float
         Relative change of the squared errors, or of the parameters, at which it ends.
 

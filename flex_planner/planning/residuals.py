@@ -9,10 +9,9 @@ from flex_planner.base.errors import InvalidTaskError, NoEquilibriumError
 from flex_planner.base.progress import Monitor
 from flex_planner.control.joint_controller import JointController
 from flex_planner.control.linear_feedback import LinearFeedback, pd_feedback
-from flex_planner.planning.execution import Execution
+from flex_planner.planning.feedback.carried_motion import CarriedMotion
 from flex_planner.planning.feedback.differing_arm import (
     CORNERS,
-    course_of,
     Difference,
     DifferingArm,
     list_differences,
@@ -88,23 +87,46 @@ def find_residuals(plan: Plan, controller: JointController, *,
     if not plan.solved or not plan.task.ends_at_rest:
         raise InvalidTaskError('residuals on other arms are those of a plan that is solved and '
                                f'ends at rest: {plan.message}')
-    payload = uncertainty.payload_error(float(plan.problem.parameters.payload_mass))
-    differences = list_differences(plan, uncertainty.stiffness, payload, (*_ONE_BY_ONE, *CORNERS))
+    return find_motion_residuals(CarriedMotion.of(plan, controller), uncertainty=uncertainty,
+                                 resolution=resolution, law=law, monitor=monitor)
+
+
+def find_motion_residuals(motion: CarriedMotion, *, uncertainty: Uncertainty = ASSUMED,
+                          resolution: float = RESOLUTION, law: LinearFeedback | None = None,
+                          monitor: Monitor | None = None) -> Residuals:
+    """
+    Return what a trajectory leaves behind on arms that differ from its model.
+
+    Parameters
+    ----------
+    motion : CarriedMotion
+        The trajectory under its controller.
+    uncertainty, resolution, law, monitor : Uncertainty, float, LinearFeedback, Monitor
+        As of `find_residuals`.
+
+    Raises
+    ------
+    StoppedError
+        If the monitor stopped it.
+
+    """
+    controller = motion.controller
+    payload = uncertainty.payload_error(float(motion.execution.parameters.payload_mass))
+    differences = list_differences(motion, uncertainty.stiffness, payload,
+                                   (*_ONE_BY_ONE, *CORNERS))
     used = law or pd_feedback(controller.gains, controller.rate)
     return Residuals(
         controller=controller, uncertainty=uncertainty, differences=differences,
-        responses=tuple(_respond(plan, controller, used, differences, resolution, monitor)))
+        responses=tuple(_respond(motion, used, differences, resolution, monitor)))
 
 
-def _respond(plan: Plan, controller: JointController, law: LinearFeedback,
-             differences: Sequence[Difference], resolution: float,
-             monitor: Monitor | None) -> list[Response]:
-    """Return what becomes of the plan on every arm; nothing of one that buckles."""
-    nominal, course = Execution.of(plan, controller), course_of(plan, controller)
-    found = []
+def _respond(motion: CarriedMotion, law: LinearFeedback, differences: Sequence[Difference],
+             resolution: float, monitor: Monitor | None) -> list[Response]:
+    """Return what becomes of the motion on every arm; nothing of one that buckles."""
+    course, found = motion.course, []
     for difference in differences:
         try:
-            arm = DifferingArm.of(nominal, plan, course, difference, resolution)
+            arm = DifferingArm.of(motion, course, difference, resolution)
         except NoEquilibriumError:
             found.append(Response(growth=np.inf))
             continue

@@ -54,6 +54,7 @@ class MessageTypes:
     def __init__(self, store: Typestore, texts: Mapping[str, str]) -> None:
         self._store = store
         self._texts = dict(texts)
+        self._definitions: dict[str, Definition] = {}  # put together so far
 
     @classmethod
     def load(cls, definition_folders: Iterable[Path | str] = ()) -> MessageTypes:
@@ -100,8 +101,10 @@ class MessageTypes:
 
     def definition(self, type_name: str) -> Definition:
         """Return what a recording carries of a type."""
-        return Definition(type_name, 'ros2msg', self.schema(type_name).encode(),
-                          self.type_hash(type_name))
+        if type_name not in self._definitions:
+            self._definitions[type_name] = Definition(
+                type_name, 'ros2msg', self.schema(type_name).encode(), self.type_hash(type_name))
+        return self._definitions[type_name]
 
     def schema(self, type_name: str) -> str:
         """Return the definition of a type and of all types within it, encoding ``ros2msg``."""

@@ -13,6 +13,8 @@ import yaml
 
 METADATA_VERSION: Final = 9
 ROS_DISTRO: Final = 'jazzy'
+# ten times as quick where PyYAML has libyaml, with the same values
+_DUMPER: Final = getattr(yaml, 'CSafeDumper', yaml.SafeDumper)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -222,5 +224,5 @@ def is_text(value: object) -> bool:
 
 def _dump(content: dict[str, object]) -> str:
     """Return the YAML text of a mapping, in the order given."""
-    text: str = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=1000)
+    text: str = yaml.dump(content, Dumper=_DUMPER, sort_keys=False, allow_unicode=True, width=1000)
     return text

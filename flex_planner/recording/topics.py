@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from functools import lru_cache
 import re
 from typing import Any, Final, NamedTuple, TypeVar
 
@@ -78,8 +79,7 @@ class QosProfile:
 
     def to_yaml(self) -> str:
         """Return the text of the channel metadata ``offered_qos_profiles``."""
-        text: str = yaml.safe_dump([self.to_dict()], sort_keys=False)
-        return text
+        return _format_profile(self)
 
     @classmethod
     def from_yaml(cls, text: str) -> QosProfile:
@@ -112,6 +112,12 @@ def parse_yaml(text: str | bytes) -> object:
     except (yaml.YAMLError, ValueError, LookupError, AttributeError, TypeError, RecursionError,
             OverflowError):
         return None
+
+
+@lru_cache  # the same few for every topic of every recording, and PyYAML takes long
+def _format_profile(profile: QosProfile) -> str:
+    text: str = yaml.safe_dump([profile.to_dict()], sort_keys=False)
+    return text
 
 
 def _infinite() -> dict[str, int]:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from flex_planner.arms.arm import Arm
 from flex_planner.control.state_feedback import StateFeedback
 from flex_planner.planning.execution import say_gains, UNSTABLE_GROWTH
 from flex_planner.planning.feedback.differing_arm import Response
 from flex_planner.planning.feedback.gains import FeedbackGains, Record
-from flex_planner.planning.plan import Plan
 from flex_planner.reports.motion import columns, Row
 import numpy as np
 
@@ -44,13 +44,13 @@ def feedback_table(gains: FeedbackGains) -> str:
         for i, difference in enumerate(gains.differences)])
 
 
-def feedback_values(gains: FeedbackGains, plan: Plan) -> dict[str, Any]:
+def feedback_values(gains: FeedbackGains, arm: Arm) -> dict[str, Any]:
     """Return gains as plain values, in SI units and radians, for a file."""
     values: dict[str, Any] = {
-        'arm': plan.arm.name, 'message': gains.message, 'rate': gains.rate,
+        'arm': arm.name, 'message': gains.message, 'rate': gains.rate,
         'encoder_resolution': gains.resolution,
-        'coordinates': [*(f'joint{i + 1}' for i in range(plan.arm.n_joints)),
-                        *plan.arm.passive_names],
+        'coordinates': [*(f'joint{i + 1}' for i in range(arm.n_joints)),
+                        *arm.passive_names],
         'arms': [str(difference) for difference in gains.differences],
         'tip_motion_after_arrival': {name: _residuals(record)
                                      for name, record in gains.records.items()}}

@@ -9,7 +9,7 @@ from typing import Any
 
 from flex_planner.arms.arm import Arm, Joint, Link, Motor, Node
 from flex_planner.base.progress import Monitor
-from flex_planner.capacity import incremental
+from flex_planner.capacity import incremental, payload_methods
 from flex_planner.capacity.incremental import PayloadTrial
 from flex_planner.capacity.max_payload import find_max_payload
 from flex_planner.capacity.results import MaxPayload, PayloadMethod
@@ -108,3 +108,27 @@ def test_incremental_search_does_not_say_that_a_kind_of_motion_ends() -> None:
     found = raised(one_link(2.0), step=4.0, accuracy=1.0)
     assert found.solved
     assert f'no motion was found with {found.local_upper:.6g} kg: the motor' in found.message
+
+
+@pytest.mark.parametrize(('ended', 'status', 'payload'), [
+    (PlanStatus.NOT_CONVERGED, PlanStatus.NOT_CONVERGED, 1.0),
+    (PlanStatus.TIMEOUT, PlanStatus.TIMEOUT, 1.0),
+    (PlanStatus.CANCELED, PlanStatus.CANCELED, 0.0),
+    (PlanStatus.SOLVED, PlanStatus.SOLVED, 0.5)])
+def test_payload_that_was_certified_is_kept_where_a_search_ends_with_less(
+        monkeypatch: pytest.MonkeyPatch, ended: PlanStatus, status: PlanStatus,
+        payload: float) -> None:
+    task = one_link(2.5)
+    known = MaxPayload(
+        task=task, method=PayloadMethod.DIRECT, status=PlanStatus.NOT_CONVERGED, payload=1.0,
+        plan=plan_path(replace(task, payload_mass=1.0), search='fast'), within_limits=True,
+        message='1 kg can be carried')
+    monkeypatch.setattr(payload_methods, '_find_at_once', lambda *given: (
+        payload_methods._AtOnce(certified=known)))
+    monkeypatch.setattr(payload_methods, '_follow', lambda *given: replace(
+        known, status=ended, within_limits=False, message='ended', plan=None,
+        payload=0.0 if ended is PlanStatus.CANCELED else 0.5))
+    found = find_max_payload(task)
+    assert (found.status, found.payload) == (status, payload)
+    assert (found.plan is known.plan) == (payload == 1.0)
+    assert ('1 kg can be carried' in found.message) == (payload == 1.0)

@@ -11,9 +11,8 @@ from flex_planner.base.errors import InvalidTaskError, InvalidValueError
 from flex_planner.control.joint_controller import Gains, JointController
 from flex_planner.control.linear_feedback import pd_feedback
 from flex_planner.optimal_control.task import Task
-from flex_planner.planning.execution import Execution
+from flex_planner.planning.feedback.carried_motion import CarriedMotion
 from flex_planner.planning.feedback.differing_arm import (
-    course_of,
     Difference,
     DifferingArm,
     list_differences,
@@ -64,9 +63,9 @@ def test_planar_arm_in_space_leaves_the_same() -> None:
     for arm in (planar, SpatialArm.of_planar(planar)):
         plan = plan_path(Task(arm=arm, start_positions=[0.3, 0.2], goal_positions=[0.35, 0.25],
                               duration=0.7, payload_mass=1.0), search='fast')
-        assert softer in list_differences(plan, 0.1, 0.1)
-        differing = DifferingArm.of(Execution.of(plan, controller), plan,
-                                    course_of(plan, controller), softer, 0.0)
+        motion = CarriedMotion.of(plan, controller)
+        assert softer in list_differences(motion, 0.1, 0.1)
+        differing = DifferingArm.of(motion, motion.course, softer, 0.0)
         found.append(differing.respond(pd_feedback(controller.gains, controller.rate)))
     assert found[0].residual > 1e-5
     assert found[1].growth == pytest.approx(found[0].growth, rel=1e-6)

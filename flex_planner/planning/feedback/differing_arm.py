@@ -10,14 +10,12 @@ from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
 from flex_planner.control.extent import peak_to_peak
 from flex_planner.control.feedback_motion import Course, FeedbackArm, FeedbackMotion
-from flex_planner.control.joint_controller import JointController
 from flex_planner.control.linear_feedback import LinearFeedback
 from flex_planner.control.state_feedback import LinearArm
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.physical_parameters import PhysicalParameters
 from flex_planner.planning.execution import Execution
-from flex_planner.planning.plan import Plan
-from flex_planner.planning.published_motion import PublishedMotion
+from flex_planner.planning.feedback.carried_motion import CarriedMotion, watched_periods
 from flex_planner.planning.robust.differing_arms import (
     differing_parameters,
     has_all_modes,
@@ -25,9 +23,6 @@ from flex_planner.planning.robust.differing_arms import (
     with_more_modes,
 )
 import numpy as np
-
-# how long the tip is watched after the arrival [s]
-WATCHED = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,7 +55,7 @@ CORNERS = (1, -1), (1, 1), (-1, -1), (-1, 1)
 """Signs of errors of stiffness and payload at the corners of their box, the worst last."""
 
 
-def list_differences(plan: Plan, stiffness: float, payload: float,
+def list_differences(motion: CarriedMotion, stiffness: float, payload: float,
                      signs: Sequence[tuple[int, int]] = CORNERS) -> tuple[Difference, ...]:
     """
     Return none, errors with some signs, and two more modes alone and with the last errors.
@@ -68,12 +63,12 @@ def list_differences(plan: Plan, stiffness: float, payload: float,
     What the arm or the task lacks is left out.
 
     """
-    given = plan.problem.parameters
-    stiffness = stiffness if plan.arm.n_modes else 0.0
+    given = motion.execution.parameters
+    stiffness = stiffness if motion.arm.n_modes else 0.0
     payload = payload if given.payload_mass or given.payload_inertia else 0.0
     found = [Difference(), *(Difference(stiffness=a * stiffness, payload=b * payload)
                              for a, b in signs)]
-    if plan.arm.n_modes and not has_all_modes(plan.arm):
+    if motion.arm.n_modes and not has_all_modes(motion.arm):
         found += [Difference(more_modes=True), replace(found[-1], more_modes=True)]
     return tuple(dict.fromkeys(found))
 
@@ -133,10 +128,10 @@ class DifferingArm:
     resolution: float
 
     @classmethod
-    def of(cls, nominal: Execution, plan: Plan, course: Course, difference: Difference,
+    def of(cls, motion: CarriedMotion, course: Course, difference: Difference,
            resolution: float) -> DifferingArm:
         """
-        Return the arm of a difference.
+        Return the arm of a difference, and the course of the motion that it is to follow.
 
         Raises
         ------
@@ -144,16 +139,16 @@ class DifferingArm:
             If it buckles at the start or at the goal.
 
         """
+        nominal = motion.execution
         parameters = differing_parameters(nominal.parameters, difference.stiffness,
                                           difference.payload)
-        dynamics = (ArmDynamics.of(with_more_modes(plan.arm)) if difference.more_modes
+        dynamics = (ArmDynamics.of(with_more_modes(motion.arm)) if difference.more_modes
                     else nominal.dynamics)
         execution = other_execution(nominal, dynamics, parameters)
-        goal = plan.problem.goal[:plan.arm.n_joints]
-        linear = LinearArm.of(dynamics, goal, without_friction(parameters),
+        linear = LinearArm.of(dynamics, motion.goal, without_friction(parameters),
                               nominal.controller.rate)
         return cls(execution=execution, linear=linear, resolution=resolution, course=course,
-                   unbalanced=plan.problem.holding_torque - linear.torque)
+                   unbalanced=motion.holding_torque - linear.torque)
 
     def growth(self, law: LinearFeedback) -> float:
         """Return how fast deviations grow at the goal under a law [1/s]."""
@@ -221,18 +216,6 @@ class DifferingArm:
                 step = step @ step
             tips: Array = (rows[:, :count] @ state).T
         return tips
-
-
-def course_of(plan: Plan, controller: JointController) -> Course:
-    """Return the course of a plan, and of `watched_periods` after it."""
-    motion = PublishedMotion.of(plan, controller, controller.period)
-    until = plan.task.duration + watched_periods(controller) * controller.period
-    return Course.of(motion, controller.hold, controller.rate, until)
-
-
-def watched_periods(controller: JointController) -> int:
-    """Return for how many periods the tip is watched after the arrival."""
-    return int(np.ceil(WATCHED * controller.rate - 1e-6))
 
 
 def without_friction(parameters: PhysicalParameters) -> PhysicalParameters:

@@ -26,11 +26,10 @@ from flex_planner.control.linear_feedback import (
 from flex_planner.control.state_feedback import LinearArm, NoFeedbackError, StateFeedback
 from flex_planner.planning.execution import (
     describe_controller,
-    Execution,
     UNSTABLE_GROWTH,
 )
+from flex_planner.planning.feedback.carried_motion import CarriedMotion
 from flex_planner.planning.feedback.differing_arm import (
-    course_of,
     DifferingArm,
     list_differences,
     Response,
@@ -116,23 +115,49 @@ def find_feedback_gains(plan: Plan, settings: GainSettings | None = None,
         raise InvalidTaskError('gains are found for motions that end at rest')
     given = settings or GainSettings()
     controller = given.controller or JointController(gains=default_gains(plan.model))
-    return _Search(plan, given, controller, monitor or Monitor()).run()
+    return _Search(CarriedMotion.of(plan, controller), given, monitor or Monitor()).run()
+
+
+def find_motion_gains(motion: CarriedMotion, settings: GainSettings | None = None,
+                      monitor: Monitor | None = None) -> FeedbackGains:
+    """
+    Find gains of feedback for a trajectory, such as a recorded one.
+
+    Parameters
+    ----------
+    motion : CarriedMotion
+        The trajectory under its controller.
+    settings : GainSettings, optional
+        Of the errors of the model; its controller is not looked at.
+    monitor : Monitor, optional
+        May stop it.
+
+    Returns
+    -------
+    FeedbackGains
+        Check `found`.
+
+    Raises
+    ------
+    StoppedError
+        If the monitor stopped it.
+
+    """
+    return _Search(motion, settings or GainSettings(), monitor or Monitor()).run()
 
 
 class _Search:
     """A search: arms that differ, and the laws that are tried on them."""
 
-    def __init__(self, plan: Plan, settings: GainSettings, controller: JointController,
-                 monitor: Monitor) -> None:
-        self._plan, self._settings, self._controller = plan, settings, controller
-        self._monitor, self._rate = monitor, controller.rate
-        self._differences = list_differences(plan, settings.stiffness_error,
+    def __init__(self, motion: CarriedMotion, settings: GainSettings, monitor: Monitor) -> None:
+        self._motion, self._settings, self._controller = motion, settings, motion.controller
+        self._monitor, self._rate = monitor, motion.controller.rate
+        self._differences = list_differences(motion, settings.stiffness_error,
                                              settings.payload_error)
         # of roundings, and of a noise of half a step
         self._noise = settings.encoder_resolution * float(np.sqrt(1 / 12 + 1 / 4))
-        parameters = without_friction(plan.problem.parameters)
-        self._model = LinearArm.of(plan.model, plan.problem.goal[:plan.arm.n_joints], parameters,
-                                   self._rate)
+        self._model = LinearArm.of(motion.execution.dynamics, motion.goal,
+                                   without_friction(motion.execution.parameters), self._rate)
 
     def run(self) -> FeedbackGains:
         """Return what was found."""
@@ -147,10 +172,8 @@ class _Search:
 
     def _make_arms(self) -> list[DifferingArm]:
         """Return the arms that are looked at."""
-        nominal = Execution.of(self._plan, self._controller)
-        course, resolution = (course_of(self._plan, self._controller),
-                              self._settings.encoder_resolution)
-        return [DifferingArm.of(nominal, self._plan, course, difference, resolution)
+        course, resolution = self._motion.course, self._settings.encoder_resolution
+        return [DifferingArm.of(self._motion, course, difference, resolution)
                 for difference in self._differences]
 
     def _add_state(self, found: FeedbackGains) -> FeedbackGains:

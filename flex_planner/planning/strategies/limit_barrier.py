@@ -108,10 +108,10 @@ def reach_limit(parameter: FreeParameter, problem: MotionProblem, solver: Solver
         parameter, problem, fallen[0].restrict(fallen[1].solution)[0], solver)
 
 
-def is_beyond_newton(parameter: FreeParameter, problem: MotionProblem, solver: Solver,
-                     target_gap: TargetGap) -> bool:
+def reach_exactly(parameter: FreeParameter, problem: MotionProblem, solver: Solver,
+                  target_gap: TargetGap) -> Extremal | None:
     """
-    Return whether the limit is found with the barrier, but no motion within the limits from it.
+    Return what `reach_limit` does, but no motion with a value that is easier; None without it.
 
     Parameters
     ----------
@@ -120,8 +120,8 @@ def is_beyond_newton(parameter: FreeParameter, problem: MotionProblem, solver: S
 
     """
     fallen = _fall_to_limit(parameter, problem, solver)
-    return fallen is not None and _solve_there(
-        parameter, problem, *fallen, solver, target_gap) is None
+    return None if fallen is None else _solve_there(parameter, problem, *fallen, solver,
+                                                    target_gap)
 
 
 def _fall_to_limit(parameter: FreeParameter, problem: MotionProblem,

@@ -2,21 +2,31 @@
 The largest payload within limits on the way, by the interior-point method.
 
 Limits of motors and limits on the way are one barrier; the payload that is worth its price comes
-to the limit while mu falls, see `limit_barrier`.
+to the limit while mu falls, see `limit_barrier`. A mesh that is too coarse for how often torques
+switch gives a payload that is wrong by more than the barrier keeps of it, either way: it counts
+once a finer mesh says the same.
 
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from flex_planner.base.errors import FlexPlannerError
 from flex_planner.base.validation import Array
 from flex_planner.collocation import CollocationSolution, GaussRule, Solver
 from flex_planner.collocation.barrier_mesh import cut_mesh, follow_barrier
-from flex_planner.collocation.interior_point import BarrierOutcome, BarrierSchedule
+from flex_planner.collocation.barrier_walk import lower_slowly, settle, walk_barrier
+from flex_planner.collocation.interior_point import (
+    BarrierOutcome,
+    BarrierProblem,
+    BarrierSchedule,
+)
 from flex_planner.optimal_control.barrier_problem import PayloadBarrier
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.path_barrier import PathBarrier
 from flex_planner.optimal_control.path_constraints import PathSlacks
+from flex_planner.planning.strategies.easier_arm import ease_arm, Easier
 from flex_planner.planning.strategies.interior_point import applies
 from flex_planner.planning.strategies.limit_barrier import barrier_price, moved_mass
 from flex_planner.planning.strategies.reached_limit import ReachedLimit
@@ -28,8 +38,13 @@ _FIRST, _LAST = 0.15, (1e-6, 1e-4)
 # of the accuracy, that the barrier may keep
 _SHARE, _ACCURACY = 0.5, 1e-3
 _TOLERANCE, _PATIENCE = 1e-3, 80
+# of mu at first, where a motion counts though mu falls no further
+_ENOUGH = 0.01
 # where Newton's method goes on without slacks and multipliers
 _SETTLED = 1e-6
+# mu from which it falls on a finer mesh, by that at last; iterations to come to it; meshes that
+# are tried, and the share of the accuracy by which the payload may differ on the last two
+_RAISED, _RAISING, _FINER, _STANDS = 1e3, 40, 3, 0.25
 
 
 def find_largest_payload(problem: MotionProblem, slacks: PathSlacks,
@@ -64,40 +79,25 @@ def reach_largest_payload(problem: MotionProblem, slacks: PathSlacks, solver: So
         If the monitor stopped it.
 
     """
-    price = barrier_price(problem)
-    if not applies(problem, solver) or not np.isfinite(price):
+    if not _is_reachable(problem, solver):
         return None
-    barrier = PayloadBarrier(problem, price)
-    both, rule = PathBarrier(barrier, slacks), GaussRule.of(STAGES)
+    rule = GaussRule.of(STAGES)
     start = (problem.straight_line(first_count(problem, solver), rule) if near is None
              else near.on_mesh(first_mesh(problem, solver), rule))
-    guess, mass = barrier.extend(start), moved_mass(problem)
-    scale = price * mass / problem.task.duration
-    y = both.guess(guess, _FIRST * scale)
-    limits = (y.shape[-1] - both.free) // 2
-    last = float(np.clip(_SHARE * accuracy / (limits * mass), *_LAST))
-    schedule = BarrierSchedule(first=_FIRST * scale, last=last * scale, tolerance=_TOLERANCE,
-                               max_iterations=_PATIENCE)
-    met = _follow(both, guess, y, schedule, solver, slacks.count)
+    barrier, both = _barriers(problem, slacks)
+    guess = barrier.extend(start)
+    y = both.guess(guess, _first_mu(problem))
+    met = _follow(both, guess, y, _schedule(both, y, accuracy), solver, slacks.count)
     return None if met is None else _reached(barrier, met, both.free)
 
 
-def refine_limit(problem: MotionProblem, slacks: PathSlacks, reached: ReachedLimit,
-                 solver: Solver) -> ReachedLimit | None:
+def reach_from_easier_arm(problem: MotionProblem, slacks: PathSlacks, solver: Solver,
+                          accuracy: float = _ACCURACY) -> ReachedLimit | None:
     """
-    Return the same limit on a mesh that resolves how torques come to their limits and leave them.
+    Return what `reach_largest_payload` does, from the motion of an arm that is easier to move.
 
-    Parameters
-    ----------
-    problem, slacks, solver
-        As of `reach_largest_payload`.
-    reached : ReachedLimit
-        What that returned.
-
-    Returns
-    -------
-    ReachedLimit or None
-        None where the mesh would be too fine.
+    The barrier of soft links, or of friction that jumps, has no way from a straight line; that of
+    the same arm ten times as stiff, or with smoother friction, has, and leads there.
 
     Raises
     ------
@@ -105,17 +105,131 @@ def refine_limit(problem: MotionProblem, slacks: PathSlacks, reached: ReachedLim
         If the monitor stopped it.
 
     """
-    assert reached.met is not None
-    barrier, old = PayloadBarrier(problem, barrier_price(problem)), reached.met
-    both, limits = PathBarrier(barrier, slacks), (old.y.shape[-1] - reached.free) // 2
-    schedule = BarrierSchedule(first=old.mu, last=old.mu, tolerance=_SETTLED,
-                               max_iterations=_PATIENCE)
-    met = _follow(both, old.solution, old.y, schedule, solver, limits)
-    if met is None:
+    if not _is_reachable(problem, solver):
         return None
-    halves = cut_mesh(both, met.solution, met.y, met.solution.steps > 0)
-    finer = _follow(both, *halves, schedule, solver, limits)
-    return None if finer is None else _reached(barrier, finer, both.free)
+    for easier in ease_arm(problem):
+        try:
+            found = _reach_from(easier, problem, slacks, solver, accuracy)
+        except FlexPlannerError:  # a payload that no equilibrium carries
+            continue
+        if found is not None:
+            return found
+    return None
+
+
+def _reach_from(easier: Easier, problem: MotionProblem, slacks: PathSlacks, solver: Solver,
+                accuracy: float) -> ReachedLimit | None:
+    """Return the limit from that of easier arms, perhaps with a larger barrier than is wanted."""
+    price, mu = barrier_price(problem), _first_mu(problem)
+
+    def family(share: float) -> tuple[BarrierProblem, float]:
+        return PathBarrier(PayloadBarrier(easier(share), price), slacks), mu
+
+    easiest = PayloadBarrier(easier(0.0), price)
+    met = _settle_on_line(PathBarrier(easiest, slacks), easiest, mu, solver)
+    if met.converged:
+        met = walk_barrier(family, met, solver.monitor)
+    if not met.converged:
+        return None
+    barrier, both = _barriers(problem, slacks)
+    met = lower_slowly(both, met, _schedule(both, met.y, accuracy).last, solver.monitor)
+    if met.mu > _ENOUGH * mu:
+        return None
+    return _reached(barrier, replace(met, converged=True), both.free)  # it is, at its mu
+
+
+def _settle_on_line(both: PathBarrier, barrier: PayloadBarrier, mu: float,
+                    solver: Solver) -> BarrierOutcome:
+    """Return what a straight line leads to at one mu."""
+    motion = barrier.motion
+    guess = barrier.extend(motion.straight_line(first_count(motion, solver), GaussRule.of(STAGES)))
+    start = BarrierOutcome(guess, both.guess(guess, mu), mu, False, np.inf, 0, '')
+    return settle(both, mu, start, solver.monitor, patience=_PATIENCE)
+
+
+def refine_limit(problem: MotionProblem, slacks: PathSlacks, reached: ReachedLimit,
+                 solver: Solver, accuracy: float = _ACCURACY) -> ReachedLimit | None:
+    """
+    Return the same limit on a mesh that resolves how torques come to their limits and leave them.
+
+    Parameters
+    ----------
+    problem, slacks, solver, accuracy
+        As of `reach_largest_payload`.
+    reached : ReachedLimit
+        What that returned.
+
+    Returns
+    -------
+    ReachedLimit or None
+        Its gap has what the last mesh changed besides what the barrier keeps. None where no mesh
+        says the same as the one before, or it would be too fine.
+
+    Raises
+    ------
+    StoppedError
+        If the monitor stopped it.
+
+    """
+    for _ in range(_FINER):
+        finer = _refine(problem, slacks, reached, solver)
+        if finer is None:
+            return None
+        change = abs(finer.value - reached.value)
+        if change <= _STANDS * accuracy:
+            return replace(finer, gap=finer.gap + change)
+        reached = finer
+    return None
+
+
+def _refine(problem: MotionProblem, slacks: PathSlacks, reached: ReachedLimit,
+            solver: Solver) -> ReachedLimit | None:
+    """
+    Return the same limit on a mesh at least twice as fine.
+
+    Where mu is small what lies between the points of the coarse mesh is no start, so it is raised.
+
+    """
+    assert reached.met is not None
+    (barrier, both), old = _barriers(problem, slacks), reached.met
+    limits = (old.y.shape[-1] - both.free) // 2
+    schedule = BarrierSchedule(first=_RAISED * old.mu, last=old.mu, tolerance=_TOLERANCE,
+                               max_iterations=_PATIENCE)
+    try:
+        raised = settle(both, schedule.first, old, solver.monitor, patience=_RAISING)
+        halves = cut_mesh(both, raised.solution, raised.y, raised.solution.steps > 0)
+        met = _follow(both, *halves, schedule, solver, limits)
+        if met is None:
+            return None
+        met = settle(both, old.mu, met, solver.monitor, _SETTLED)
+    except FlexPlannerError:  # a payload that no equilibrium carries
+        return None
+    return _reached(barrier, met, both.free) if met.converged else None
+
+
+def _is_reachable(problem: MotionProblem, solver: Solver) -> bool:
+    """Return whether the method applies, and anything is a limit."""
+    return applies(problem, solver) and bool(np.isfinite(barrier_price(problem)))
+
+
+def _barriers(problem: MotionProblem, slacks: PathSlacks) -> tuple[PayloadBarrier, PathBarrier]:
+    """Return the barrier of the motors' limits, and that of both."""
+    barrier = PayloadBarrier(problem, barrier_price(problem))
+    return barrier, PathBarrier(barrier, slacks)
+
+
+def _first_mu(problem: MotionProblem) -> float:
+    """Return mu at first."""
+    return _FIRST * barrier_price(problem) * moved_mass(problem) / problem.task.duration
+
+
+def _schedule(both: PathBarrier, y: Array, accuracy: float) -> BarrierSchedule:
+    """Return how mu falls to what keeps a share of the accuracy."""
+    limits, motion = (y.shape[-1] - both.free) // 2, both.inner.motion
+    last = float(np.clip(_SHARE * accuracy / (limits * moved_mass(motion)), *_LAST))
+    first = _first_mu(motion)
+    return BarrierSchedule(first=first, last=last * first / _FIRST, tolerance=_TOLERANCE,
+                           max_iterations=_PATIENCE)
 
 
 def _follow(both: PathBarrier, guess: CollocationSolution, y: Array, schedule: BarrierSchedule,

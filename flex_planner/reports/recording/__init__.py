@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from flex_planner.reports.recording.check import check_motion
 from flex_planner.reports.recording.contents import RecordedMotion, RecordedRequest
+from flex_planner.reports.recording.execution import carried_motion
 from flex_planner.reports.recording.findings import CheckLimits, Finding, MotionCheck
 from flex_planner.reports.recording.page import report_page, write_report
 from flex_planner.reports.recording.tables import check_table, verdict
@@ -19,6 +20,7 @@ __all__ = [
     'MotionCheck',
     'RecordedMotion',
     'RecordedRequest',
+    'carried_motion',
     'check_motion',
     'check_table',
     'report_page',

@@ -26,9 +26,9 @@ from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.planning.execution import Execution
 from flex_planner.reports.recording.contents import RecordedMotion, RecordedRequest
 from flex_planner.reports.recording.execution import (
+    carried_motion,
     effort_delay,
     efforts_settled,
-    recorded_controller,
     recorded_execution,
 )
 from flex_planner.reports.recording.findings import CheckLimits, Finding, MotionCheck
@@ -75,10 +75,7 @@ def check_motion(request: RecordedRequest, model: ArmModel | None = None,
     model, limits = model or ArmModel(request.arm), limits or CheckLimits()
     ends = [_start_state(model, request, motion),
             _at_rest(model, motion.coordinates[-1], parameters)]
-    execution = Execution(
-        dynamics=model, parameters=parameters, goal=motion.tip[-1],
-        start=np.concatenate([motion.coordinates[0], motion.rates[0]]),
-        duration=float(motion.times[-2]), controller=recorded_controller(request))
+    execution = carried_motion(request, model).execution
     states = _states(execution, motion, monitor)
     tip = tip_position(request.arm, states[:, :request.arm.n_coordinates])
     return MotionCheck(tip=tip, findings=(

@@ -6,7 +6,12 @@ from flex_planner.control.default_gains import default_gains
 from flex_planner.control.joint_controller import EffortHold, Gains, JointController
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.planning.executed_limits import ExecutedSlack
-from flex_planner.planning.execution import ExecutionCertificate, RobustnessReport
+from flex_planner.planning.execution import (
+    Execution,
+    ExecutionCertificate,
+    RobustnessReport,
+)
+from flex_planner.planning.feedback.carried_motion import CarriedMotion
 from flex_planner.planning.published_motion import start_ramp
 from flex_planner.planning.uncertainty import ASSUMED_ERROR
 from flex_planner.reports.recording.contents import RecordedMotion, RecordedRequest
@@ -23,6 +28,29 @@ def recorded_controller(request: RecordedRequest) -> JointController:
                   damping=np.asarray(report.controller_damping))
     return JointController(gains=gains, rate=float(report.controller_rate),
                            hold=EffortHold.named(report.effort_hold))
+
+
+def carried_motion(request: RecordedRequest, model: ArmDynamics) -> CarriedMotion:
+    """
+    Return the recorded trajectory under the controller that it was published for.
+
+    Parameters
+    ----------
+    request : RecordedRequest
+        With a motion.
+    model : ArmDynamics
+        Of its arm.
+
+    """
+    motion = request.motion
+    assert motion is not None
+    execution = Execution(
+        dynamics=model, parameters=request.parameters, goal=motion.tip[-1],
+        start=np.concatenate([motion.coordinates[0], motion.rates[0]]),
+        duration=float(motion.times[-2]), controller=recorded_controller(request))
+    return CarriedMotion(execution=execution, reference=motion.reference,
+                         goal=motion.coordinates[-1, :request.arm.n_joints],
+                         holding_torque=motion.torques[-1])
 
 
 def effort_delay(request: RecordedRequest) -> float:

@@ -35,7 +35,6 @@ from flex_planner.ros.messages.classes import (
     Duration,
     FlexiblePoint,
     FlexibleTrajectory,
-    JointState,
     JointTrajectory,
     JointTrajectoryPoint,
     MotionTask,
@@ -343,14 +342,3 @@ def _flexible_points(n: int, samples: Samples,
                       torque_costates=torques)
         for displacements, rates, positions, velocities, torques in zip(
             *map(_rows, columns), strict=True)])
-
-
-def reference_state(plan: Plan, samples: Samples, k: int, names: Sequence[str],
-                    stamp_ns: int) -> JointState:
-    """Return one sample as a JointState: joints and modal coordinates, with the torque."""
-    torque = np.concatenate([samples.torques[k], np.zeros(plan.arm.n_passive)])
-    message = JointState(name=list(names), position=samples.coordinates[k].tolist(),
-                         velocity=samples.rates[k].tolist(), effort=torque.tolist())
-    stamp = duration_message(stamp_ns)
-    message.header.stamp.sec, message.header.stamp.nanosec = stamp.sec, stamp.nanosec
-    return message

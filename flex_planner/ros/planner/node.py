@@ -51,7 +51,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 
-_STOP_TIMEOUT = 0.5
+_STOP_TIMEOUT, _RECORDING_TIMEOUT = 0.5, 1.0  # [s]
 _LOG_PERIOD = 1.0  # [s], of plans that replace others, many a second
 _SWITCH_INTERVAL = 5e-4  # [s], the solver hands over to callbacks that soon where it can
 
@@ -171,8 +171,10 @@ class PlannerNode(Node):  # type: ignore[misc]
 
     async def _conclude(self, pending: PendingRequest, task: MotionTask) -> Outcome:
         """Return the outcome of a request; an exception here would end the node."""
+        record = None
         try:
             outcome: Outcome = await pending.future
+            record = outcome.record
             if task.publish and outcome.publishable:
                 outcome = await self._hand_over(outcome, pending, task)
         except Exception as error:
@@ -180,6 +182,8 @@ class PlannerNode(Node):  # type: ignore[misc]
                 printable(f'a request failed: {type(error).__name__}: {error}'))
             outcome = unknown_failure(error)
         pending.is_open = False
+        if record is not None:
+            record()
         self._record.add(outcome.report)
         self._log(outcome)
         return outcome
@@ -198,6 +202,8 @@ class PlannerNode(Node):  # type: ignore[misc]
             return outcome
         state.report(replace(state.progress, phase='carrying out the plan'))
         track = self._topics.track(outcome)
+        if outcome.record is not None:  # to carry it out takes seconds
+            outcome.record()
         pending.execution = self._controller.start(
             self._topics.trajectory(outcome, track), state.settings.execute_timeout, self.executor,
             lambda: self._topics.publish(outcome, state.settings, track),
@@ -247,6 +253,7 @@ class PlannerNode(Node):  # type: ignore[misc]
         self._motions.close()
         if not self._queue.close(_STOP_TIMEOUT):
             self._planner.abandon()
+        self._planner.close(_RECORDING_TIMEOUT)
         # or the node would go on within them: others would hear of it until its lease is over, and
         # its shared memory would stay for good
         for endpoint in self._endpoints:

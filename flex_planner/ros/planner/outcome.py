@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from flex_planner.base.progress import StopReason
@@ -35,6 +36,8 @@ class Outcome:
         When the motion begins, by the clock of the node; 0: when it is published [ns].
     replaces : str
         Identifier of the plan that it replaces; empty if it is a motion of its own.
+    record : callable or None
+        Has it recorded, once it is published; None where that is done.
 
     """
 
@@ -46,6 +49,7 @@ class Outcome:
     search: PayloadSearch | None = None
     start_ns: int = 0
     replaces: str = ''
+    record: Callable[[], None] | None = None
 
     @property
     def publishable(self) -> bool:

@@ -29,7 +29,7 @@ from flex_planner.recording import (
 )
 from flex_planner.ros.messages.classes import MotionTask, PlanReport, TYPES
 from flex_planner.ros.messages.feedback import feedback_message
-from flex_planner.ros.messages.plans import reference_state
+from flex_planner.ros.messages.reference_states import encode_states
 from flex_planner.ros.planner.outcome import Outcome
 from flex_planner.ros.planner.request_state import RequestState
 from flex_planner.ros.recorded_motion import in_order, RecordedMotion
@@ -64,6 +64,7 @@ class OutcomeRecorder:
 
     def __init__(self, arm: Arm, names: str | Callable[[str], str]) -> None:
         self._arm = arm
+        self._described: tuple[PlannerSettings, str] | None = None  # and as YAML
 
         def name(topic: str) -> str:
             return f'{names}/{topic}' if isinstance(names, str) else names(f'~/{topic}')
@@ -80,7 +81,23 @@ class OutcomeRecorder:
         self._gains = Topic(name('feedback_gains'), f'{interfaces}FeedbackGains', LATCHED)
         self._states = Topic(name('reference_states'), JOINT_STATE, DEFAULT)
 
-    def write(self, task: MotionTask, state: RequestState, outcome: Outcome) -> Path:
+    def find_place(self, state: RequestState, outcome: Outcome) -> Path:
+        """
+        Return a folder for the recording of a request, and enter it into the report.
+
+        Parameters
+        ----------
+        state, outcome : RequestState, Outcome
+            As of `write`.
+
+        """
+        kind = 'plan_path' if outcome.search is None else 'find_max_payload'
+        path = state.settings.output_folder() / self._name(state.stamp_ns, kind)
+        outcome.report.recording = printable(str(path))
+        return path
+
+    def write(self, task: MotionTask, state: RequestState, outcome: Outcome,
+              place: Path | None = None) -> Path:
         """
         Write a recording and return its folder.
 
@@ -94,6 +111,8 @@ class OutcomeRecorder:
         outcome : Outcome
             Of the request; the recording's path is entered into the report. A search for the
             maximum payload gives the folder another name.
+        place : Path, optional
+            From `find_place`, if that was called before.
 
         Raises
         ------
@@ -103,9 +122,7 @@ class OutcomeRecorder:
         """
         settings, stamp, report = state.settings, state.stamp_ns, outcome.report
         ready = stamp + report.planning_time.sec * 10**9 + report.planning_time.nanosec
-        path = settings.output_folder() / self._name(
-            stamp, 'plan_path' if outcome.search is None else 'find_max_payload')
-        report.recording = printable(str(path))
+        path = place or self.find_place(state, outcome)
         with Recording.create(path.parent, path.name, TYPES,
                               custom_data={'flex_planner': VERSION},
                               max_bytes=settings.max_recording_size or None) as recording:
@@ -185,13 +202,12 @@ class OutcomeRecorder:
                       reference: SampledPlan, ready: int) -> None:
         """Write the samples of a plan that is ready at a time [ns]."""
         names = [*state.settings.joint_names, *plan.arm.passive_names]
-        for k, passed in enumerate(reference.times_ns):
+        stamps, definition = reference.times_ns + ready, TYPES.definition(JOINT_STATE)
+        encoded = encode_states(reference.samples, names, stamps)
+        for k, (stamp, data) in enumerate(zip(stamps.tolist(), encoded, strict=True)):
             if state.stopping():
-                raise RecordingError(f'writing stopped after {k} of {len(reference.times_ns)} '
-                                     'samples')
-            stamp = ready + int(passed)
-            message = reference_state(plan, reference.samples, k, names, stamp)
-            recording.write(self._states, message, stamp)
+                raise RecordingError(f'writing stopped after {k} of {len(stamps)} samples')
+            recording.copy(self._states, definition, data, stamp)
 
     def _name(self, stamp: int, kind: str) -> str:
         """Return a name that sorts by kind and time and is not used twice."""
@@ -199,9 +215,12 @@ class OutcomeRecorder:
         return f'{kind}_{moment:%Y%m%dT%H%M%S}_{stamp % 10**9:09d}_{next(self._numbers):04d}'
 
     def _scenario(self, settings: PlannerSettings) -> str:
-        """Return arm and parameters as YAML."""
-        return format_yaml({'arm': plain_arm(self._arm),
-                            'parameters': dict(as_mapping(settings))})
+        """Return arm and parameters as YAML, which takes longer than all else of a recording."""
+        known = self._described
+        if known is None or known[0] != settings:
+            known = self._described = settings, format_yaml(
+                {'arm': plain_arm(self._arm), 'parameters': dict(as_mapping(settings))})
+        return known[1]
 
 
 def _remove_old(settings: PlannerSettings, newest: Path) -> None:

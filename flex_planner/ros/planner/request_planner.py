@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import replace
 import logging
 from pathlib import Path
@@ -48,6 +49,7 @@ from flex_planner.ros.messages.spaces import add_space
 from flex_planner.ros.messages.times import time_ns
 from flex_planner.ros.messages.trajectory_rules import trajectory_violations
 from flex_planner.ros.planner.arm_state import ArmState
+from flex_planner.ros.planner.late_recorder import LateRecorder, once
 from flex_planner.ros.planner.map_starts import Starts
 from flex_planner.ros.planner.outcome import (
     enter_times,
@@ -101,6 +103,7 @@ class RequestPlanner:
         self._arm_state = arm_state
         self._replanner = replanner or Replanner(RunningPlans(), time.time_ns)
         self._report_in_work: PlanReport | None = None
+        self._late = LateRecorder()
 
     def plan(self, message: MotionTask, state: RequestState) -> Outcome:
         """
@@ -165,6 +168,17 @@ class RequestPlanner:
             return replace(outcome, search=search_message(found, options))
 
         return self._conclude(search_payload, request.task, state, search_without_result(request))
+
+    @property
+    def records_later(self) -> bool:
+        """Return whether plans that replace others are recorded after the answer."""
+        return self._late.ready
+
+    def close(self, timeout: float) -> None:
+        """Write what is to be recorded after its answer; what takes longer is lost [s]."""
+        left = self._late.close(timeout)
+        if left:
+            _LOG.error('the planner ends, and the last %d recordings are not written', left)
 
     def abandon(self) -> None:
         """Remove what is left of a recording that another thread had no time to finish."""
@@ -301,9 +315,13 @@ class RequestPlanner:
         given_up = outcome.report.error_code == PlanReport.CANCELED and state.stopping()
         if not state.settings.record or given_up:
             return outcome
+        if (outcome.replaces and outcome.publishable and message.publish
+                and self.records_later and not state.settings.recording_required):
+            return self._record_later(message, state, outcome)
         self._report_in_work = outcome.report
         try:
             path = self._recorder.write(message, state, outcome)
+            self._late.recover()
         except Exception as error:
             expected = isinstance(error, FlexPlannerError)
             _LOG.error('recording failed: %s', error, exc_info=not expected)
@@ -315,6 +333,20 @@ class RequestPlanner:
             self._report_in_work = None
         outcome.report.recording = printable(str(path))
         return outcome
+
+    def _record_later(self, message: MotionTask, state: RequestState,
+                      outcome: Outcome) -> Outcome:
+        """Return an outcome that an arm in motion waits for, which is recorded afterwards."""
+        place = self._recorder.find_place(state, outcome)
+        # that the node ends does not keep it from being written
+        patient = replace(state, stopping=lambda: False)
+
+        def record() -> None:
+            # what is entered later, such as how it was carried out, is recorded elsewhere
+            known = replace(outcome, report=copy(outcome.report))
+            self._late.add(lambda: self._recorder.write(message, patient, known, place))
+
+        return replace(outcome, record=once(record))
 
 
 def _say_not_recorded(report: PlanReport, failure: str, warning: str,

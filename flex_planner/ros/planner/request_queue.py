@@ -57,6 +57,8 @@ class PendingRequest:
         """Set the outcome, unless there is one already; from any thread."""
         with self._lock:
             if self.future.done():
+                if outcome.record is not None:  # as nobody else will
+                    outcome.record()
                 return
             self.future.set_result(outcome)
         # a future that another thread completes does not wake the executor by itself

@@ -122,12 +122,15 @@ class RunningPlan:
     def _last(self, new: Track) -> Track:
         """Return the plan just before the new one begins, with its own efforts."""
         at_ns, track = new.begin_ns - _APART_NS, self.track
-        sample = self.plan.sample(max(at_ns - self.begin_ns, 0) * 1e-9)
+        assert self.plan.solution is not None
+        n_t, time = self.plan.arm.n_coordinates, max(at_ns - self.begin_ns, 0) * 1e-9
+        z = self.plan.solution(np.array([time]))
+        control = self.plan.problem.controls(np.array([time]), z)
         effort = np.array([np.interp(at_ns - track.begin_ns, track.times_ns, column)
                            for column in track.efforts.T])
         return Track(begin_ns=at_ns, times_ns=np.zeros(1, dtype=np.int64),
-                     coordinates=sample.coordinates, rates=sample.rates, efforts=effort[None],
-                     accelerations=sample.accelerations, torques=sample.torques)
+                     coordinates=z[:, :n_t], rates=z[:, n_t:2 * n_t], efforts=effort[None],
+                     accelerations=control.acceleration, torques=control.torque)
 
 
 class RunningPlans:

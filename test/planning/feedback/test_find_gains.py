@@ -15,12 +15,9 @@ from flex_planner.control.linear_feedback import LinearFeedback, pd_feedback
 from flex_planner.dynamics.arm_dynamics import ArmDynamics
 from flex_planner.dynamics.integration import HeldTorqueIntegrator
 from flex_planner.optimal_control.torque_limits import TorqueLimits
-from flex_planner.planning.execution import Execution, UNSTABLE_GROWTH
-from flex_planner.planning.feedback.differing_arm import (
-    course_of,
-    Difference,
-    DifferingArm,
-)
+from flex_planner.planning.execution import UNSTABLE_GROWTH
+from flex_planner.planning.feedback.carried_motion import CarriedMotion
+from flex_planner.planning.feedback.differing_arm import Difference, DifferingArm
 from flex_planner.planning.feedback.find_gains import (
     find_feedback_gains,
     GainSettings,
@@ -74,8 +71,8 @@ def worst_of(plan: Plan, law: LinearFeedback, difference: Difference) -> float:
 
 def arm_of(plan: Plan, difference: Difference) -> DifferingArm:
     controller = JointController(gains=Gains.of(2, 100.0, 10.0))
-    return DifferingArm.of(Execution.of(plan, controller), plan, course_of(plan, controller),
-                           difference, RESOLUTION)
+    motion = CarriedMotion.of(plan, controller)
+    return DifferingArm.of(motion, motion.course, difference, RESOLUTION)
 
 
 @pytest.mark.parametrize('number', [4, 6])

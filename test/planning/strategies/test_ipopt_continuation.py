@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import islice
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,6 +16,7 @@ from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.direct.ipopt import DirectProblem
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.optimal_control.task import Task
+from flex_planner.optimal_control.totals import integrate_totals
 from flex_planner.planning.plan import PlanStatus
 from flex_planner.planning.strategies.ipopt_continuation import continue_by_ipopt
 import numpy as np
@@ -23,9 +25,9 @@ import pytest
 
 TaskFactory = Callable[..., Task]
 
-# direct collocation on 60 equal intervals of 8 points, at 300 per kg; 4 points on 80 and on 160
-# intervals say 5.6895 and 5.6843, for equal intervals miss the switches
-HEAVIEST, MISSED = 5.6858, 4e-3
+# by Newton's method at a rising price: this much is carried, and no more of this kind. IPOPT says
+# 5.68735 with nodes on the switches, and scatters by 4e-3 on equal intervals, which miss them
+CARRIED, TOO_MUCH = 5.68735, 5.68795
 ACCURACY = 1e-3
 
 
@@ -37,16 +39,28 @@ def problem(single_mode_arm: Arm, paper_task: TaskFactory) -> MotionProblem:
 
 
 def test_clamped_arm_carries_what_direct_collocation_says(problem: MotionProblem) -> None:
-    found = find_max_payload(problem.task, model=problem.model, accuracy=ACCURACY,
+    found = find_max_payload(problem.task, model=problem.model, accuracy=ACCURACY, search='fast',
                              monitor=Monitor(time_limit=120))
     assert found.solved, found.message
-    assert found.payload == pytest.approx(HEAVIEST, abs=MISSED)
-    assert found.local_upper - found.payload <= ACCURACY
-    assert all(np.diff(found.front.payloads) > 0)
-    assert all(np.diff(found.front.efforts) > 0)
+    assert CARRIED - ACCURACY < found.payload < TOO_MUCH
+    assert CARRIED < found.local_upper <= found.payload + ACCURACY
+    # an estimate, which the words say, too
+    assert found.within_limits and 'seem possible' in found.message
     assert found.plan is not None
     assert found.plan.certificate.tip_error <= 1e-6
     assert tip_miss(found.plan) <= 1e-6
+
+
+def test_ipopt_leads_to_heavier_and_heavier_payloads(problem: MotionProblem) -> None:
+    extremals = list(islice(continue_by_ipopt(problem, 300.0, Solver(), lambda value: ACCURACY),
+                            2))
+    assert [one.result.converged for one in extremals] == [True, True]
+    payloads = [one.value for one in extremals]
+    efforts = [integrate_totals(one.problem, one.result.solution).cost for one in extremals]
+    assert 5.5 < payloads[0] < payloads[1] < TOO_MUCH
+    # the price is what effort rises by: the more, the heavier the payload
+    assert extremals[0].price < np.diff(efforts) / np.diff(payloads) < extremals[1].price
+    assert CARRIED < payloads[1] + extremals[1].gap
 
 
 class Watched(Monitor):

@@ -39,7 +39,6 @@ from flex_planner.ros.messages.plans import (
     flexible_trajectory,
     joint_trajectory,
     planning_time_limit,
-    reference_state,
     report_from_plan,
     STATUS_CODES,
     task_from_message,
@@ -385,15 +384,6 @@ def test_messages_hold_the_samples(plan: Plan, reference: SampledPlan) -> None:
     assert bend.velocity_costates.tolist() == samples.velocity_costates[k].tolist()
     assert (message.tip_path[k].x, message.tip_path[k].y) == tuple(samples.tip[k])
     assert (message.header.frame_id, message.payload_mass) == ('base', 1.0)
-
-
-def test_reference_state_has_joints_and_modes(plan: Plan, reference: SampledPlan) -> None:
-    names = [*NAMES, *plan.arm.passive_names]
-    state = reference_state(plan, reference.samples, 5, names, 1_700_000_000_123_456_789)
-    assert (state.header.stamp.sec, state.header.stamp.nanosec) == (1_700_000_000, 123_456_789)
-    assert state.name == names
-    assert state.position.tolist() == reference.samples.coordinates[5].tolist()
-    assert state.effort.tolist() == [*reference.samples.torques[5], 0, 0, 0, 0]
 
 
 @pytest.mark.parametrize(('nanoseconds', 'expected'), [

@@ -146,6 +146,7 @@ def test_stop_is_carried_out_and_recorded_as_a_failure(chase: Chase) -> None:
         report.error_msg)
     assert 'the arm stops on the path of the plan before' in report.error_msg
     assert report.bending_source == 'ESTIMATE'
+    chase.wait('the recording', Path(report.recording).exists)  # written after the answer
     recorded = RecordedRequest.read(report.recording)
     assert recorded.report.error_code == PlanReport.STOPS
     assert recorded.report.plan_id == report.plan_id
