@@ -191,13 +191,13 @@ LIMITS = """
 ## Random limits on the way
 
 Random arms of two rigid links, and the paper's arm with one mode per link, a random E I of 20 to
-100 N m² and up to 1.5 kg; one or two random limits that the free motion breaks: ranges and speeds of
-joints, posts for the tip or for stations of the links, lines, moments and deflections. IPOPT, with
-a transcription and a model of its own, starts from the free motion, a straight line and the plan,
-on finer meshes where it seems cheaper; it keeps limits at its points only. Tasks that neither
-solves are counted in the third column alone. The slack is that on a grid of 4001 points, a share of
-the limit's scale. CPU times hold the search for other kinds of motion and the first compilation
-of an arm's functions.
+100 N m² and up to 1.5 kg; one or two random limits that the free motion breaks: ranges and speeds
+of joints, posts for the tip or for stations of the links, lines, moments and deflections. IPOPT,
+with a transcription and a model of its own, starts from the free motion, a straight line and the
+plan, on finer meshes where it seems cheaper; it keeps limits at its points only. Tasks that
+neither solves are counted in the third column alone. The slack is that on a grid of 4001 points, a
+share of the limit's scale. CPU times hold the search for other kinds of motion and the first
+compilation of an arm's functions.
 
 {table}
 """

@@ -102,7 +102,8 @@ def table(rows: Sequence[Row]) -> str:
     """Return the rows as a table."""
     return '\n'.join([
         '| arm | search | residual bending [mm] | asked to forgive [mm] | more J | plans more '
-        '| arms | plain, CPU [s] | forgiving [s] | ratio |', '|---|---|---|---|---|---|---|---|---|---|',
+        '| arms | plain, CPU [s] | forgiving [s] | ratio |',
+        '|---|---|---|---|---|---|---|---|---|---|',
         *(f'| `{one.arm}` | {one.search} | {1e3 * one.before:.3g} | {1e3 * one.after:.3g} '
           f'| {100 * one.growth:.2g} % | {one.trials} | {one.arms} | {one.plain:.3f} '
           f'| {one.forgiving:.3f} | {one.forgiving / one.plain:.1f} |' for one in rows)])
