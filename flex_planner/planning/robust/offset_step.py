@@ -62,8 +62,8 @@ class OffsetStep:
     def of(cls, responses: Responses, effort_weights: Array, offset: TorqueOffset) -> OffsetStep:
         """Return the system of a plan with an offset."""
         w, free = offset(responses.times), responses.free.ravel()
-        rows = np.ascontiguousarray(responses.all.transpose(1, 0, 2)).reshape(
-            responses.all.shape[1], -1)
+        rows = np.ascontiguousarray(responses.stacked.transpose(1, 0, 2)).reshape(
+            responses.stacked.shape[1], -1)
         root = free / np.sqrt(np.tile(effort_weights * responses.step, len(w)))
         weighed = rows * root
         return cls(responses=responses, effort_weights=effort_weights, offset=w, rows=rows,

@@ -42,7 +42,7 @@ class Responses:
         Their length [s].
     free : numpy.ndarray, shape (g, n)
         1 where a motor of the plan is between its limits, 0 where it is on one.
-    all : numpy.ndarray, shape (g, (S + 1) 2 n_t, n)
+    stacked : numpy.ndarray, shape (g, (S + 1) 2 n_t, n)
         `differing` over `nominal`.
     misses : numpy.ndarray, shape (S 2 n_t,)
         By how much the states on arrival are off the rest that the controller leads to, in the
@@ -55,7 +55,7 @@ class Responses:
     times: Array
     step: float
     free: Array
-    all: Array
+    stacked: Array
     misses: Array
     roots: Array
 
@@ -70,7 +70,7 @@ class Responses:
         roots = np.stack([_energy_root(arrival) for arrival in arrivals])
         misses = [root @ arrival.away
                   for root, arrival in zip(roots, arrivals, strict=True)]
-        return cls(times=times, step=step, free=free, all=_respond(drives, roots, step),
+        return cls(times=times, step=step, free=free, stacked=_respond(drives, roots, step),
                    misses=np.concatenate(misses), roots=roots)
 
     @property
@@ -81,12 +81,12 @@ class Responses:
         Their squares add up to twice the energy under the controller [sqrt(J)].
 
         """
-        return self.all[:, :self.misses.size]
+        return self.stacked[:, :self.misses.size]
 
     @property
     def nominal(self) -> Array:
         """Return those of the state at the end of the plan, shape (g, 2 n_t, n)."""
-        return self.all[:, self.misses.size:]
+        return self.stacked[:, self.misses.size:]
 
     def states_of(self, misses: Array) -> Array:
         """Return how far arms are from their rest that miss so much (S 2 n_t,), (S, 2 n_t)."""
