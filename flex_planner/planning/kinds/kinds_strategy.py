@@ -33,7 +33,8 @@ from flex_planner.planning.strategies.strategy import Attempt
 
 # kinds that Newton's method is tried from
 _TRIED = 3
-# where a smaller share of the starts leads to a motion, others are asked, too
+# where a smaller share of the starts leads to a motion, and motors are on their limits, others
+# are asked, too
 _SELDOM = 0.25
 _LESS = is_better(Free.NOTHING)
 # a task is out of sight if the heaviest payload found, links included, is less than this share of
@@ -52,7 +53,8 @@ def explore_kinds(problem: MotionProblem, solver: Solver) -> Attempt | None:
         return None
     kinds = find_kinds(bare, Free.NOTHING, starts, solver)
     late = not kinds and is_too_short(rigid, Free.NOTHING, solver)
-    if not late and sum(kind.met for kind in kinds) < _SELDOM * starts:
+    seldom = sum(kind.met for kind in kinds) < _SELDOM * starts
+    if seldom and not late and (not kinds or _reaches_limits(kinds[0])):
         near = cluster(explore_near_limit(rigid, solver), _LESS)
         kinds = reduce(lambda known, kind: merge(known, kind, _LESS), near, kinds)
     attempt = _solve_first(problem, bare, kinds, solver)
@@ -72,6 +74,13 @@ def explore_kinds(problem: MotionProblem, solver: Solver) -> Attempt | None:
                      shortest=find_kinds(bare, Free.DURATION, starts, solver))
     return replace(again, result=replace(again.result, message=limits.sentence),
                    not_found=True, hopeless=limits.hopeless)
+
+
+def _reaches_limits(kind: KindOfMotion) -> bool:
+    """Return whether motors reach their limits; a motion that needs no more is not near one."""
+    motion = kind.motion.solution
+    found = kind.motion.problem.controls(motion.mesh, motion.nodes)
+    return bool((found.torque != found.free_torque).any())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
