@@ -101,9 +101,10 @@ def sampling_settings(options: argparse.Namespace, arm: Arm) -> SamplingSettings
         period = number('--controller-period', period, at_least=0, at_most=MAX_PERIOD, unit='s')
     rate = _rate(options, _RATE)
     known = JointController(gains=default_gains(ArmDynamics.of(arm), rate), rate=rate)
+    controller = given_controller(options, arm, known)
     try:
-        return SamplingSettings(controller=given_controller(options, arm, known),
-                                controller_period=period, start_hold=options.start_hold or 0.0)
+        return SamplingSettings(controller=controller, controller_period=period,
+                                start_hold=options.start_hold or 0.0)
     except InvalidValueError as error:
         raise type(error)('--start-hold', error.value, error.bound) from None
 
