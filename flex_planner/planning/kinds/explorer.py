@@ -31,6 +31,8 @@ _STAGES, _LIMIT_INTERVALS, _INTERVALS = 4, 24, 16
 # relative change on a mesh twice as fine up to which a value stands, and the finest mesh
 _STANDS, MOST_INTERVALS = 0.01, 192
 _ITERATIONS, _TOLERANCE, _FINE_TOLERANCE = 100, 1e-4, 1e-6
+# of a least effort on a finer mesh: motions that stand take five to thirty, seldom fifty
+_FINE_ITERATIONS = 60
 # the price of what is free, in units of the largest possible cost by the mass of the links, or by
 # the duration; it goes with R, so that the motion does not depend on it
 _PRICE = 20.0
@@ -183,9 +185,11 @@ class Explorer:
         """Return the programme on a mesh; the first one is for many starts, the others exact."""
         if intervals not in self._directs:
             fine = bool(self._directs)
+            few = fine and self._free is Free.NOTHING
             self._directs[intervals] = DirectProblem(self._problem.model, DirectSettings(
                 scheme='gauss', degree=_STAGES, intervals=intervals, exploring=True,
-                max_iterations=_ITERATIONS, tolerance=_FINE_TOLERANCE if fine else _TOLERANCE))
+                max_iterations=_FINE_ITERATIONS if few else _ITERATIONS,
+                tolerance=_FINE_TOLERANCE if fine else _TOLERANCE))
         return self._directs[intervals]
 
     def _motion(self, found: DirectResult) -> ExploredMotion | None:
