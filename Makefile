@@ -15,7 +15,7 @@ help:
 	@echo '              (make demo ARM=spatial_3r: of an arm in space)'
 	@echo 'make demo-library   plan and draw the same motion with the library alone, without ROS 2'
 	@echo 'make paper    recompute Korayem et al. 2009 and write docs/paper.md (1 to 3 minutes)'
-	@echo 'make test     check the style, run all unit tests and a node test of each kind (12 to 25 minutes)'
+	@echo 'make test     check the style, run all unit tests and a node test of each kind (12 to 20 minutes)'
 	@echo 'make test-thorough   run the other tests: long plans, every node test, every example'
 	@echo 'make setup    only create .venv and build into install/'
 	@echo 'make lint     only check the style'
