@@ -16,7 +16,7 @@ LONGEST = 80  # lines
 
 # what must be among the lines of a script; a new one needs no entry
 EXPECTED = {
-    'allowable_stress.py': ('factor 3: J = 1.175', 'factor 5: J = 1.246', 'factor 2: 4.36 kg'),
+    'allowable_stress.py': ('factor 3: J = 1.175', 'factor 5: J = 1.246', 'factor 2: 4.37 kg'),
     'call_the_node.py': ('service: J = 0.6', 'action: canceled'),
     'controller.py': ('followed: at most 0.',),
     'find_the_payload.py': ('between 5.85', 'dJ/dm_p'),
