@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from factories import PlanFactory, TaskFactory
+from flex_planner.arms.arm import Arm, Joint, Link, Motor
 from flex_planner.base.progress import Monitor
 from flex_planner.collocation import Solver, SolverStatus
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.motion_problem import MotionProblem
+from flex_planner.optimal_control.task import Task
 from flex_planner.optimal_control.totals import integrate_totals
+from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.strategies.catalogue import CATALOGUE, order_strategies
 from flex_planner.planning.strategies.strategy import Strategy
 import numpy as np
@@ -66,3 +69,18 @@ def test_what_rings_many_times_under_gravity_starts_from_the_rigid_motion(
     assert ordered[2:] == list(CATALOGUE[2:])
     alone = order_strategies(problem, Solver(), CATALOGUE[:1])
     assert alone == [BY_NAME['cold start']]
+
+
+def test_rigid_chains_go_to_direct_collocation_before_kinds_of_motion() -> None:
+    # from a straight line Newton's method fails, and six of sixteen starts lead to a motion
+    joints = (Joint(motor=Motor(stall_torque=1e3)), Joint(), Joint(), Joint())
+    arm = Arm(name='chain', links=(Link(length=0.5, linear_density=6.0),) * 4, joints=joints)
+    start = np.resize([0.5, -0.8], 4)
+    task = Task(arm=arm, start_positions=start, goal_positions=start + 0.6, duration=2.0,
+                payload_mass=1.0)
+    ordered = order_strategies(problem_of(ArmModel(arm), task), Solver(), CATALOGUE)
+    names = [each.name for each in ordered]
+    assert names.index('direct collocation') == names.index('kinds of motion') - 1
+    assert set(ordered) == set(CATALOGUE)
+    plan = plan_path(task, search='fast')
+    assert (plan.solved, plan.strategy) == (True, 'direct collocation'), plan.message
