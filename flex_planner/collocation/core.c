@@ -19,8 +19,9 @@
 #include <time.h>
 
 /*
- * Of what GCC has at -O3, this is all that makes loops of fixed size faster: with -O2 it takes half
- * the time to compile, and exact stages of middling size are faster than with -O3. Clang has it.
+ * Of what GCC has at -O3, this is all that makes loops of fixed size faster. With -O2 it takes 50 to
+ * 90 % of the time to compile. Exact stages of 12 to 16 unknowns are faster than with -O3, those of
+ * 24 and 48 a tenth slower. Clang has it at -O2.
  */
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC optimize("vect-cost-model=dynamic", "peel-loops", "tree-partial-pre")

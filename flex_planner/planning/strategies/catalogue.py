@@ -82,9 +82,10 @@ def order_strategies(problem: MotionProblem, solver: Solver,
 
 
 def _ahead(strategies: list[Strategy], first: Strategy, second: Strategy) -> list[Strategy]:
-    """Return strategies with one of them moved ahead of another, if both are among them."""
+    """Return strategies with one of them moved ahead of another, if it comes after that."""
     if first not in strategies or second not in strategies:
         return strategies
-    others = [each for each in strategies if each is not first]
-    at = others.index(second)
-    return [*others[:at], first, *others[at:]]
+    at, after = strategies.index(second), strategies.index(first)
+    if after < at:
+        return strategies
+    return [*strategies[:at], first, *strategies[at:after], *strategies[after + 1:]]

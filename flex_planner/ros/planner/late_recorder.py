@@ -41,11 +41,14 @@ class LateRecorder:
         self._failed = False
 
     def add(self, write: _Write) -> None:
-        """Have a recording written after those before it; `write` may raise."""
+        """Have a recording written after those before it; `write` may raise. Lost once closed."""
         with self._changed:
+            if self._closed:
+                _LOG.error('the planner ends, and a recording after the answer is not written')
+                return
             self._waiting.append(write)
             self._changed.notify()
-            if self._thread is None and not self._closed:
+            if self._thread is None:
                 self._thread = threading.Thread(target=self._run, name='recorder', daemon=True)
                 self._thread.start()
 

@@ -82,5 +82,8 @@ def test_rigid_chains_go_to_direct_collocation_before_kinds_of_motion() -> None:
     names = [each.name for each in ordered]
     assert names.index('direct collocation') == names.index('kinds of motion') - 1
     assert set(ordered) == set(CATALOGUE)
+    # who wants another order has it
+    other = CATALOGUE[::-1]
+    assert order_strategies(problem_of(ArmModel(arm), task), Solver(), other) == list(other)
     plan = plan_path(task, search='fast')
     assert (plan.solved, plan.strategy) == (True, 'direct collocation'), plan.message

@@ -68,6 +68,14 @@ def test_there_is_room_for_some_and_not_for_more() -> None:
     assert recorder.close(10) == 0
 
 
+def test_what_comes_after_the_end_is_told_as_lost(caplog: pytest.LogCaptureFixture) -> None:
+    recorder, written = LateRecorder(), list[int]()
+    assert recorder.close(1) == 0
+    recorder.add(lambda: written.append(1))
+    assert 'a recording after the answer is not written' in caplog.text
+    assert (recorder.close(1), written) == (0, [])
+
+
 def test_once_is_once() -> None:
     calls = list[int]()
     call = once(lambda: calls.append(1))
