@@ -74,9 +74,9 @@ def turn(arm: Arm, modal_weight: float = 0.0) -> Task:
                 duration=duration, velocity_weights=weights, tolerance=EPSILON)
 
 
-def find_largest(task: Task, accuracy: float = 1e-3) -> MaxPayload:
+def find_largest(task: Task) -> MaxPayload:
     """
-    Return the largest payload of a task, to an accuracy [kg].
+    Return the largest payload of a task.
 
     Raises
     ------
@@ -84,7 +84,7 @@ def find_largest(task: Task, accuracy: float = 1e-3) -> MaxPayload:
         If it is not found.
 
     """
-    return require_solved(find_max_payload(task, accuracy=accuracy))
+    return require_solved(find_max_payload(task))
 
 
 def require_solved(found: MaxPayload) -> MaxPayload:

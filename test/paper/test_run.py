@@ -112,6 +112,13 @@ def test_independent_method_agrees_in_every_section(run: Run) -> None:
             float(row[2]), abs=2e-3)
 
 
+def test_clamped_links_carry_less_if_they_are_soft() -> None:
+    section = STUDIES['6.2']()  # the reduced run leaves these searches out
+    assert section.values['clamped_limit_50'] == pytest.approx(5.687, abs=1e-3)
+    assert section.values['clamped_limit_5'] == pytest.approx(3.128, abs=1e-3)
+    assert [claim.verdict for claim in section.claims] == [Verdict.CORRECTED]
+
+
 def test_statements_that_a_number_decides(run: Run) -> None:
     verdicts = {claim.said: claim.verdict for section in run.sections.values()
                 for claim in section.claims}

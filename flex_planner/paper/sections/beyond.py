@@ -26,8 +26,6 @@ import numpy as np
 _GRID = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0, 5.5)  # [kg]
 _DURATIONS: Array = np.linspace(1.4, 0.7, 15, dtype=np.float64)  # [s]
 _SOFT = 5.0  # [N m^2]
-# dozens of switches at the limit: the last grams of the bracket take longest
-_CLAMPED_ACCURACY = 5e-3  # [kg]
 _HARDLY, _FEW = 0.98, 1e-3
 _MODES = (ExecutionMode.FLEXIBLE_OPEN, ExecutionMode.RIGID_OPEN, ExecutionMode.FLEXIBLE,
           ExecutionMode.RIGID, ExecutionMode.PD_ONLY)
@@ -84,8 +82,8 @@ def clamped_links(*, reduced: bool = False) -> Section:
         rigidity for rigidity in STIFFNESS_LIMITS if not math.isinf(rigidity))
     pinned = {rigidity: find_largest(point_to_point(paper_arm(rigidity, 1), 1.0))
               for rigidity in rigidities}
-    built_in = {rigidity: find_largest(point_to_point(paper_arm(rigidity, 1, 'clamped_free'), 1.0),
-                                       _CLAMPED_ACCURACY) for rigidity in rigidities}
+    built_in = {rigidity: find_largest(point_to_point(paper_arm(rigidity, 1, 'clamped_free'), 1.0))
+                for rigidity in rigidities}
     light = plan_certified(point_to_point(paper_arm(50.0, 1, 'clamped_free'), 1.0))
     rows = tuple((f'{rigidity:g}', f'{STIFFNESS_LIMITS[rigidity]:g}',
                   f'{pinned[rigidity].payload:.4f}',
@@ -97,15 +95,16 @@ def clamped_links(*, reduced: bool = False) -> Section:
         key='6.2', title='Beyond the paper: clamped links',
         text='Pinned-pinned shapes keep the tip on the chord, and leave out the work of the '
         'torque on the slope at the hub. Clamped-free shapes do neither. One mode per link; two '
-        'modes are not solved at the limit.',
+        'modes are not solved at the limit. The softer links would bend by more than 0.3 of their '
+        'length, beyond which their shapes do not hold: the payload ends where they bend so far.',
         tables=(Table(title='Table V with both kinds of shapes', rows=rows, header=(
             'EI [N m^2]', 'paper [kg]', 'pinned-pinned [kg]', 'clamped-free [kg]')),)
         if rows else (),
         claims=(Claim(
             said='Flexibility hardly changes what the arm carries (Table V).',
             found='With links of 5 N m^2 clamped to their hubs the arm carries '
-            f'{built_in[_SOFT].payload:.2f} kg, not {pinned[_SOFT].payload:.2f} kg. What Table V '
-            'shows is a property of the shapes.', verdict=judge(
+            f'{built_in[_SOFT].payload:.2f} kg within what its shapes hold, not '
+            f'{pinned[_SOFT].payload:.2f} kg. What Table V shows is a property of the shapes.', verdict=judge(
                 built_in[_SOFT].payload > _HARDLY * pinned[_SOFT].payload)),) if rows else (),
         values=values)
 

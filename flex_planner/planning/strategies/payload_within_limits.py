@@ -42,9 +42,12 @@ _TOLERANCE, _PATIENCE = 1e-3, 80
 _ENOUGH = 0.01
 # where Newton's method goes on without slacks and multipliers
 _SETTLED = 1e-6
-# mu from which it falls on a finer mesh, by that at last; iterations to come to it; meshes that
-# are tried, and the share of the accuracy by which the payload may differ on the last two
-_RAISED, _RAISING, _FINER, _STANDS = 1e3, 40, 3, 0.25
+# mu from which it falls on a finer mesh, by that at last, one after the other, and at most by that
+# at first, from which there may be no way; iterations to come to it
+_RAISED, _HIGHEST, _RAISING = (1e3, 30.0), 0.01, 40
+# meshes that are tried, and the share of the accuracy by which the payload may differ on the last
+# two
+_FINER, _STANDS = 3, 0.25
 
 
 def find_largest_payload(problem: MotionProblem, slacks: PathSlacks,
@@ -191,20 +194,28 @@ def _refine(problem: MotionProblem, slacks: PathSlacks, reached: ReachedLimit,
 
     """
     assert reached.met is not None
-    (barrier, both), old = _barriers(problem, slacks), reached.met
+    (barrier, both), highest = _barriers(problem, slacks), _HIGHEST * _first_mu(problem)
+    for raised in sorted({min(share * reached.met.mu, highest) for share in _RAISED},
+                         reverse=True):
+        try:
+            met = _follow_from(raised, both, reached.met, solver)
+        except FlexPlannerError:  # a payload that no equilibrium carries
+            continue
+        if met is not None and met.converged:
+            return _reached(barrier, met, both.free)
+    return None
+
+
+def _follow_from(raised: float, both: PathBarrier, old: BarrierOutcome,
+                 solver: Solver) -> BarrierOutcome | None:
+    """Return where mu ends that is raised on a finer mesh, and falls to what it was."""
     limits = (old.y.shape[-1] - both.free) // 2
-    schedule = BarrierSchedule(first=_RAISED * old.mu, last=old.mu, tolerance=_TOLERANCE,
+    schedule = BarrierSchedule(first=raised, last=old.mu, tolerance=_TOLERANCE,
                                max_iterations=_PATIENCE)
-    try:
-        raised = settle(both, schedule.first, old, solver.monitor, patience=_RAISING)
-        halves = cut_mesh(both, raised.solution, raised.y, raised.solution.steps > 0)
-        met = _follow(both, *halves, schedule, solver, limits)
-        if met is None:
-            return None
-        met = settle(both, old.mu, met, solver.monitor, _SETTLED)
-    except FlexPlannerError:  # a payload that no equilibrium carries
-        return None
-    return _reached(barrier, met, both.free) if met.converged else None
+    start = settle(both, raised, old, solver.monitor, patience=_RAISING)
+    halves = cut_mesh(both, start.solution, start.y, start.solution.steps > 0)
+    met = _follow(both, *halves, schedule, solver, limits)
+    return None if met is None else settle(both, old.mu, met, solver.monitor, _SETTLED)
 
 
 def _is_reachable(problem: MotionProblem, solver: Solver) -> bool:

@@ -30,7 +30,7 @@ CARRIED, TOO_MUCH = 5.68735, 5.68795
 # EI 5 within a deflection of 0.3 of a link's length, where no bending limit leaves 3.3745 to
 # 3.3753: by the same method on 162 and on 324 intervals, 3.12815 and 3.12807
 SOFT = 3.1281
-ACCURACY = 1e-3
+ACCURACY, LOOSE = 1e-3, 2e-2
 
 
 @cache
@@ -84,6 +84,18 @@ def test_soft_links_are_reached_from_stiffer_ones() -> None:
     assert found.value == pytest.approx(SOFT, abs=1e-2)  # on the first mesh
     values = slacks(found.motion.nodes[:, problem.layout.states])
     assert -1e-4 < values.min() < 1e-3  # bent as far as it may
+
+
+def test_mesh_is_made_finer_for_an_accuracy_that_is_soon_reached() -> None:
+    # mu ends so high there that a thousand times as much is more than it began with
+    problem, slacks = clamped(5.0)
+    coarse = reach_from_easier_arm(problem, slacks, Solver(), LOOSE)
+    assert coarse is not None
+    fine = refine_limit(problem, slacks, coarse, Solver(), LOOSE)
+    assert fine is not None
+    assert fine.motion.intervals > coarse.motion.intervals
+    assert fine.value <= SOFT + ACCURACY <= fine.value + fine.gap + 2 * ACCURACY
+    assert fine.gap <= LOOSE
 
 
 def test_arm_that_is_easier_ends_as_the_arm_itself() -> None:
