@@ -104,7 +104,8 @@ def clamped_links(*, reduced: bool = False) -> Section:
             said='Flexibility hardly changes what the arm carries (Table V).',
             found='With links of 5 N m^2 clamped to their hubs the arm carries '
             f'{built_in[_SOFT].payload:.2f} kg within what its shapes hold, not '
-            f'{pinned[_SOFT].payload:.2f} kg. What Table V shows is a property of the shapes.', verdict=judge(
+            f'{pinned[_SOFT].payload:.2f} kg. What Table V shows is a property of the shapes.',
+            verdict=judge(
                 built_in[_SOFT].payload > _HARDLY * pinned[_SOFT].payload)),) if rows else (),
         values=values)
 
