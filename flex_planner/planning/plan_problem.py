@@ -30,7 +30,7 @@ from flex_planner.planning.strategies.via_times import (
     TimedMotion,
 )
 from flex_planner.planning.verdict import judge
-from flex_planner.planning.warnings import find_arm_warnings
+from flex_planner.planning.warnings import bends_at_once, find_arm_warnings, warn_of_price
 
 INTERRUPTED_STATUS = {SolverStatus.TIMEOUT: PlanStatus.TIMEOUT,
                       SolverStatus.CANCELED: PlanStatus.CANCELED}
@@ -73,13 +73,19 @@ def plan_problem(problem: MotionProblem, solver: Solver,
         elif free_times(problem.task.via_points):
             problem, strategy, attempt = _solve_at_via_times(problem, solver, strategies, tried)
         else:
-            strategy, attempt = try_strategies(problem, solver, strategies, tried)
+            strategy, attempt = try_strategies(problem, solver, strategies, tried,
+                                               substitutes=bends_at_once(problem.task.arm))
+            if attempt.substitute is not None:
+                problem = attempt.substitute.problem
         plan = _conclude(problem, strategy, attempt, solver)
         if (effort.explores and strategy != WARM_START and plan.solution is not None
                 and not problem.junctions.size  # kinds are looked for without via points
                 and plan.status not in STOP_STATUS.values()
                 and plan.cost > 0):  # nothing is cheaper than nothing
             plan = _look_for_cheaper(plan, attempt, solver, effort)
+        if attempt.substitute is not None:
+            priced = warn_of_price(plan.task.velocity_weights)
+            plan = replace(plan, warnings=(*plan.warnings, priced))
     except StoppedError as error:
         plan = Plan(task=problem.task, status=STOP_STATUS[error.reason], message=str(error),
                     strategy='', problem=problem, solution=None)

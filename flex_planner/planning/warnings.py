@@ -48,6 +48,7 @@ class WarningKind(Enum):
     TIP_NEAR_BASE = 'the tip comes near the base'
     LINKS_OVERLAP = 'links overlap'
     STIFF_LINKS = 'links or joints too stiff to vibrate with the motion'
+    PRICE_ON_BENDING = 'a price on the speed of bending that was not asked for'
     JOINT_WITHOUT_INERTIA = 'clamped link on a joint without inertia'
     MODE_FAMILY_ASSUMED = 'a link does not say how it is fixed'
     TOO_FEW_MODES = 'too few modes'
@@ -109,6 +110,21 @@ def find_arm_warnings(arm: Arm) -> tuple[PlanWarning, ...]:
     """Return what is to be known of an arm before any motion; a hint where planning fails."""
     found = (check(arm) for check in (_joints_without_inertia, _assumed_families))
     return tuple(one for one in found if one is not None)
+
+
+def bends_at_once(arm: Arm) -> bool:
+    """Return whether the torque of a motor meets a bending link before it meets any inertia."""
+    return _joints_without_inertia(arm) is not None
+
+
+def warn_of_price(weights: Array) -> PlanWarning:
+    """Warn that a plan has velocity_weights (n_t,) that were not asked for."""
+    shown = ', '.join(f'{weight:.3g}' for weight in weights)
+    return PlanWarning(kind=WarningKind.PRICE_ON_BENDING, value=float(weights.max()), sentence=(
+        'without a price on the speed of bending no motion was found: links that ring cost nothing '
+        'here, and motions that ring more and more are hardly dearer or a little cheaper. This '
+        f'plan is that of the task with velocity_weights of {shown}, the least with which '
+        'a motion was found; inertia of the joints or damping of the links makes do without'))
 
 
 def _joints_without_inertia(arm: Arm) -> PlanWarning | None:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from flex_planner.collocation import Solver
 from flex_planner.optimal_control.motion_problem import MotionProblem
 from flex_planner.planning.kinds.kinds_strategy import explore_kinds
+from flex_planner.planning.strategies.calm_links import calm_links
 from flex_planner.planning.strategies.friction_homotopy import sharpen_friction
 from flex_planner.planning.strategies.homotopies import (
     lower_vibration_price,
@@ -37,6 +38,7 @@ _SEVERAL = 3
 
 BARRIER = (Strategy('interior point', pass_barrier),
            Strategy('interior point from the rigid motion', pass_barrier_from_rigid))
+CALM = Strategy('homotopy in a price on bending', calm_links, cost=0.25)
 COLD_START = Strategy('cold start', cold_start, quick=True)
 RIGID_FIRST = Strategy('rigid motion first', lift_rigid_motion, quick=True)
 KINDS = Strategy('kinds of motion', explore_kinds, cost=0.0)
@@ -49,6 +51,7 @@ CATALOGUE: tuple[Strategy, ...] = (
     Strategy('homotopy in via points', move_via_points, quick=True),
     Strategy('homotopy in Coulomb friction', sharpen_friction, quick=True, cost=0.25),
     *BARRIER,
+    CALM,
     Strategy('homotopy in vibration weights', lower_vibration_price),
     Strategy('homotopy in stiffness', soften_links),
     KINDS,

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+from flex_planner.base.validation import Array
 from flex_planner.collocation import (
     CollocationResult,
     CollocationSolution,
@@ -130,12 +131,18 @@ def soften_links(problem: MotionProblem, solver: Solver) -> Attempt | None:
                                           first_step=1 / _DECADES))
 
 
+def bending_masses(problem: MotionProblem) -> Array:
+    """Return the masses that move with the bending at the start, shape (n_t,); 0 for joints."""
+    n = problem.model.arm.n_joints
+    masses: Array = np.diag(problem.model.mass_and_energy(
+        problem.start[None], problem.parameters.physical)[0][0]).copy()
+    masses[:n] = 0.0
+    return masses
+
+
 def _calm(problem: MotionProblem) -> Callable[[float], MotionProblem]:
     """Return the problem with a price on the kinetic energy of bending, falling to none."""
-    n = problem.model.arm.n_joints
-    mass = np.diag(problem.model.mass_and_energy(
-        problem.start[None], problem.parameters.physical)[0][0])
-    added = np.concatenate([np.zeros(n), mass[n:]])
+    added = bending_masses(problem)
 
     def at(share: float) -> MotionProblem:
         price = _CALM * 10.0 ** (-_DECADES * share) if share < 1 else 0.0

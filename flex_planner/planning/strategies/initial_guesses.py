@@ -61,7 +61,7 @@ def lift_rigid_motion(problem: MotionProblem, solver: Solver) -> Attempt | None:
     such a mesh fails, a finer one is tried.
 
     """
-    motion = _solve_rigid(problem, solver)
+    motion = solve_rigid(problem, solver)
     if motion is None or not motion.converged:
         return None if motion is None else Attempt(result=motion)
     fewest, settings = problem.fewest_intervals(solver.settings.stages), solver.settings
@@ -76,7 +76,7 @@ def lift_rigid_motion(problem: MotionProblem, solver: Solver) -> Attempt | None:
     return Attempt(result=result)
 
 
-def _solve_rigid(problem: MotionProblem, solver: Solver) -> CollocationResult | None:
+def solve_rigid(problem: MotionProblem, solver: Solver) -> CollocationResult | None:
     """
     Return the cheaper of two motions of the same arm made rigid, or the failure of the first.
 
@@ -174,7 +174,7 @@ def direct_collocation(problem: MotionProblem, solver: Solver) -> Attempt | None
     direct = DirectProblem(problem.model, DirectSettings(
         scheme='gauss', degree=_DIRECT_STAGES, intervals=intervals, tolerance=1e-6,
         max_iterations=_DIRECT_ITERATIONS), rates=TorqueRates.of(problem))
-    rigid = None if problem.layout.torques else _solve_rigid(problem, solver)
+    rigid = None if problem.layout.torques else solve_rigid(problem, solver)
     guess = lift(problem, rigid.solution, solver) if rigid and rigid.converged else None
     found = direct.solve(problem.parameters, problem.start, problem.goal,
                          problem.task.duration, guess=guess, monitor=solver.monitor)

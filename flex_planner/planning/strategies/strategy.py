@@ -11,6 +11,24 @@ from flex_planner.planning.kinds.clusters import KindOfMotion
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Substitute:
+    """
+    A motion of a task that differs in its weights, for want of the one that was asked for.
+
+    Attributes
+    ----------
+    problem : MotionProblem
+        With those weights.
+    result : CollocationResult
+        Its solution.
+
+    """
+
+    problem: MotionProblem
+    result: CollocationResult
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Attempt:
     """
     The outcome of a strategy.
@@ -27,6 +45,8 @@ class Attempt:
         Whether many starts led to no motion that could do the task.
     hopeless : bool
         Whether what was found instead speaks against trying on.
+    substitute : Substitute or None
+        What was solved instead, for use where nothing else solves the task.
 
     """
 
@@ -35,6 +55,7 @@ class Attempt:
     starts: int = 1
     not_found: bool = False
     hopeless: bool = False
+    substitute: Substitute | None = None
 
     @property
     def decides(self) -> bool:

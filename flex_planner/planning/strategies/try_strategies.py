@@ -42,7 +42,8 @@ class TriedStrategy:
 
 
 def try_strategies(problem: MotionProblem, solver: Solver, strategies: Sequence[Strategy],
-                   tried: list[TriedStrategy]) -> tuple[str, Attempt]:
+                   tried: list[TriedStrategy], *,
+                   substitutes: bool = False) -> tuple[str, Attempt]:
     """
     Try the strategies in order; report the first that decides it, or all failures.
 
@@ -59,6 +60,8 @@ def try_strategies(problem: MotionProblem, solver: Solver, strategies: Sequence[
         In their order.
     tried : list of TriedStrategy
         Grows by those that were tried.
+    substitutes : bool
+        Whether a motion of a task with other weights will do.
 
     """
     failures: dict[str, str] = {}
@@ -75,6 +78,8 @@ def try_strategies(problem: MotionProblem, solver: Solver, strategies: Sequence[
             last = attempt
             if attempt.decides:
                 return strategy.name, attempt
+            if attempt.substitute is not None and substitutes:
+                return strategy.name, replace(attempt, result=attempt.substitute.result)
             failures[strategy.name] = attempt.result.message
             not_found = not_found or attempt.not_found
         strategies = cut_off
