@@ -60,6 +60,16 @@ def encode_flexible_trajectory(message: FlexibleTrajectory) -> bytes:
         return TYPES.encode(FLEXIBLE_TRAJECTORY, message)
 
 
+def encode_joint_points(empty: JointTrajectory, times_ns: NDArray[np.int64], positions: Array,
+                        velocities: Array, accelerations: Array, efforts: Array) -> bytes:
+    """Return a trajectory in CDR with points, at least one, of `joint_points` of these arrays."""
+    times = np.stack(np.divmod(times_ns, 10**9), axis=1)
+    data = _Data()
+    data.add_joints(empty, dict(zip(
+        _JOINTS, (positions, velocities, accelerations, efforts, times), strict=True)))
+    return data.padded()
+
+
 class _Data:
     """A message as it grows: little endian, numbers at multiples of their sizes after 4 bytes."""
 
@@ -110,10 +120,22 @@ class _Data:
         self.add('I', len(points))
         if not len(points):
             return
-        columns = {name: _times(points) if name == _TIME else _column(points, name)
-                   for name in fields}
-        sizes = tuple((name, -1 if name == _TIME else columns[name].shape[1]) for name in fields)
-        self._bytes += b''.join(_rows(columns, sizes, len(self._bytes) % 8, len(points)))
+        self._add_rows({name: _times(points) if name == _TIME else _column(points, name)
+                        for name in fields})
+
+    def add_joints(self, empty: JointTrajectory, columns: dict[str, Any]) -> None:
+        """Add a joint trajectory with fields of its points, and the rest of another one."""
+        self.add_header(empty.header)
+        self.add_texts(empty.joint_names)
+        self.add('I', len(columns[_TIME]))
+        self._add_rows(columns)
+
+    def _add_rows(self, columns: dict[str, Any]) -> None:
+        """Add at least one point, from fields (k, size) and times (k, 2) in their order."""
+        sizes = tuple((name, -1 if name == _TIME else values.shape[1])
+                      for name, values in columns.items())
+        count = len(columns[_TIME])
+        self._bytes += b''.join(_rows(columns, sizes, len(self._bytes) % 8, count))
 
     def _add_text(self, text: str) -> None:
         encoded = text.encode()
