@@ -92,10 +92,7 @@ class Endpoint:
             cancel_service_qos_profile=_MANY, result_timeout=RESULT_TIMEOUT)
         # by a clock that also goes on while a simulation is paused
         clock = Clock(clock_type=ClockType.STEADY_TIME)
-        # only while there are goals: a timer that is due wakes the executor, also beside the solver
-        self._feedback_timer = node.create_timer(_FEEDBACK_PERIOD, self._send_feedback, group,
-                                                 clock)
-        self._feedback_timer.cancel()
+        node.create_timer(_FEEDBACK_PERIOD, self._send_feedback, group, clock)
         node.create_timer(_PRESENCE_PERIOD, self._drop_abandoned, group, clock)
 
     def close(self) -> None:
@@ -119,8 +116,6 @@ class Endpoint:
     def _on_goal(self, goal: ServerGoalHandle) -> None:
         """Submit an accepted goal, which can be canceled from now on."""
         pending = self._submit(goal.request, _ACTION)
-        if not self._goals:
-            self._feedback_timer.reset()
         self._goals[_key(goal)] = goal, pending
         goal.execute()
 
@@ -129,8 +124,6 @@ class Endpoint:
         pending = self._goals[_key(goal)][1]
         outcome = await self._handlers.conclude(pending, goal.request.task)
         del self._goals[_key(goal)], self._audiences[pending]
-        if not self._goals:
-            self._feedback_timer.cancel()
         result = self._action.Result()
         self._fill(result, goal.request, outcome)
         try:
