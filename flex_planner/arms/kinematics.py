@@ -197,12 +197,7 @@ def tip_position(arm: Arm, coordinates: Array) -> Array:
     """Return the position of the tip, shape (..., 2 or 3) [m], eq. (18)."""
     if isinstance(arm, SpatialArm):
         return tip_frame(arm, coordinates)[0]
-    angles = frame_angles(arm, coordinates)
-    c, s, position = np.cos(angles), np.sin(angles), np.zeros((*coordinates.shape[:-1], 2))
-    for i, (link, modal) in enumerate(zip(arm.links, arm.modal_slices, strict=True)):
-        bend = coordinates[..., modal] @ link.mode_shapes().tip_deflection
-        position[..., 0] += c[..., i] * link.length - s[..., i] * bend
-        position[..., 1] += s[..., i] * link.length + c[..., i] * bend
+    position: Array = link_points(arm, coordinates)[..., -1, -1, :]
     return position
 
 

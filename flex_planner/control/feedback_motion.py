@@ -25,7 +25,7 @@ import numpy as np
 _LONGEST_STEP = 1e-3
 # the motion of the tip after an arrival is the same to five digits with smaller ones
 _TOLERANCES = 1e-5, 1e-7
-_TOGETHER, _MOST_STEPS = 512, 64
+_TOGETHER, _MOST_STEPS = 512, 64  # as many times as few as there may be
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -144,7 +144,7 @@ class FeedbackArm:
         rows[0, :size] = state
         fewest = int(np.ceil(self.law.period / _LONGEST_STEP - 1e-9))
         first, steps = 0, fewest
-        while first < count and steps <= _MOST_STEPS:
+        while first < count and steps <= _MOST_STEPS * fewest:
             watch.check()
             last = min(first + max(_TOGETHER // steps, 1), count)
             found = self._cross(course, rows[first], slice(first, last), (law, motors), steps)
