@@ -87,7 +87,7 @@ def find_plan_residuals(found: Identification, log: JointLog, drive: Drive,
 
 
 def _up_to_arrival(reference: JointReference) -> JointReference:
-    """Return a trajectory up to where it stays for good: what is held then is none of the motion."""
+    """Return a trajectory up to where it stays for good: what is held then is no motion."""
     moves = ((np.abs(reference.velocities) > _STILL)
              | (np.abs(reference.positions - reference.positions[-1]) > _THERE)).any(axis=1)
     count = min(int(np.flatnonzero(moves).max(initial=-1)) + 2, len(moves))

@@ -23,7 +23,7 @@ _FLEXIBLE = (_TIME, 'modal_displacements', 'modal_rates', 'position_costates',
 _PLACE = 'x', 'y', 'z'
 
 
-class _Uneven(ValueError):
+class _UnevenError(ValueError):
     """Points whose fields are not of the same lengths, or values that do not fit."""
 
 
@@ -41,7 +41,7 @@ def encode_joint_trajectory(message: JointTrajectory) -> bytes:
         data = _Data()
         data.add_trajectory(message)
         return data.padded()
-    except _Uneven:
+    except _UnevenError:
         return TYPES.encode(JOINT_TRAJECTORY, message)
 
 
@@ -56,7 +56,7 @@ def encode_flexible_trajectory(message: FlexibleTrajectory) -> bytes:
         data.add_places(message.tip_path)
         data.add('d', message.payload_mass)
         return data.padded()
-    except _Uneven:
+    except _UnevenError:
         return TYPES.encode(FLEXIBLE_TRAJECTORY, message)
 
 
@@ -87,7 +87,7 @@ class _Data:
         try:
             self._bytes += struct.pack(f'<{kind}', value)
         except struct.error as error:
-            raise _Uneven(str(error)) from error
+            raise _UnevenError(str(error)) from error
 
     def add_texts(self, texts: Sequence[str]) -> None:
         """Add a sequence of texts."""
@@ -151,7 +151,7 @@ def _column(points: Sequence[Any], name: str) -> Array:
     rows = [getattr(point, name) for point in points]
     size = len(rows[0])
     if any(getattr(row, 'typecode', '') != 'd' or len(row) != size for row in rows):
-        raise _Uneven(name)
+        raise _UnevenError(name)
     return np.frombuffer(b''.join(rows)).reshape(len(rows), size)
 
 
