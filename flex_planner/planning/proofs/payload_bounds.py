@@ -90,12 +90,16 @@ def _least_excluded(margin: Callable[[float], float], accuracy: float,
                     known: float = MAX_PAYLOAD, carried: float = 0.0) -> float:
     """Return a payload whose margin is positive, close to the least one; inf for none [kg]."""
     margin = cache(margin)
-    high = min(known, MAX_PAYLOAD)
+    low = high = min(known, MAX_PAYLOAD)
     if not margin(high) > 0:
         return np.inf
-    low = carried if _LEAST < carried < high else min(_LEAST, high)
-    if low <= _LEAST and margin(low) > 0:
-        return 0.0 if margin(0.0) > 0 else low
+    if _LEAST < carried < high:
+        low = carried
+    else:
+        while low > _LEAST and margin(low) > 0:
+            low, high = low / 4, low
+        if low <= _LEAST and margin(0.0) > 0:
+            return 0.0
     return _narrow(margin, low, high, accuracy)
 
 
