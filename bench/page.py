@@ -95,7 +95,9 @@ PAYLOAD = """
 
 The motion of section 5.3: {accuracies}. A result counts if the payload is that near to the limit
 and its torque, re-simulated by SciPy's DOP853, leads the tip that near to the goal. Times of
-flex_planner are of whole searches, certified plan included; those of IPOPT (minimise the cost less
+flex_planner are of whole searches, certified plan and bound included: of one kind of motion
+(`search='fast'`), as by IPOPT from its one start, and of the best of the kinds that are found,
+which is the default and shares its work among processes. Those of IPOPT (minimise the cost less
 a high price of the payload; the programme of `flex_planner.optimal_control.direct.programme`,
 whose derivation is not counted) are of the coarsest of meshes of {meshes} intervals that counts,
 found by trying.

@@ -75,13 +75,12 @@ class RecordedPlan:
 
 
 def _refuse_motion(options: argparse.Namespace) -> None:
-    """Raise InvalidValueError if an option of the motion is given."""
+    """Raise InvalidValueError if an option of the motion is given, also with its default."""
     parser = argparse.ArgumentParser()
     add_task(parser, payload='', recorded=True)
-    plain = vars(parser.parse_args(['recording']))
-    others = {'controller_period': None, 'start_hold': None}
-    for name, value in {**plain, **others}.items():
-        given = getattr(options, name)
-        if name not in ('arm', 'time_limit') and given != value:
-            raise InvalidValueError('--limit' if name == 'limits' else name, given,
+    names = [*vars(parser.parse_args(['recording'])), 'controller_period', 'start_hold']
+    for name in names:
+        if name in options.given and name != 'time_limit':
+            raise InvalidValueError('--limit' if name == 'limits' else name,
+                                    getattr(options, name),
                                     'left out: the recording has the motion')

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import ctypes
 from dataclasses import dataclass
 
 from flex_planner.base.progress import Monitor
 from flex_planner.base.validation import Array
+from flex_planner.control.held_periods import (
+    cross_periods,
+    load_library,
+    MOST_STEPS,
+    Periods,
+)
 from flex_planner.control.joint_controller import EffortHold
 from flex_planner.control.joint_reference import Reference
 from flex_planner.control.linear_feedback import LinearFeedback
@@ -18,7 +25,7 @@ import numpy as np
 _LONGEST_STEP = 1e-3
 # the motion of the tip after an arrival is the same to five digits with smaller ones
 _TOLERANCES = 1e-5, 1e-7
-_TOGETHER, _MOST_STEPS = 512, 64
+_TOGETHER, _MOST_STEPS = 512, 64  # as many times as few as there may be
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -99,7 +106,37 @@ class FeedbackArm:
             If the monitor stopped it.
 
         """
-        watch, count = monitor or Monitor(), len(course.angles)
+        watch, library = monitor or Monitor(), load_library()
+        rate = self.dynamics.forward_dynamics_address
+        if rate is not None and library is not None:
+            watch.check()
+            return self._follow_compiled(course, state, rate, library)
+        return self._follow_steps(course, state, watch)
+
+    def _follow_compiled(self, course: Course, state: Array, rate: int,
+                         library: ctypes.CDLL) -> FeedbackMotion:
+        """Carry out a course by one call of compiled code."""
+        count, n = course.angles.shape
+        states, laws = np.full((count + 1, state.size), np.nan), np.zeros(
+            (count + 1, self.law.order))
+        states[0], torques = state, np.full((count, n), np.nan)
+        rows, law, controller, physical = (np.ascontiguousarray(values, dtype=np.float64)
+                                           for values in (
+            np.hstack([course.angles, course.efforts]), self.law.entries,
+            np.concatenate([np.zeros(2 * n), self._motors]), self.parameters.physical))
+        done = cross_periods(library, Periods(
+            rate=rate, joints=n, size=state.size, count=count, most_steps=MOST_STEPS,
+            length=self.law.period, rtol=_TOLERANCES[0], atol=_TOLERANCES[1],
+            reference=rows.ctypes.data, controller=controller.ctypes.data,
+            physical=physical.ctypes.data, states=states.ctypes.data, law=law.ctypes.data,
+            order=self.law.order, resolution=self.resolution, law_states=laws.ctypes.data,
+            torques=torques.ctypes.data))
+        states[done + 1:], laws[done + 1:], torques[done:] = np.nan, np.nan, np.nan
+        return FeedbackMotion(states=states, laws=laws, torques=torques)
+
+    def _follow_steps(self, course: Course, state: Array, watch: Monitor) -> FeedbackMotion:
+        """Carry out a course by the steps of `ArmDynamics.feedback_steps`, without a compiler."""
+        count = len(course.angles)
         size, n = state.size, self.law.joints
         law, motors = self.law.padded(size + n).entries, self._motors
         rows = np.full((count + 1, 2 * (size + n)), np.nan)
@@ -107,7 +144,7 @@ class FeedbackArm:
         rows[0, :size] = state
         fewest = int(np.ceil(self.law.period / _LONGEST_STEP - 1e-9))
         first, steps = 0, fewest
-        while first < count and steps <= _MOST_STEPS:
+        while first < count and steps <= _MOST_STEPS * fewest:
             watch.check()
             last = min(first + max(_TOGETHER // steps, 1), count)
             found = self._cross(course, rows[first], slice(first, last), (law, motors), steps)

@@ -1,5 +1,6 @@
 /*
- * Periods of a joint controller one after another, see held_periods.py.
+ * Periods of a joint controller, or of a linear law, one after another: see held_periods.py and
+ * feedback_motion.py.
  *
  * Steps are those of Cash and Karp, ACM Transactions on Mathematical Software 16 (1990), order 5
  * with an error estimate of order 4 from six stages. `rate` is the arm's x' of (x, torques).
@@ -37,6 +38,12 @@ struct periods {
     const double *controller;  /* (5 n): stiffness, damping, stall torque, its loss, largest torque */
     const double *physical;
     double *states; /* (count + 1, size), the first one given */
+    /* of a law, NULL for a PD: A, B, C, D, E column by column; the controller then begins with 2 n
+       numbers that are not looked at, and the reference has (2 n): angles, efforts */
+    const double *law;
+    long long order;
+    double resolution;              /* of the encoders, 0 for exact ones */
+    double *law_states, *torques;   /* (count + 1, order), the first one given; (count, n) */
 };
 
 /* comparisons, where fmin and fmax are calls of the mathematical library */
@@ -50,19 +57,59 @@ static void add_multiple(long long size, double *sum, double factor, const doubl
     for (long long i = 0; i < size; ++i) sum[i] += factor * values[i];
 }
 
-/* torques at a share of a period, within the limits of the motors at the speeds of a state */
+/* a torque within the limits of a motor at the speed of a state */
+static double limit(const struct periods *g, long long i, double asked, const double *x)
+{
+    const long long n = g->joints;
+    const double *stall = g->controller + 2 * n, *loss = stall + n, *cap = loss + n;
+    double lost = loss[i] * x[g->size / 2 + i];
+    double lowest = -stall[i] - lost, highest = stall[i] - lost;
+    return clip(asked, clip(-cap[i], lowest, highest), clip(cap[i], lowest, highest));
+}
+
+/* torques at a share of a period; those of a law are held, within the limits when it began */
 static void find_torques(const struct periods *g, const double *row, const double *feedback,
                          double share, const double *x, double *torques)
 {
     const long long n = g->joints;
-    const double *stall = g->controller + 2 * n, *loss = stall + n, *cap = loss + n;
     const double *first = row + 2 * n, *last = row + 3 * n;
+    if (g->law) memcpy(torques, feedback, n * sizeof *torques);
+    else
+        for (long long i = 0; i < n; ++i)
+            torques[i] = limit(g, i, first[i] + share * (last[i] - first[i]) + feedback[i], x);
+}
+
+/* sum += M v, with M (rows, columns) column by column */
+static void add_product(long long rows, long long columns, double *sum, const double *matrix,
+                        const double *values)
+{
+    for (long long j = 0; j < columns; ++j)
+        add_multiple(rows, sum, values[j], matrix + rows * j);
+}
+
+/* torques of a law in a state, and its next state; `memory` of 2 n */
+static void sample_law(const struct periods *g, const double *row, const double *x,
+                       const double *law_state, double *torques, double *following,
+                       double *memory)
+{
+    const long long n = g->joints, m = g->order;
+    const double *A = g->law, *B = A + m * m, *C = B + m * n, *D = C + n * m, *E = D + n * n;
+    const double *efforts = row + n;
+    const double step = g->resolution;
+    double *error = memory, *added = error + n;
+    for (long long i = 0; i < n; ++i)
+        error[i] = (step > 0 ? floor(x[i] / step + 0.5) * step : x[i]) - row[i];
+    memcpy(torques, efforts, n * sizeof *torques);
+    add_product(n, m, torques, C, law_state);
+    add_product(n, n, torques, D, error);
     for (long long i = 0; i < n; ++i) {
-        double lost = loss[i] * x[g->size / 2 + i];
-        double lowest = -stall[i] - lost, highest = stall[i] - lost;
-        double asked = first[i] + share * (last[i] - first[i]) + feedback[i];
-        torques[i] = clip(asked, clip(-cap[i], lowest, highest), clip(cap[i], lowest, highest));
+        torques[i] = limit(g, i, torques[i], x);
+        added[i] = torques[i] - efforts[i];
     }
+    memset(following, 0, m * sizeof *following);
+    add_product(m, m, following, A, law_state);
+    add_product(m, n, following, B, error);
+    add_product(m, n, following, E, added);
 }
 
 /* one step from share `begin` of a period on; its error, at most 1 if the tolerances are kept */
@@ -95,22 +142,34 @@ static double take_step(const struct periods *g, const double *row, const double
     return sqrt(error / size);
 }
 
-/* cross a period in equal steps; the largest error of one, above 1 if it breaks the tolerances */
-static double cross(const struct periods *g, const double *row, const double *state, long long steps,
-                 double *after, double *memory)
+/* torques that the controller adds throughout a period, or those of a law */
+static void find_feedback(const struct periods *g, const double *row, long long number,
+                          double *feedback, double *memory)
 {
-    const long long n = g->joints, size = g->size;
-    double *feedback = memory, *x = feedback + n, *rest = x + size;
+    const long long n = g->joints, m = g->order;
+    const double *state = g->states + g->size * number;
+    if (g->law) {
+        double *now = g->law_states + m * number;
+        sample_law(g, row, state, now, feedback, now + m, memory);
+        memcpy(g->torques + n * number, feedback, n * sizeof *feedback);
+        return;
+    }
     for (long long i = 0; i < n; ++i)
         feedback[i] = g->controller[i] * (row[i] - state[i])
-                      + g->controller[n + i] * (row[n + i] - state[size / 2 + i]);
-    memcpy(x, state, size * sizeof *x);
-    double worst = 0;
+                      + g->controller[n + i] * (row[n + i] - state[g->size / 2 + i]);
+}
+
+/* cross a period in equal steps; the largest error of one, above 1 if it breaks the tolerances */
+static double cross(const struct periods *g, const double *row, const double *feedback,
+                    const double *state, long long steps, double *after, double *memory)
+{
+    double *x = memory, *rest = x + g->size, worst = 0;
+    memcpy(x, state, g->size * sizeof *x);
     for (long long k = 0; k < steps; ++k) {
         double error = take_step(g, row, feedback, (double)k / steps, 1.0 / steps, x, after, rest);
         if (!(error <= 1)) return INFINITY;
         if (error > worst) worst = error;
-        memcpy(x, after, size * sizeof *x);
+        memcpy(x, after, g->size * sizeof *x);
     }
     return worst;
 }
@@ -118,19 +177,22 @@ static double cross(const struct periods *g, const double *row, const double *st
 /* fill in the states after the periods; returns how many were crossed */
 long long cross_periods(const struct periods *g)
 {
-    double *memory = malloc((2 * g->joints + (STAGES + 2) * g->size) * sizeof *memory);
-    if (!memory) return NO_MEMORY;
+    const long long n = g->joints, width = g->law ? 2 * n : 4 * n;
+    double *feedback = malloc((4 * n + (STAGES + 2) * g->size) * sizeof *feedback);
+    if (!feedback) return NO_MEMORY;
+    double *memory = feedback + n;
     long long done = 0, steps = 1;
     for (; done < g->count; ++done) {
-        const double *row = g->reference + 4 * g->joints * done;
+        const double *row = g->reference + width * done;
         double *state = g->states + g->size * done;
         double error;
-        while ((error = cross(g, row, state, steps, state + g->size, memory)) > 1
+        find_feedback(g, row, done, feedback, memory);
+        while ((error = cross(g, row, feedback, state, steps, state + g->size, memory)) > 1
                && steps < g->most_steps)
             steps *= 2;
         if (error > 1) break;
         if (steps > 1 && error < HALVED) steps /= 2;
     }
-    free(memory);
+    free(feedback);
     return done;
 }

@@ -25,17 +25,18 @@ _SOURCE = Path(__file__).with_name('held_periods.c')
 _OPTIONS = ('-O2', '-ftree-vectorize', '-fno-math-errno')
 _TOLERANCES = 1e-5, 1e-8
 # in a period: the arm must have run away
-_MOST_STEPS = 256
+MOST_STEPS = 256
 _address, _number, _real = ctypes.c_void_p, ctypes.c_longlong, ctypes.c_double
 
 
-class _Periods(ctypes.Structure):
+class Periods(ctypes.Structure):
     """`struct periods` of held_periods.c."""
 
     _fields_ = [('rate', _address), ('joints', _number), ('size', _number), ('count', _number),
                 ('most_steps', _number), ('length', _real), ('rtol', _real), ('atol', _real),
                 ('reference', _address), ('controller', _address), ('physical', _address),
-                ('states', _address)]
+                ('states', _address), ('law', _address), ('order', _number),
+                ('resolution', _real), ('law_states', _address), ('torques', _address)]
 
 
 class HeldPeriods:
@@ -73,7 +74,7 @@ class HeldPeriods:
             If the monitor stopped it.
 
         """
-        rate, library = arm.dynamics.forward_dynamics_address, _load()
+        rate, library = arm.dynamics.forward_dynamics_address, load_library()
         if rate is None or library is None:
             return arm.follow(self._reference, state, self._until, monitor)
         if monitor is not None:
@@ -82,20 +83,25 @@ class HeldPeriods:
         states[0] = state
         physical, constants = (np.ascontiguousarray(values, dtype=np.float64) for values in (
             arm.parameters.physical, arm.constants))
-        job = _Periods(
+        job = Periods(
             rate=rate, joints=arm.dynamics.arm.n_joints, size=states.shape[1],
-            count=len(self._rows), most_steps=_MOST_STEPS, length=arm.controller.period,
+            count=len(self._rows), most_steps=MOST_STEPS, length=arm.controller.period,
             rtol=_TOLERANCES[0], atol=_TOLERANCES[1], reference=self._rows.ctypes.data,
             controller=constants.ctypes.data, physical=physical.ctypes.data,
             states=states.ctypes.data)
-        crossed = library.cross_periods(ctypes.byref(job))
-        if crossed < 0:
-            raise MemoryError('no memory to simulate an arm')
-        states[crossed + 1:] = np.nan
+        states[cross_periods(library, job) + 1:] = np.nan
         return ControlledMotion(times=self._times, states=states)
 
 
-def _load() -> ctypes.CDLL | None:
+def cross_periods(library: ctypes.CDLL, job: Periods) -> int:
+    """Fill in the states after periods, and return how many were crossed."""
+    crossed = int(library.cross_periods(ctypes.byref(job)))
+    if crossed < 0:
+        raise MemoryError('no memory to simulate an arm')
+    return crossed
+
+
+def load_library() -> ctypes.CDLL | None:
     """Return the library, None without a compiler."""
     return load_once(_SOURCE, _OPTIONS, _open, 'arms are simulated several times slower')
 
@@ -103,5 +109,5 @@ def _load() -> ctypes.CDLL | None:
 def _open(library: Path) -> ctypes.CDLL:
     functions = ctypes.CDLL(str(library))
     functions.cross_periods.restype = _number
-    functions.cross_periods.argtypes = (ctypes.POINTER(_Periods),)
+    functions.cross_periods.argtypes = (ctypes.POINTER(Periods),)
     return functions

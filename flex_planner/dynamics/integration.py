@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from typing import Protocol
 
 from flex_planner.base.progress import Monitor
@@ -28,6 +28,8 @@ _TABLE_STEPS = 16
 # error of a step below which half as many are as good, with a margin: the order is 8
 _EASY = 2.0**-10
 _SMALLEST = float(np.finfo(np.float64).tiny)
+# bases of polynomials that are kept: of meshes of many motions the same
+_KEPT_BASES, _MOST_KEPT_ROWS = 64, 1024
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,8 +71,23 @@ class PiecewisePolynomial:
 
     def basis(self, theta: Array) -> Array:
         """Return the matrix from coefficients to values at positions (k,), shape (k, d + 1)."""
-        basis = legvander(2 * theta - 1, self.coefficients.shape[1] - 1)
-        return basis.astype(np.float64, copy=False)
+        degree = self.coefficients.shape[1] - 1
+        if theta.size > _MOST_KEPT_ROWS:
+            return _legendre_basis(theta, degree)
+        return _kept_basis(theta.astype(np.float64, copy=False).tobytes(), degree)
+
+
+@lru_cache(maxsize=_KEPT_BASES)
+def _kept_basis(theta: bytes, degree: int) -> Array:
+    """Return `_legendre_basis`, read-only, at float64 positions as bytes."""
+    basis = _legendre_basis(np.frombuffer(theta), degree)
+    basis.setflags(write=False)
+    return basis
+
+
+def _legendre_basis(theta: Array, degree: int) -> Array:
+    """Return the Legendre polynomials over an interval at positions (k,), (k, degree + 1)."""
+    return legvander(2 * theta - 1, degree).astype(np.float64, copy=False)
 
 
 class TorqueProfile(Protocol):

@@ -65,7 +65,8 @@ class Estimate:
     spread : float
         Largest distance of the value from those of single logs and of one mode more; nan without.
     verdict : Verdict
-        `WEAK` where the uncertainty is over 20 % of the value.
+        `WEAK` where the uncertainty is over 20 % of the value, and where the interval is withheld:
+        fits of a model that is not the plant may agree on what is not so.
 
     """
 
@@ -152,15 +153,15 @@ def judge_estimate(parameter: Parameter, value: float, assumed: float, half_widt
     """
     Return a parameter with its verdict.
 
-    Where the interval is withheld, the spread between fits is its uncertainty, else the larger of
-    the two; one that is neither is no evidence, and the parameter is weak.
+    Its uncertainty is the larger one of interval and spread between fits. Where the interval is
+    withheld the spread alone is no evidence, and the parameter is weak: the fits of a model that
+    lacks something agree on the damping, say, that stands for it.
 
     """
     shown = np.nan if withheld or not free else half_width
-    known = [one for one in (shown, spread) if not np.isnan(one)]
     if not free:
         verdict = Verdict.FIXED
-    elif known and max(known) <= WEAK_SHARE * abs(value):
+    elif not withheld and np.nanmax([half_width, spread]) <= WEAK_SHARE * abs(value):
         verdict = Verdict.IDENTIFIED
     else:
         verdict = Verdict.WEAK

@@ -16,8 +16,9 @@ import numpy as np
 _RUN_AWAY = 1e6
 # for how long errors of a wrong model are alike [s]
 _BLOCK = 0.1
-# for how long errors in closed loop are, where intervals hold the truth as often as they say [s]
-_ALONE = 0.01
+# for how long errors in closed loop are, where intervals hold the truth at least as often as they
+# say: with half of it three of four of the delay of two links did [s]
+_ALONE = 0.02
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -24,7 +24,8 @@ import numpy as np
 
 WINDOW = 1.0
 """How long the tip is watched after the arrival [s]."""
-_STILL = 1e-6  # [rad/s]
+# [rad/s], [rad]: tables have nine digits
+_STILL, _THERE = 1e-6, 1e-7
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,13 +77,25 @@ def find_plan_residuals(found: Identification, log: JointLog, drive: Drive,
         If the monitor stopped it.
 
     """
-    reference = log.reference
-    if reference is None or np.abs(reference.velocities[-1]).max() > _STILL:
+    if log.reference is None or np.abs(log.reference.velocities[-1]).max() > _STILL:
         return None
+    reference = _up_to_arrival(log.reference)
     arm = found.identified_arm()
     before = _residual(arm, found, drive, reference, found.encoder_offsets)
     after, message = _replan(arm, found, drive, reference, monitor)
     return PlanResiduals(name=log.name, before=before, after=after, message=message)
+
+
+def _up_to_arrival(reference: JointReference) -> JointReference:
+    """Return a trajectory up to where it stays for good: what is held then is no motion."""
+    moves = ((np.abs(reference.velocities) > _STILL)
+             | (np.abs(reference.positions - reference.positions[-1]) > _THERE)).any(axis=1)
+    count = min(int(np.flatnonzero(moves).max(initial=-1)) + 2, len(moves))
+    efforts = reference.torques[:count].copy()
+    efforts[-1] = reference.torques[-1]
+    return JointReference(times=reference.times[:count], positions=reference.positions[:count],
+                          velocities=reference.velocities[:count],
+                          accelerations=reference.accelerations[:count], torques=efforts)
 
 
 def _replan(arm: Arm, found: Identification, drive: Drive, reference: JointReference,

@@ -74,7 +74,7 @@ class Departure:
             plan=plan, at=at,
             state=plan.solution(np.array([at]))[0, :size] if state is None else vector(
                 'state', state, size),
-            torque=plan.sample(at).torques[0] if torque is None else vector(
+            torque=plan.torques(at)[0] if torque is None else vector(
                 'torque', torque, n, unit='N m'), torque_rate_weight=weight)
 
     @property

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from textwrap import indent
 from types import MappingProxyType
 from typing import Final
 
@@ -12,6 +14,7 @@ from flex_planner.recording.topics import Definition, Topic
 import yaml
 
 METADATA_VERSION: Final = 9
+_TOPICS: Final = 'topics_with_message_count'
 ROS_DISTRO: Final = 'jazzy'
 # ten times as quick where PyYAML has libyaml, with the same values
 _DUMPER: Final = getattr(yaml, 'CSafeDumper', yaml.SafeDumper)
@@ -162,7 +165,7 @@ class RecordingMetadata:
             'version': METADATA_VERSION,
             'storage_identifier': 'mcap',
             **_extent(self.start_ns, self.end_ns, self.message_count),
-            'topics_with_message_count': [topic.to_dict() for topic in self.topics],
+            _TOPICS: [topic.to_dict() for topic in self.topics],
             'compression_format': '',
             'compression_mode': '',
             'relative_file_paths': [file.name for file in self.files],
@@ -173,11 +176,15 @@ class RecordingMetadata:
 
     def to_record(self) -> str:
         """Return the text of the MCAP metadata record ``rosbag2``."""
-        return _dump(self.to_dict())
+        text, empty = _dump({**self.to_dict(), _TOPICS: []}), f'\n{_TOPICS}: []\n'
+        if not self.topics:
+            return text
+        return text.replace(
+            empty, f'\n{_TOPICS}:\n{"".join(_topic_text(topic) for topic in self.topics)}', 1)
 
     def to_file(self) -> str:
         """Return the text of metadata.yaml."""
-        return _dump({'rosbag2_bagfile_information': self.to_dict()})
+        return f'rosbag2_bagfile_information:\n{indent(self.to_record(), "  ")}'
 
     @classmethod
     def join(cls, parts: Iterable[RecordingMetadata]) -> RecordingMetadata:
@@ -222,7 +229,13 @@ def is_text(value: object) -> bool:
     return isinstance(value, str) and value == value.encode(errors='ignore').decode()
 
 
-def _dump(content: dict[str, object]) -> str:
-    """Return the YAML text of a mapping, in the order given."""
+@lru_cache(maxsize=64)
+def _topic_text(topic: TopicSummary) -> str:
+    """Return the entry of a topic, which is the same in many recordings, and most of the work."""
+    return _dump([topic.to_dict()])
+
+
+def _dump(content: object) -> str:
+    """Return the YAML text of a mapping or list, in the order given."""
     text: str = yaml.dump(content, Dumper=_DUMPER, sort_keys=False, allow_unicode=True, width=1000)
     return text

@@ -69,6 +69,7 @@ def test_gains_of_a_recorded_plan_are_those_of_the_plan(
 @pytest.mark.parametrize(('options', 'message'), [
     (['--from', '0.5,0'], '--from is'), (['--duration', '2'], '--duration is'),
     (['--limit', 'joint_speed:1'], '--limit is'), (['--payload', '1'], '--payload is'),
+    (['--payload', '0'], '--payload is 0'), (['--elbow=-1'], '--elbow is -1'),  # as by default
     (['--start-hold', '1'], '--start-hold is')])
 def test_options_of_a_motion_are_refused(recording: Path, capsys: pytest.CaptureFixture[str],
                                          options: list[str], message: str) -> None:

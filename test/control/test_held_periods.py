@@ -66,7 +66,7 @@ def test_arm_that_runs_away_has_no_states_from_there(arm: ControlledArm,
 
 def test_without_a_compiler_steps_are_taken_one_by_one(
         arm: ControlledArm, reference: JointReference, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(held_periods, '_load', lambda: None)
+    monkeypatch.setattr(held_periods, 'load_library', lambda: None)
     found = HeldPeriods(reference, arm.controller, 0.01).follow(arm, START)
     np.testing.assert_array_equal(found.states, arm.follow(reference, START, 0.01).states)
 

@@ -6,6 +6,7 @@ from flex_planner.arms.arm import Arm
 from flex_planner.base.errors import InvalidSizeError, InvalidValueError
 from flex_planner.base.progress import Monitor, StoppedError
 from flex_planner.base.validation import Array
+from flex_planner.control import feedback_motion
 from flex_planner.control.feedback_motion import Course, FeedbackArm
 from flex_planner.control.joint_controller import EffortHold, Gains
 from flex_planner.control.joint_reference import JointReference
@@ -72,6 +73,19 @@ def test_arm_under_a_law_moves_as_scipy_has_it(arm: FeedbackArm, course: Course,
     np.testing.assert_allclose(motion.torques[-1], torque, rtol=0, atol=1e-4)
     lower, upper = arm.limits.bounds(motion.states[:-1, 5:7])
     assert (np.isclose(motion.torques, lower) | np.isclose(motion.torques, upper)).any()
+
+
+def test_compiled_motion_is_that_of_steps_one_by_one(
+        arm: FeedbackArm, course: Course, start: Array,
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    compiled = arm.follow(course, start)
+    monkeypatch.setattr(feedback_motion, 'load_library', lambda: None)
+    steps = arm.follow(course, start)
+    # tolerances of 1e-5 in every step; the law is sampled at the same instants
+    for name in ('states', 'laws', 'torques'):
+        one, other = getattr(compiled, name), getattr(steps, name)
+        assert one.shape == other.shape and not np.array_equal(one, other)
+        assert (np.abs(one - other) <= 1e-3 * np.abs(other).max(axis=0) + 1e-6).all(), name
 
 
 def test_arm_that_runs_away_is_not_a_number(arm: FeedbackArm, start: Array) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from factories import PlanFactory
 from flex_planner.arms.arm import Arm
 from flex_planner.base.errors import InvalidTaskError, InvalidValueError, NotFiniteError
 from flex_planner.base.progress import Monitor, StoppedError
@@ -15,10 +16,12 @@ from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.optimal_control.parameters import Parameters
 from flex_planner.optimal_control.task import Task
 from flex_planner.optimal_control.torque_limits import TorqueLimits
+from flex_planner.planning.execution import Execution
 from flex_planner.planning.plan import Plan
 from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.point_times import point_times
 from flex_planner.planning.published_motion import PublishedMotion
+from flex_planner.planning.quick_sampling import sample_quickly
 from flex_planner.planning.sampling import sample_plan, SampledPlan, SamplingSettings
 import numpy as np
 import pytest
@@ -250,3 +253,16 @@ def test_motion_that_does_not_end_at_rest_is_no_reference(flexible: Plan,
     with pytest.raises(InvalidTaskError, match='does not end at rest'):
         sample_plan(replace(flexible, task=replace(flexible.task, **change)),
                     SamplingSettings())
+
+
+@pytest.mark.parametrize('arm', ['ei50', 'rigid'])
+def test_quick_samples_have_the_figures_of_an_exact_simulation(plan_of: PlanFactory,
+                                                               arm: str) -> None:
+    plan, settings = plan_of(arm), SamplingSettings(longest_step=0.02, torque_tolerance=0.1)
+    quick = sample_quickly(plan, settings)
+    execution = Execution.of(plan, settings.controller_of(plan))
+    exact = execution.arrive(quick.reference)
+    # by steps with tolerances of 1e-5 that are not cut at the limits of motors [m]
+    assert quick.execution.tip_error == pytest.approx(execution.tip_error(exact), abs=1e-6)
+    assert quick.execution.residual_vibration == pytest.approx(execution.vibration(exact),
+                                                               abs=1e-6)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from flex_planner.recording import DEFAULT, MessageTypes
+from flex_planner.recording.metadata import FileSummary, RecordingMetadata, TopicSummary
 from mcap.reader import make_reader
+import pytest
 from recording_support import START, TREE
 import yaml
 
@@ -33,3 +36,16 @@ def test_metadata_record_in_the_file_repeats_the_metadata_file(plan: Path) -> No
         (record,) = make_reader(stream).iter_metadata()
     assert record.name == 'rosbag2'
     assert yaml.safe_load(record.metadata['serialized_metadata']) == content
+
+
+@pytest.mark.parametrize('count', [0, 1, 3])
+def test_texts_are_those_of_the_whole_mapping(types: MessageTypes, count: int) -> None:
+    odd = {'lines': 'a\n\n  b: c\n', 'mark': '\ntopics_with_message_count: []\n', 'no': 'x ' * 900}
+    topics = tuple(TopicSummary(topic=replace(TREE, name=f'/t{k}'), message_count=k,
+                                definition=types.definition(TREE.type_name))
+                   for k in range(count))
+    extent = FileSummary(name='x_0.mcap', start_ns=START, end_ns=START + 5, message_count=count)
+    metadata = RecordingMetadata(files=(extent,), topics=topics, custom_data=odd)
+    assert yaml.safe_load(metadata.to_record()) == metadata.to_dict()
+    assert yaml.safe_load(metadata.to_file()) == {
+        'rosbag2_bagfile_information': metadata.to_dict()}

@@ -44,8 +44,8 @@ def bound_by_power(facts: MotionFacts) -> DurationBound:
     bounds = [DurationBound(seconds=(1 - SAFETY) * facts.energy_needed() / facts.power,
                             deed=_lifting(payload))]
     if facts.reaches and facts.knows_energies:
-        start = facts.end_energy(facts.problem.start).most(payload)
-        mass, way = payload + facts.tip_mass(), float(facts.distances()[-1])
+        start = facts.start_energy.most(payload)
+        mass, way = payload + facts.tip_mass, float(facts.distances()[-1])
         bounds.append(DurationBound(
             seconds=_least_time(facts.power, start, mass, way), deed=_moving(payload, way)))
     return max(bounds, key=lambda bound: bound.seconds)
@@ -119,17 +119,17 @@ def energy_limits(facts: MotionFacts, payload: float, duration: float,
     driving = _growth(sets, drag, signs * facts.stall, slopes)
     if (facts.caps < facts.stall).any():
         driving = _growth(sets, np.diag(facts.friction), signs * facts.caps, slopes, driving)
-    ends = [facts.end_energy(facts.problem.start)]
+    ends = [facts.start_energy]
     braking = EnergyGrowth.below(np.zeros(0), np.zeros(0))
     if facts.stops:
         braking = _braking(facts, inertia, sets, signs, slopes)
         if not heavier:  # the speed at which caps end may be less of a speed for them
             braking = _braking_below_caps(facts, inertia, sets, signs, slopes, braking)
-        ends.append(facts.end_energy(facts.problem.goal))
+        ends.append(facts.goal_energy)
     if np.isfinite(facts.power):
         driving = EnergyGrowth.below(np.append(driving.slopes, 0.0),
                                      np.append(driving.offsets, facts.power))
-    energies = [end.ceiling(payload, facts.tip_mass()) if heavier else end.most(payload)
+    energies = [end.ceiling(payload, facts.tip_mass) if heavier else end.most(payload)
                 for end in ends]
     return EnergyLimits(driving, braking, energies[0], energies[1] if facts.stops else 0.0)
 
@@ -195,8 +195,7 @@ def _requirements(facts: MotionFacts, limits: EnergyLimits,
             yield (_time_for(limits, links[i], of_links[i]),
                    f'turning link {i + 1} by {np.degrees(links[i]):.3g} deg')
     if facts.stops:
-        ends = [facts.end_energy(state).least(payload)
-                for state in (facts.problem.start, facts.problem.goal)]
+        ends = [end.least(payload) for end in (facts.start_energy, facts.goal_energy)]
         yield limits.change_time(max(ends)), _lifting(payload)
 
 

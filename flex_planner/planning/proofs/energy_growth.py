@@ -9,6 +9,9 @@ import numpy as np
 
 # below it, the arc tangent of its root loses digits to the root itself
 _SMALL = 1e-4
+# where energies are looked for, and into which parts the ratio of two of them is divided
+_DECADES: Array = np.geomspace(1e-30, 1e30, 61, dtype=np.float64)
+_STEPS: Array = np.linspace(0.0, 1.0, 129, dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,8 +79,19 @@ class EnergyGrowth:
 
     def travel(self, energies: Array, begin: float) -> Array:
         """Return the integral of sqrt(E) over that time, shape (m,) [J^(1/2) s]."""
-        low, high = self._spans(energies, begin)
-        total: Array = (self._primitive(high) - self._primitive(low)).sum(-1)
+        count = self.slopes.size
+        if not count:
+            return np.zeros(energies.size)
+        begins = np.maximum(self.edges[:-1], begin)
+        ends = np.maximum(self.edges[1:-1], begins[:-1])  # the last piece has none
+        reached = np.searchsorted(self.edges[1:-1], energies, side='right')
+        pieces = np.arange(count)
+        integrals = self._primitive(
+            np.concatenate([begins, ends, np.maximum(energies, begins[reached])]),
+            np.concatenate([pieces, pieces[:-1], reached]))
+        before, whole, within = np.split(integrals, [count, 2 * count - 1])
+        passed = np.concatenate([[0.0], np.cumsum(whole - before[:-1])])
+        total: Array = passed[reached] + within - before[reached]
         return total
 
     def _spans(self, energies: Array, begin: float) -> tuple[Array, Array]:
@@ -86,14 +100,15 @@ class EnergyGrowth:
         high = np.clip(energies[:, None], low, np.maximum(self.edges[1:], low))
         return np.broadcast_to(low, high.shape), high
 
-    def _primitive(self, energies: Array) -> Array:
-        """Return the integral of sqrt(E) / (slope E + offset) from 0 on each piece."""
-        ratio = self.slopes * energies / self.offsets
+    def _primitive(self, energies: Array, pieces: Array) -> Array:
+        """Return the integrals of sqrt(E) / (slope E + offset) from 0, each on its piece."""
+        offsets = self.offsets[pieces]
+        ratio = self.slopes[pieces] * energies / offsets
         safe = np.where(ratio > _SMALL, ratio, 1.0)
-        factor = np.where(ratio > _SMALL,
-                          3 * (np.sqrt(safe) - np.arctan(np.sqrt(safe))) / safe**1.5,
+        root = np.sqrt(safe)
+        factor = np.where(ratio > _SMALL, 3 * (root - np.arctan(root)) / (safe * root),
                           1 - 3 * ratio / 5 + 3 * ratio**2 / 7)
-        integral: Array = 2 / 3 * energies**1.5 / self.offsets * factor
+        integral: Array = 2 / 3 * energies * np.sqrt(energies) / offsets * factor
         return integral
 
 
@@ -119,8 +134,8 @@ class EnergyLimits:
     def least_time(self, travel: float) -> float:
         """Return the least time in which the integral of sqrt(E) can reach a value [s]."""
         low, high = self._enclose(travel)
-        for _ in range(4):
-            peaks: Array = np.geomspace(low, high, 33, dtype=np.float64)
+        for _ in range(3):
+            peaks: Array = low * (high / low)**_STEPS
             within = self._travel(peaks) <= travel
             last = int(within.argmin()) - 1 if not within.all() else within.size - 1
             low, high = peaks[max(last, 0)], peaks[min(last + 1, within.size - 1)]
@@ -132,8 +147,7 @@ class EnergyLimits:
 
     def _enclose(self, travel: float) -> tuple[float, float]:
         """Return energies of which the first is too small for that, and the second too large."""
-        peaks: Array = np.geomspace(1e-30, 1e30, 61, dtype=np.float64)
-        peaks = peaks * max(self.start, self.goal, 1.0)
+        peaks = _DECADES * max(self.start, self.goal, 1.0)
         short = self._travel(peaks) <= travel
         count = int(np.count_nonzero(short))  # it grows with the peak
         return float(peaks[max(count - 1, 0)]), float(peaks[min(count, peaks.size - 1)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from flex_planner.arms.arm import Arm
 from flex_planner.arms.kinematics import link_points, payload_position, payload_velocity
@@ -141,14 +142,25 @@ class MotionFacts:
         """Return the inertia of a rigid arm with a payload [kg]."""
         return RigidInertia.of(self.arm, payload, self.problem.parameters.payload_inertia)
 
+    @cached_property
     def tip_mass(self) -> float:
         """Return the least mass that moves with the payload's centre besides it [kg]."""
         if self.rigid:
             return 1 / self.inertia(0.0).carried_mobility
         return 0.0 if self.arm.payload_com.any() else self.arm.nodes[-1].mass
 
-    def end_energy(self, state: Array) -> EndEnergy:
-        """Return the energy of a state (2 n_t,); for arms of which it is known."""
+    @cached_property
+    def start_energy(self) -> EndEnergy:
+        """Return the energy at the start; for arms of which it is known."""
+        return self._end_energy(self.problem.start)
+
+    @cached_property
+    def goal_energy(self) -> EndEnergy:
+        """Return the energy at the goal; for arms of which it is known."""
+        return self._end_energy(self.problem.goal)
+
+    def _end_energy(self, state: Array) -> EndEnergy:
+        """Return the energy of a state (2 n_t,)."""
         kinetic, potential = self._energies(state, 0.0)
         n_t, weight = self.arm.n_coordinates, float(np.linalg.norm(self.arm.gravity))
         speed = payload_velocity(self.arm, state[:n_t], state[n_t:])
@@ -156,8 +168,8 @@ class MotionFacts:
         if not weight:  # at rest and unbent it is 0
             return EndEnergy(bare=kinetic + potential, per_payload=moving,
                              size=kinetic + potential, size_per_payload=moving)
-        bare, loaded = (self.inertia(0.0).first_moments(self.arm, payload).sum()
-                        for payload in (0.0, 1.0))
+        inertia = self.inertia(0.0)
+        bare, loaded = (inertia.first_moments(self.arm, payload).sum() for payload in (0.0, 1.0))
         lowest, hangs = -weight * float(bare), weight * float(loaded - bare)
         height = -float(self.arm.gravity @ payload_position(self.arm, state[:n_t]))
         return EndEnergy(

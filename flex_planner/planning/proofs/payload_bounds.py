@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 
 from flex_planner.optimal_control.task import MAX_PAYLOAD
 from flex_planner.planning.proofs.duration_bounds import energy_limits, SAFETY, way_by_power
@@ -11,34 +12,31 @@ import numpy as np
 
 # payloads below are not told from none [kg]
 _LEAST = 1e-6
-# how far above what is carried a bound is looked for first
-_FIRST_FACTOR = 1.1
 
 
 def payload_by_power(facts: MotionFacts) -> float:
     """Return the payload [kg] that the motors have not the power to exceed; inf for none."""
     if not (np.isfinite(facts.power) and facts.reaches and facts.knows_energies):
         return np.inf
-    start, tip_mass = facts.end_energy(facts.problem.start), facts.tip_mass()
+    start, tip_mass = facts.start_energy, facts.tip_mass
     duration, way = facts.problem.task.duration, (1 - SAFETY) * facts.distances()[-1]
 
-    def excluded(payload: float) -> bool:
-        """Return whether no motion carries this payload or more."""
+    def margin(payload: float) -> float:
         mass = payload + tip_mass
-        if not mass:
-            return False
-        reached = way_by_power(facts.power, start.ceiling(payload, tip_mass), mass, duration)
-        return bool(reached < way)
+        if not (mass and way):
+            return -np.inf
+        return float(np.log(way / way_by_power(
+            facts.power, start.ceiling(payload, tip_mass), mass, duration)))
 
-    return min(_least_excluded(excluded, 1e-9), _lifted_by_power(facts))
+    return min(_least_excluded(margin, 1e-9), _lifted_by_power(facts))
 
 
 def _lifted_by_power(facts: MotionFacts) -> float:
     """Return the payload [kg] of a rigid arm that the motors can give the energy of its goal."""
     if not (facts.rigid and facts.stops):
         return np.inf
-    start = facts.end_energy(facts.problem.start)
-    goal = facts.end_energy(facts.problem.goal)
+    start = facts.start_energy
+    goal = facts.goal_energy
     bare, one = (goal.least(payload) - start.most(payload) for payload in (0.0, 1.0))
     spare = facts.power * facts.problem.task.duration - bare
     return float(max(spare, 0.0) / (one - bare) * (1 + SAFETY)) if one > bare else np.inf
@@ -59,54 +57,69 @@ def payload_by_energy(facts: MotionFacts, known: float = MAX_PAYLOAD,
         A payload that a motion carries: the search begins there [kg].
 
     """
-    excluded = _excluded_by_energy(facts)
-    return np.inf if excluded is None else _least_excluded(excluded, 5e-3, known, carried)
+    margin = _margin_of_energy(facts)
+    return np.inf if margin is None else _least_excluded(margin, 5e-3, known, carried)
 
 
 def is_any_excluded(facts: MotionFacts) -> bool:
     """Return whether `payload_by_energy` is finite, which is quicker to tell."""
-    excluded = _excluded_by_energy(facts)
-    return excluded is not None and excluded(MAX_PAYLOAD)
+    margin = _margin_of_energy(facts)
+    return margin is not None and margin(MAX_PAYLOAD) > 0
 
 
-def _excluded_by_energy(facts: MotionFacts) -> Callable[[float], bool] | None:
-    """Return whether no motion carries a payload or more, as a function; None if none is known."""
+def _margin_of_energy(facts: MotionFacts) -> Callable[[float], float] | None:
+    """
+    Return a function of payloads that is positive if no motion carries that much or more.
+
+    The logarithm of the time that it takes as a share of the duration; None if none is known.
+
+    """
     if not (facts.rigid and facts.limited and facts.reaches):
         return None
     duration, way = facts.problem.task.duration, (1 - SAFETY) * facts.distances()[-1]
-    tip_mass = facts.tip_mass()
 
-    def excluded(payload: float) -> bool:
+    def margin(payload: float) -> float:
         limits = energy_limits(facts, payload, duration, heavier=True)
-        needed = limits.least_time(way * np.sqrt((payload + tip_mass) / 2))
-        return needed * (1 - SAFETY) > duration
+        needed = limits.least_time(way * np.sqrt((payload + facts.tip_mass) / 2))
+        return float(np.log(needed * (1 - SAFETY) / duration)) if needed else -np.inf
 
-    return excluded
+    return margin
 
 
-def _least_excluded(excluded: Callable[[float], bool], accuracy: float,
+def _least_excluded(margin: Callable[[float], float], accuracy: float,
                     known: float = MAX_PAYLOAD, carried: float = 0.0) -> float:
-    """Return a payload that is excluded, close to the least one; inf for none [kg]."""
+    """Return a payload whose margin is positive, close to the least one; inf for none [kg]."""
+    margin = cache(margin)
     low = high = min(known, MAX_PAYLOAD)
-    if not excluded(high):
+    if not margin(high) > 0:
         return np.inf
     if _LEAST < carried < high:
-        low, high = _bracket_above(excluded, carried, high)
+        low = carried
     else:
-        while low > _LEAST and excluded(low):
+        while low > _LEAST and margin(low) > 0:
             low, high = low / 4, low
-        if low <= _LEAST and excluded(0.0):
+        if low <= _LEAST and margin(0.0) > 0:
             return 0.0
+    return _narrow(margin, low, high, accuracy)
+
+
+def _narrow(margin: Callable[[float], float], low: float, high: float, accuracy: float) -> float:
+    """
+    Return the upper end of payloads around the least excluded one, closer than an accuracy.
+
+    Steps aim a little beyond the zero of the secant, at the side of the farther end, so that
+    both ends come close to it; a step that gains little is followed by a bisection.
+
+    """
+    width, slow = float(np.log1p(accuracy)), False
     while high > low * (1 + accuracy):
-        middle = float(np.sqrt(low * high))
-        low, high = (low, middle) if excluded(middle) else (middle, high)
+        gap = float(np.log(high / low))
+        below, above = margin(low), margin(high)
+        secant = not slow and -np.inf < below <= 0 and np.isfinite(above)
+        share = -below / (above - below) if secant else 0.5
+        if secant:
+            share += (0.45 if share < 0.5 else -0.45) * width / gap
+        middle = low * float(np.exp(share * gap))
+        low, high = (low, middle) if margin(middle) > 0 else (middle, high)
+        slow = secant and bool(np.log(high / low) > 0.5 * gap)
     return high
-
-
-def _bracket_above(excluded: Callable[[float], bool], low: float,
-                   most: float) -> tuple[float, float]:
-    """Return payloads around the least excluded one above a payload, `most` at most [kg]."""
-    factor = _FIRST_FACTOR
-    while (high := low * factor) < most and not excluded(high):
-        low, factor = high, factor**2
-    return low, min(high, most)

@@ -90,7 +90,7 @@ def replacement_from_message(message: MotionTask, running: Plan,
 
 def with_motion(message: MotionTask, task: Task) -> MotionTask:
     """Return a task that replaces a plan as a motion of its own, which says all of itself."""
-    whole, n = copy.deepcopy(message), task.arm.n_joints
+    whole, n = copy.copy(message), task.arm.n_joints  # whose fields are replaced, not changed
     whole.space, whole.goal_point = MotionTask.JOINT, Point()
     for name in ('start_positions', 'goal_positions', 'start_velocities',
                  'start_modal_displacements', 'effort_weights', 'position_weights',

@@ -105,7 +105,8 @@ class PlannerNode(Node):  # type: ignore[misc]
         self._settings.check_joints(arm.n_joints)
         recorder = OutcomeRecorder(arm, self.resolve_topic_name)
         self._motions = MotionRecorder(self, self._settings, recorder.write_motion)
-        self._topics = PlanTopics(self, self._motions.begin)
+        self._topics = PlanTopics(
+            self, self._motions.begin if self._settings.record_motions else None)
         self.add_on_set_parameters_callback(self._judge_parameters)
         self.add_post_set_parameters_callback(self._apply_parameters)
         self.get_logger().info(f'preparing the dynamics of {arm.name}')

@@ -29,8 +29,9 @@ class PlanTopics:
     ----------
     node : Node
         The planner.
-    record : callable
-        Records the motion of a trajectory from now on, given the settings of its request, too.
+    record : callable, optional
+        Records the motion of a trajectory from now on, given the settings of its request, too;
+        None if motions are not recorded.
 
     Attributes
     ----------
@@ -44,7 +45,7 @@ class PlanTopics:
     """
 
     def __init__(self, node: Node,
-                 record: Callable[[JointTrajectory, PlannerSettings], None]) -> None:
+                 record: Callable[[JointTrajectory, PlannerSettings], None] | None) -> None:
         self._node, self._record = node, record
         self.running, self.streamer = RunningPlans(), Streamer(node)
         self.joints = node.create_publisher(JointTrajectory, '~/joint_trajectory', LATCHED)
@@ -101,8 +102,7 @@ class PlanTopics:
         if outcome.gains is not None:  # first: a controller has them when it begins
             self._gains.publish(feedback_message(outcome.gains, plan, settings.joint_names,
                                                  settings.base_frame))
-        joints = self.trajectory(outcome, track)
-        self._record(joints, settings)
+        joints = self._joints_of(outcome, track, settings)
         if not outcome.start_ns:  # all that follows it has to begin when a controller gets it
             track = replace(track, begin_ns=self._now_ns())
         begin_ns = (outcome.start_ns or track.begin_ns) + round(reference.start_hold * 1e9)
@@ -115,6 +115,17 @@ class PlanTopics:
         self._flexible.publish(outcome.trajectory)
         if markers is not None:
             self._markers.publish(markers)
+
+    def _joints_of(self, outcome: Outcome, track: Track,
+                   settings: PlannerSettings) -> JointTrajectory | bytes:
+        """Return what a controller gets, and have its motion recorded if motions are."""
+        if outcome.replaces and self._record is None:  # nobody here needs the message itself
+            names = list(outcome.trajectory.joint_trajectory.joint_names)
+            return track.part(self._now_ns()).encoded(names)
+        joints = self.trajectory(outcome, track)
+        if self._record is not None:
+            self._record(joints, settings)
+        return joints
 
     def _now_ns(self) -> int:
         return int(self._node.get_clock().now().nanoseconds)

@@ -30,6 +30,12 @@ from flex_planner.recording import (
 from flex_planner.ros.messages.classes import MotionTask, PlanReport, TYPES
 from flex_planner.ros.messages.feedback import feedback_message
 from flex_planner.ros.messages.reference_states import encode_states
+from flex_planner.ros.messages.trajectory_bytes import (
+    encode_flexible_trajectory,
+    encode_joint_trajectory,
+    FLEXIBLE_TRAJECTORY,
+    JOINT_TRAJECTORY,
+)
 from flex_planner.ros.planner.outcome import Outcome
 from flex_planner.ros.planner.request_state import RequestState
 from flex_planner.ros.recorded_motion import in_order, RecordedMotion
@@ -74,10 +80,8 @@ class OutcomeRecorder:
         self._task = Topic(name('motion_task'), f'{interfaces}MotionTask')
         self._report = Topic(name('plan_report'), f'{interfaces}PlanReport')
         self._search = Topic(name('payload_search'), f'{interfaces}PayloadSearch')
-        self._joints = Topic(name('joint_trajectory'),
-                             'trajectory_msgs/msg/JointTrajectory', LATCHED)
-        self._flexible = Topic(name('flexible_trajectory'),
-                               f'{interfaces}FlexibleTrajectory', LATCHED)
+        self._joints = Topic(name('joint_trajectory'), JOINT_TRAJECTORY, LATCHED)
+        self._flexible = Topic(name('flexible_trajectory'), FLEXIBLE_TRAJECTORY, LATCHED)
         self._gains = Topic(name('feedback_gains'), f'{interfaces}FeedbackGains', LATCHED)
         self._states = Topic(name('reference_states'), JOINT_STATE, DEFAULT)
 
@@ -133,8 +137,11 @@ class OutcomeRecorder:
             if outcome.search is not None:
                 recording.write(self._search, outcome.search, ready)
             if outcome.plan is not None and outcome.reference is not None:
-                recording.write(self._joints, outcome.trajectory.joint_trajectory, ready)
-                recording.write(self._flexible, outcome.trajectory, ready)
+                trajectory = outcome.trajectory
+                recording.copy(self._joints, TYPES.definition(JOINT_TRAJECTORY),
+                               encode_joint_trajectory(trajectory.joint_trajectory), ready)
+                recording.copy(self._flexible, TYPES.definition(FLEXIBLE_TRAJECTORY),
+                               encode_flexible_trajectory(trajectory), ready)
                 if outcome.gains is not None:
                     recording.write(self._gains, feedback_message(
                         outcome.gains, outcome.plan, settings.joint_names, settings.base_frame),

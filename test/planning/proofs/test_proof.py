@@ -22,11 +22,13 @@ from flex_planner.planning.proofs import (
     find_doubt,
     find_proof,
     is_payload_bounded,
+    payload_bounds,
     ProofName,
     prove_not_held,
     short_durations,
 )
-from flex_planner.planning.proofs.duration_bounds import bound_by_power
+from flex_planner.planning.proofs.duration_bounds import bound_by_power, energy_limits
+from flex_planner.planning.proofs.energy_growth import EnergyLimits
 from flex_planner.planning.proofs.motion_facts import MotionFacts
 from known_limits import G, HEAVIEST, lifted_to, one_link, SHORTEST
 from light_model import LightModel
@@ -471,6 +473,21 @@ def test_bound_that_begins_at_what_is_carried_is_as_close(carried: float) -> Non
     exact, found = bound_payload(problem).payload, bound_payload(problem, carried).payload
     assert carried < exact
     assert found == pytest.approx(exact, rel=6e-3)  # each is within 5e-3 of the least excluded
+
+
+@pytest.mark.parametrize('carried', [0.0, 0.1, 1.5])
+def test_bound_takes_few_payloads(carried: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    tried: list[float] = []
+
+    def limits(facts: MotionFacts, payload: float, *rest: Any, **options: Any) -> EnergyLimits:
+        tried.append(payload)
+        return energy_limits(facts, payload, *rest, **options)
+
+    monkeypatch.setattr(payload_bounds, 'energy_limits', limits)
+    found = bound_payload(problem_of(with_motor(one_link(1.6), 0.1, no_load_speed=2.5)), carried)
+    assert found.payload in tried
+    assert max(payload for payload in tried if payload < found.payload) > found.payload / 1.0051
+    assert len(tried) <= 9  # halving the ratio of the bracket takes 12 and more
 
 
 @pytest.mark.parametrize('task', [

@@ -13,6 +13,7 @@ from flex_planner.planning.sampling import sample_plan, SamplingSettings
 from flex_planner.ros.messages.measured_states import AngleTrack, state_from_estimate
 from flex_planner.ros.messages.request_error import RequestError
 from flex_planner.ros.messages.times import time_message, time_ns
+from flex_planner.ros.messages.trajectory_bytes import encode_joint_trajectory
 from flex_planner.ros.planner.arm_bending import ArmBending
 from flex_planner.ros.planner.outcome import Outcome
 from flex_planner.ros.planner.replanner import Replanner
@@ -88,6 +89,7 @@ def test_published_trajectory_has_the_rest_of_the_plan_before_it(
     whole = first.replaced_by(outcome, at(0.25))
     shown = whole.part(at(0.25))
     message = shown.trajectory(JOINTS)
+    assert shown.encoded(JOINTS) == encode_joint_trajectory(message)
     begin = time_ns(message.header.stamp)
     assert at(0.24) < begin <= at(0.25) and whole.begin_ns <= at(0.01)
     times = np.array([point.time_from_start.sec * 10**9 + point.time_from_start.nanosec
