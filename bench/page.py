@@ -305,6 +305,10 @@ def replanning_text(figures: dict[str, Any]) -> str:
     if 'replanning' not in figures:
         return ''
     found = figures['replanning']
+    runs = found.get('runs', 1)
+    load = (f'Load of the machine when it ended: {found["load"]:.1f}.' if runs == 1 else
+            f'Means of {runs} runs; load of the machine when they ended, with other work on it: '
+            f'{found["load"]:.1f}.')
     return REPLANNING.format(
         duration=replanning.DURATION, most=replanning.MOST, table=replanning.table(found['rows']),
-        load=f'Load of the machine when it ended: {found["load"]:.1f}.')
+        load=load)

@@ -30,6 +30,7 @@ from flex_planner.planning.strategies.limit_strategies import (
 )
 from flex_planner.planning.strategies.strategy import Strategy
 from flex_planner.planning.strategies.via_homotopy import move_via_points
+from flex_planner.planning.warnings import bends_at_once
 
 # intervals of a first mesh that are many, in units of those of a mesh without ringing
 _MANY = 5
@@ -74,10 +75,15 @@ def order_strategies(problem: MotionProblem, solver: Solver,
     Where three rigid links or more fail to follow from a straight line, IPOPT mostly takes them
     there in a fraction of the time that its sixteen starts for kinds of motion take.
 
+    Links that are clamped to joints without inertia ring, and seldom follow from a straight line.
+
     """
     ordered = list(strategies)
     if problem.model.arm.n_joints >= _SEVERAL and not problem.model.arm.n_passive:
         ordered = _ahead(ordered, DIRECT, KINDS)
+    if bends_at_once(problem.task.arm):
+        straight, from_rigid = BARRIER
+        ordered = _ahead(_ahead(ordered, from_rigid, straight), CALM, straight)
     rings = problem.fewest_intervals(solver.settings.stages) > _MANY * solver.settings.intervals
     if rings and problem.holding_torque.any():
         ordered = _ahead(ordered, RIGID_FIRST, COLD_START)

@@ -22,7 +22,8 @@ import pytest
 NEITHER = {'homotopy in via points', 'homotopy in Coulomb friction'}
 NOTHING_TO_ADD = {
     'rigid': {'rigid motion first', 'interior point from the rigid motion',
-              'homotopy in vibration weights', 'homotopy in stiffness', *NEITHER},
+              'homotopy in a price on bending', 'homotopy in vibration weights',
+              'homotopy in stiffness', *NEITHER},
     'ei5': NEITHER}
 BY_NAME = {strategy.name: strategy for strategy in CATALOGUE}
 each_strategy = pytest.mark.parametrize('strategy', CATALOGUE, ids=list(BY_NAME))
@@ -69,6 +70,21 @@ def test_what_rings_many_times_under_gravity_starts_from_the_rigid_motion(
     assert ordered[2:] == list(CATALOGUE[2:])
     alone = order_strategies(problem, Solver(), CATALOGUE[:1])
     assert alone == [BY_NAME['cold start']]
+
+
+def test_links_on_joints_without_inertia_seldom_start_from_a_straight_line() -> None:
+    links = (Link(length=0.5, linear_density=6.0, flexural_rigidity=50.0, modes=1,
+                  mode_family='clamped_free'),) * 2
+    arm = Arm(name='light joints', links=links,
+              joints=(Joint(motor=Motor(stall_torque=1e3)), Joint()))
+    task = Task(arm=arm, start_positions=[0, 0], goal_positions=[1, 1], duration=2.0)
+    problem = problem_of(ArmModel(arm), task)
+    ordered = [each.name for each in order_strategies(problem, Solver(), CATALOGUE)]
+    at = ordered.index('interior point')
+    assert ordered[at - 2:at] == ['interior point from the rigid motion',
+                                  'homotopy in a price on bending']
+    other = CATALOGUE[::-1]
+    assert order_strategies(problem, Solver(), other) == list(other)
 
 
 def test_rigid_chains_go_to_direct_collocation_before_kinds_of_motion() -> None:

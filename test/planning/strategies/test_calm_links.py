@@ -1,0 +1,81 @@
+"""Motions of clamped links that ring at no cost, found with a price on the speed of bending."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from flex_planner import Arm, load_arm, Plan, plan_path, Task
+from flex_planner.arms.arm import Motor
+from flex_planner.planning.plan import PlanStatus
+from flex_planner.planning.strategies import calm_links as strategy
+from flex_planner.planning.strategies.catalogue import CALM
+from flex_planner.planning.warnings import bends_at_once, WarningKind
+import numpy as np
+import pytest
+
+# one link of the paper, clamped, that is lifted by 0.6 rad in 2 s with 1 kg: by homotopy in
+# stiffness on 2000 intervals, which took 22 s of CPU time
+COST, WITH_ONE_MODE = 35.95994497, 35.96219256
+
+
+def lifting(modes: int, **joint: Any) -> Task:
+    """Return a motion of one clamped link under gravity."""
+    paper = load_arm('korayem_ei50')
+    link = replace(paper.links[0], modes=modes, mode_family='clamped_free')
+    motor = replace(paper.joints[0], motor=Motor(stall_torque=1e3, **joint))
+    arm = Arm(name='one clamped link', links=(link,), joints=(motor,), gravity=[0.0, -9.81])
+    return Task(arm=arm, start_positions=[0.5], goal_positions=[1.1], duration=2.0,
+                payload_mass=1.0)
+
+
+def calmly(task: Task) -> Plan:
+    """Return what this strategy alone leads to."""
+    return plan_path(task, strategies=(CALM,), search='fast')
+
+
+@pytest.fixture
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the price stay since there are no iterations to lower it."""
+    monkeypatch.setattr(strategy, '_PATIENCE_FALLING', 0)
+
+
+@pytest.mark.parametrize(('modes', 'cost'), [(1, WITH_ONE_MODE), (2, COST)])
+def test_price_falls_to_nothing(modes: int, cost: float) -> None:
+    plan = calmly(lifting(modes))
+    assert plan.solved
+    assert plan.cost == pytest.approx(cost, rel=1e-7)
+    assert not plan.task.velocity_weights.any()
+    assert WarningKind.PRICE_ON_BENDING not in {one.kind for one in plan.warnings}
+
+
+@pytest.mark.usefixtures('impatient')
+def test_price_that_stays_is_told() -> None:
+    task = lifting(1)
+    plan = calmly(task)
+    assert bends_at_once(task.arm)
+    assert plan.solved
+    assert plan.certified
+    weights = plan.task.velocity_weights
+    assert weights[0] == 0.0 < weights[1]
+    [told] = [one for one in plan.warnings if one.kind is WarningKind.PRICE_ON_BENDING]
+    assert told.value == pytest.approx(weights[1])
+    # the plan is that of the task with these weights, and costs little more than the best
+    again = plan_path(replace(task, velocity_weights=weights), search='fast')
+    assert plan.cost == pytest.approx(again.cost, rel=1e-6)
+    assert WITH_ONE_MODE < plan.cost == pytest.approx(WITH_ONE_MODE, rel=2e-2)
+
+
+@pytest.mark.usefixtures('impatient')
+def test_no_price_is_added_where_joints_have_inertia() -> None:
+    task = lifting(1, rotor_inertia=0.05)
+    assert not bends_at_once(task.arm)
+    plan = calmly(task)
+    assert plan.status is PlanStatus.NOT_CONVERGED
+    np.testing.assert_array_equal(plan.task.velocity_weights, task.velocity_weights)
+
+
+def test_rigid_arms_have_nothing_to_calm() -> None:
+    plan = calmly(lifting(0))
+    assert plan.status is PlanStatus.NOT_CONVERGED
+    assert 'no strategy applies' in plan.message
