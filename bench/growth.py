@@ -24,6 +24,7 @@ from flex_planner.collocation.mesh import defects
 from flex_planner.optimal_control.arm_model import ArmModel
 from flex_planner.planning.certificate import certify
 from flex_planner.planning.strategies.initial_guesses import cold_start
+from flex_planner.planning.warnings import WarningKind
 import numpy as np
 
 SIZES = [(n, m) for n in range(1, 5) for m in range(5) if n * m <= 8]
@@ -101,10 +102,16 @@ def report(links: int, modes: int, setting: str = '') -> None:
     last = plans[-1]
     print(json.dumps({
         'links': links, 'modes': modes, 'setting': setting, 'unknowns': 4 * task.arm.n_coordinates,
-        'solved': last.solved, 'strategy': last.strategy, 'iterations': last.iterations,
+        'solved': last.solved, 'strategy': _how(last), 'iterations': last.iterations,
         'seconds': statistics.median(times), 'intervals': last.mesh_intervals,
         'cpu': statistics.median(plan.planning_time for plan in plans) if setting else np.nan,
         'memory': int(peak.split()[1]) / 1024}))
+
+
+def _how(plan: Plan) -> str:
+    """Return the strategy of a plan, and whether it changed what the task asked for."""
+    priced = any(one.kind is WarningKind.PRICE_ON_BENDING for one in plan.warnings)
+    return f'{plan.strategy}, which is left' if priced else plan.strategy
 
 
 class _CpuMonitor(Monitor):

@@ -45,7 +45,7 @@ from flex_planner.planning.strategies.catalogue import CATALOGUE
 from flex_planner.planning.strategies.initial_guesses import restart, warm_start
 from flex_planner.planning.strategies.strategy import Strategy
 from flex_planner.planning.via_limits import check_via_points
-from flex_planner.planning.warnings import find_arm_warnings
+from flex_planner.planning.warnings import find_arm_warnings, PlanWarning, WarningKind
 from flex_planner.planning.weight_search import adapt_weights, check_objectives
 from flex_planner.planning.within_model import keep_model
 import numpy as np
@@ -133,12 +133,21 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
     if plan is not None:
         return _forgive(plan, objectives, solver)
     plan = plan_problem(problem, solver, (*_given(start_from, problem, solver), *strategies),
-                        effort)
+                        effort, substitutes=True)
     if plan.status in (PlanStatus.NOT_FOUND, PlanStatus.NOT_CONVERGED):
         proof = find_proof(problem, thorough=True)
         return plan if proof is None else replace(
             plan, status=PlanStatus.INFEASIBLE, message=str(proof))
-    return _forgive(_keep(plan, solver, objectives, effort), objectives, solver)
+    kept = _forgive(_keep(plan, solver, objectives, effort), objectives, solver)
+    return _with_price(kept, plan.warnings)
+
+
+def _with_price(plan: Plan, before: Sequence[PlanWarning]) -> Plan:
+    """Return a plan with the warning of a price that one had from which it was made."""
+    told = {one.kind for one in plan.warnings}
+    lost = [one for one in before
+            if one.kind is WarningKind.PRICE_ON_BENDING and one.kind not in told]
+    return replace(plan, warnings=(*plan.warnings, *lost)) if lost else plan
 
 
 def _known_times(task: Task,

@@ -46,7 +46,7 @@ _GUESSES = (2.0, 4.0, 8.0)
 
 def plan_problem(problem: MotionProblem, solver: Solver,
                  strategies: Sequence[Strategy] = CATALOGUE,
-                 effort: SearchEffort = SearchEffort.FAST) -> Plan:
+                 effort: SearchEffort = SearchEffort.FAST, *, substitutes: bool = False) -> Plan:
     """
     Return the certified plan of a problem by the first strategy that solves it.
 
@@ -63,6 +63,9 @@ def plan_problem(problem: MotionProblem, solver: Solver,
         At least one, in the order in which they are tried, see `order_strategies`.
     effort : SearchEffort
         Whether cheaper kinds of motion are looked for.
+    substitutes : bool
+        Whether a plan of the same task with a price on the speed of bending will do for arms that
+        `bends_at_once`, if there is no other; a warning tells it.
 
     """
     tried: list[TriedStrategy] = []
@@ -73,8 +76,9 @@ def plan_problem(problem: MotionProblem, solver: Solver,
         elif free_times(problem.task.via_points):
             problem, strategy, attempt = _solve_at_via_times(problem, solver, strategies, tried)
         else:
-            strategy, attempt = try_strategies(problem, solver, strategies, tried,
-                                               substitutes=bends_at_once(problem.task.arm))
+            strategy, attempt = try_strategies(
+                problem, solver, strategies, tried,
+                substitutes=substitutes and bends_at_once(problem.task.arm))
             if attempt.substitute is not None:
                 problem = attempt.substitute.problem
         plan = _conclude(problem, strategy, attempt, solver)

@@ -7,6 +7,7 @@ from typing import Any
 
 from flex_planner import Arm, load_arm, Plan, plan_path, Task
 from flex_planner.arms.arm import Motor
+from flex_planner.optimal_control.path_constraints import JointSpeed
 from flex_planner.planning.plan import PlanStatus
 from flex_planner.planning.strategies import calm_links as strategy
 from flex_planner.planning.strategies.catalogue import CALM
@@ -64,6 +65,15 @@ def test_price_that_stays_is_told() -> None:
     again = plan_path(replace(task, velocity_weights=weights), search='fast')
     assert plan.cost == pytest.approx(again.cost, rel=1e-6)
     assert WITH_ONE_MODE < plan.cost == pytest.approx(WITH_ONE_MODE, rel=2e-2)
+
+
+@pytest.mark.usefixtures('impatient')
+def test_price_is_told_of_plans_that_limits_bend_too() -> None:
+    plan = calmly(replace(lifting(1), path_constraints=(JointSpeed(joint=1, limit=0.42),)))
+    assert plan.solved
+    assert plan.constraints
+    assert plan.task.velocity_weights.any()
+    assert WarningKind.PRICE_ON_BENDING in {one.kind for one in plan.warnings}
 
 
 @pytest.mark.usefixtures('impatient')
