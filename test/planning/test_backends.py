@@ -16,7 +16,7 @@ from scipy_backend import CountingBackend, FINE, solve_by_scipy
 # by IPOPT, by our own method alone, and without via points or Coulomb friction not at all
 OTHERS = ('direct collocation', 'kinds of motion', 'interior point',
           'interior point from the rigid motion', 'homotopy in via points',
-          'homotopy in Coulomb friction')
+          'homotopy in Coulomb friction', 'homotopy in a price on bending')
 
 
 @pytest.mark.parametrize('strategy', [

@@ -13,8 +13,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from flex_planner.base.progress import StoppedError
 from flex_planner.base.validation import Array
-from flex_planner.collocation import CollocationResult, CollocationSolution, GaussRule, Solver
+from flex_planner.collocation import (
+    CollocationResult,
+    CollocationSolution,
+    GaussRule,
+    INTERRUPTED,
+    Solver,
+)
 from flex_planner.collocation.newton import newton
 from flex_planner.collocation.newton_outcome import NewtonOutcome
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
@@ -40,10 +47,17 @@ def calm_links(problem: MotionProblem, solver: Solver) -> Attempt | None:
     Start near the rigid motion with a price on the speed of bending, and lower it to nothing.
 
     Where it cannot be lowered so far, the attempt has the motion of the lowest price as a
-    substitute.
+    substitute. None for other methods, rigid arms, via points, and torques that are states.
+
+    Raises
+    ------
+    StoppedError
+        If the monitor stopped it.
 
     """
-    if not problem.model.arm.n_passive or problem.junctions.size or problem.layout.torques:
+    if not (solver.is_own and problem.model.arm.n_passive):
+        return None
+    if problem.junctions.size or problem.layout.torques:
         return None
     motion = solve_rigid(problem, solver)
     if motion is None or not motion.converged:
@@ -65,7 +79,7 @@ class _Walk:
     def begin(self, rigid: CollocationSolution) -> NewtonOutcome:
         """Return the motion at the first price, from the rigid one or by way of stiffer links."""
         outcome = self._start(1.0, rigid)
-        if outcome.converged or outcome.stopped:
+        if outcome.converged:
             return outcome
         outcome = self._start(_STIFFER, rigid)
         return self._soften(outcome.solution) if outcome.converged else outcome
@@ -77,7 +91,7 @@ class _Walk:
             softer = max(stiffness / fall, 1.0)
             ahead = self._with(_FIRST, softer)
             outcome = self._solve(ahead, point.on_mesh(self._mesh(ahead)))
-            if outcome.converged and softer == 1.0 or outcome.stopped or fall < _LEAST_SOFTER:
+            if outcome.converged and softer == 1.0 or fall < _LEAST_SOFTER:
                 return outcome
             if outcome.converged:
                 stiffness, point = softer, outcome.solution
@@ -90,8 +104,6 @@ class _Walk:
         while fall >= _LEAST_FALL:
             lower = price / fall if price > _LAST else 0.0
             outcome = self._solve(self._with(lower), point, _PATIENCE_FALLING)
-            if outcome.stopped:
-                return Attempt(result=_failed(outcome))
             if not outcome.converged:
                 fall **= 0.5
                 continue
@@ -101,16 +113,19 @@ class _Walk:
             fall **= 1.5 if outcome.iterations <= _EASY else 1.0
         if not price:
             return Attempt(result=self._solver.solve(self._problem, point))
-        return Attempt(result=_failed(outcome), substitute=self._substitute(price, point))
+        found = self._substitute(price, point)
+        if found.result.status in INTERRUPTED:
+            return Attempt(result=found.result)
+        return Attempt(result=_failed(outcome),
+                       substitute=found if found.result.converged else None)
 
-    def _substitute(self, price: float, point: CollocationSolution) -> Substitute | None:
+    def _substitute(self, price: float, point: CollocationSolution) -> Substitute:
         """Return the motion of a task with a price, solved exactly."""
         task = self._problem.task
         calm = replace(task, velocity_weights=task.velocity_weights
                        + price * self._unit * self._masses)
         problem = MotionProblem(self._problem.model, calm, task_parameters(calm))
-        result = self._solver.solve(problem, point)
-        return Substitute(problem=problem, result=result) if result.converged else None
+        return Substitute(problem=problem, result=self._solver.solve(problem, point))
 
     def _start(self, stiffness: float, rigid: CollocationSolution) -> NewtonOutcome:
         """Return the motion at the first price of an arm so many times as stiff."""
@@ -135,8 +150,11 @@ class _Walk:
     def _solve(self, problem: MotionProblem, guess: CollocationSolution,
                patience: int = _PATIENCE) -> NewtonOutcome:
         """Return where Newton's method comes to from a guess on its mesh."""
-        return newton(problem, guess, tolerance=_TOLERANCE, max_iterations=patience,
-                      monitor=self._solver.monitor, exact=True)
+        outcome = newton(problem, guess, tolerance=_TOLERANCE, max_iterations=patience,
+                         monitor=self._solver.monitor, exact=True)
+        if outcome.stopped:
+            raise StoppedError(outcome.stopped)
+        return outcome
 
 
 def _price_unit(problem: MotionProblem) -> float:
