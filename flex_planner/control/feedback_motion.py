@@ -25,7 +25,8 @@ import numpy as np
 _LONGEST_STEP = 1e-3
 # the motion of the tip after an arrival is the same to five digits with smaller ones
 _TOLERANCES = 1e-5, 1e-7
-_TOGETHER, _MOST_STEPS = 512, 64  # as many times as few as there may be
+# steps that are taken at once, and those of a period at most, in units of the fewest
+_TOGETHER, _MOST_STEPS = 512, 64
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -45,7 +45,7 @@ from flex_planner.planning.strategies.catalogue import CATALOGUE
 from flex_planner.planning.strategies.initial_guesses import restart, warm_start
 from flex_planner.planning.strategies.strategy import Strategy
 from flex_planner.planning.via_limits import check_via_points
-from flex_planner.planning.warnings import find_arm_warnings, PlanWarning, WarningKind
+from flex_planner.planning.warnings import find_arm_warnings, warn_of_price
 from flex_planner.planning.weight_search import adapt_weights, check_objectives
 from flex_planner.planning.within_model import keep_model
 import numpy as np
@@ -139,15 +139,14 @@ def plan_path(task: Task, *, model: ArmModel | None = None, solver: Solver | Non
         return plan if proof is None else replace(
             plan, status=PlanStatus.INFEASIBLE, message=str(proof))
     kept = _forgive(_keep(plan, solver, objectives, effort), objectives, solver)
-    return _with_price(kept, plan.warnings)
+    return _tell_price(kept, task.velocity_weights, plan.task.velocity_weights)
 
 
-def _with_price(plan: Plan, before: Sequence[PlanWarning]) -> Plan:
-    """Return a plan with the warning of a price that one had from which it was made."""
-    told = {one.kind for one in plan.warnings}
-    lost = [one for one in before
-            if one.kind is WarningKind.PRICE_ON_BENDING and one.kind not in told]
-    return replace(plan, warnings=(*plan.warnings, *lost)) if lost else plan
+def _tell_price(plan: Plan, asked: Array, weights: Array) -> Plan:
+    """Return a plan, with a warning if it was made with other velocity_weights than asked for."""
+    if np.array_equal(asked, weights):
+        return plan
+    return replace(plan, warnings=(*plan.warnings, warn_of_price(weights)))
 
 
 def _known_times(task: Task,

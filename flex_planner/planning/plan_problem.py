@@ -30,7 +30,7 @@ from flex_planner.planning.strategies.via_times import (
     TimedMotion,
 )
 from flex_planner.planning.verdict import judge
-from flex_planner.planning.warnings import bends_at_once, find_arm_warnings, warn_of_price
+from flex_planner.planning.warnings import find_arm_warnings
 
 INTERRUPTED_STATUS = {SolverStatus.TIMEOUT: PlanStatus.TIMEOUT,
                       SolverStatus.CANCELED: PlanStatus.CANCELED}
@@ -64,8 +64,8 @@ def plan_problem(problem: MotionProblem, solver: Solver,
     effort : SearchEffort
         Whether cheaper kinds of motion are looked for.
     substitutes : bool
-        Whether a plan of the same task with a price on the speed of bending will do for arms that
-        `bends_at_once`, if there is no other; a warning tells it.
+        Whether a plan of the same task with other weights will do, see `calm_links`; the task of
+        the plan has them.
 
     """
     tried: list[TriedStrategy] = []
@@ -76,9 +76,8 @@ def plan_problem(problem: MotionProblem, solver: Solver,
         elif free_times(problem.task.via_points):
             problem, strategy, attempt = _solve_at_via_times(problem, solver, strategies, tried)
         else:
-            strategy, attempt = try_strategies(
-                problem, solver, strategies, tried,
-                substitutes=substitutes and bends_at_once(problem.task.arm))
+            strategy, attempt = try_strategies(problem, solver, strategies, tried,
+                                               substitutes=substitutes)
             if attempt.substitute is not None:
                 problem = attempt.substitute.problem
         plan = _conclude(problem, strategy, attempt, solver)
@@ -87,9 +86,6 @@ def plan_problem(problem: MotionProblem, solver: Solver,
                 and plan.status not in STOP_STATUS.values()
                 and plan.cost > 0):  # nothing is cheaper than nothing
             plan = _look_for_cheaper(plan, attempt, solver, effort)
-        if attempt.substitute is not None:
-            priced = warn_of_price(plan.task.velocity_weights)
-            plan = replace(plan, warnings=(*plan.warnings, priced))
     except StoppedError as error:
         plan = Plan(task=problem.task, status=STOP_STATUS[error.reason], message=str(error),
                     strategy='', problem=problem, solution=None)

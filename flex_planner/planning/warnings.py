@@ -121,10 +121,11 @@ def warn_of_price(weights: Array) -> PlanWarning:
     """Warn that a plan has velocity_weights (n_t,) that were not asked for."""
     shown = ', '.join(f'{weight:.3g}' for weight in weights)
     return PlanWarning(kind=WarningKind.PRICE_ON_BENDING, value=float(weights.max()), sentence=(
-        'no motion was found without a price on the speed of bending: here links that ring cost '
-        'nothing, and what rings more may be a little cheaper. This plan is that of the task with '
-        f'velocity_weights of {shown}, the least that were reached. Inertia of the joints or '
-        'damping of the links makes do without'))
+        'the first strategies found no motion without a price on the speed of bending, and others '
+        'were not tried: here links that ring cost nothing, and what rings more may be a little '
+        f'cheaper. This plan is that of the task with velocity_weights of {shown}, the least that '
+        'were reached. With inertia of the joints or damping of the links there is mostly one '
+        'without'))
 
 
 def _joints_without_inertia(arm: Arm) -> PlanWarning | None:

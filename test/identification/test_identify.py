@@ -14,10 +14,20 @@ from flex_planner.control.joint_reference import JointReference
 from flex_planner.identification.drive import Drive
 from flex_planner.identification.excitation import predict_identification
 from flex_planner.identification.experiments import LogError, Method
-from flex_planner.identification.identification import Finding, Identification, Verdict
+from flex_planner.identification.identification import (
+    Finding,
+    Identification,
+    judge_estimate,
+    Verdict,
+)
 from flex_planner.identification.identify import ALL, identify
 from flex_planner.identification.joint_log import JointLog
-from flex_planner.identification.plant_parameters import arm_with, parameters_of, Quantity
+from flex_planner.identification.plant_parameters import (
+    arm_with,
+    list_parameters,
+    parameters_of,
+    Quantity,
+)
 from flex_planner.optimal_control.task import Task
 from flex_planner.planning.plan_path import plan_path
 from flex_planner.planning.sampling import sample_plan, SamplingSettings
@@ -80,6 +90,16 @@ def test_parameters_are_those_of_the_arm(method: Method, resolution: float, ever
     assert errors(found).max() < most
     assert {one.verdict for one in found.estimates} == {Verdict.IDENTIFIED}
     assert found.left_out.min() > 99.9 and not found.warnings
+
+
+def test_fits_of_a_wrong_model_that_agree_are_no_evidence() -> None:
+    parameter = list_parameters(1)[0]
+
+    def judged(*, withheld: bool) -> Verdict:
+        return judge_estimate(parameter, 1.0, 1.0, 0.01, 0.001, free=True,
+                              withheld=withheld).verdict
+
+    assert (judged(withheld=False), judged(withheld=True)) == (Verdict.IDENTIFIED, Verdict.WEAK)
 
 
 @pytest.mark.parametrize('late', [-0.0312, 0.0173])

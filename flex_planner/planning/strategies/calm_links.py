@@ -25,10 +25,15 @@ from flex_planner.collocation import (
 from flex_planner.collocation.newton import newton
 from flex_planner.collocation.newton_outcome import NewtonOutcome
 from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
-from flex_planner.planning.strategies.homotopies import bending_masses
+from flex_planner.planning.strategies.homotopies import (
+    bending_masses,
+    coordinate_masses,
+    with_parameters,
+)
 from flex_planner.planning.strategies.initial_guesses import solve_rigid
 from flex_planner.planning.strategies.quasi_static_lift import bend_quasi_statically
 from flex_planner.planning.strategies.strategy import Attempt, Substitute
+from flex_planner.planning.warnings import bends_at_once
 import numpy as np
 
 # the first price of the kinetic energy of bending and the lowest before it is dropped, in units of
@@ -46,8 +51,9 @@ def calm_links(problem: MotionProblem, solver: Solver) -> Attempt | None:
     """
     Start near the rigid motion with a price on the speed of bending, and lower it to nothing.
 
-    Where it cannot be lowered so far, the attempt has the motion of the lowest price as a
-    substitute. None for other methods, rigid arms, via points, and torques that are states.
+    Where it cannot be lowered so far, and the arm `bends_at_once`, the attempt has the motion of
+    the lowest price as a substitute. None for other methods, rigid arms, via points, and torques
+    that are states.
 
     Raises
     ------
@@ -91,10 +97,12 @@ class _Walk:
             softer = max(stiffness / fall, 1.0)
             ahead = self._with(_FIRST, softer)
             outcome = self._solve(ahead, point.on_mesh(self._mesh(ahead)))
-            if outcome.converged and softer == 1.0 or fall < _LEAST_SOFTER:
-                return outcome
             if outcome.converged:
+                if softer == 1.0:
+                    return outcome
                 stiffness, point = softer, outcome.solution
+            elif fall < _LEAST_SOFTER:
+                return outcome
             else:
                 fall **= 0.5
 
@@ -113,11 +121,13 @@ class _Walk:
             fall **= 1.5 if outcome.iterations <= _EASY else 1.0
         if not price:
             return Attempt(result=self._solver.solve(self._problem, point))
+        failed = _failed(outcome)
+        if not bends_at_once(self._problem.task.arm):
+            return Attempt(result=failed)
         found = self._substitute(price, point)
         if found.result.status in INTERRUPTED:
             return Attempt(result=found.result)
-        return Attempt(result=_failed(outcome),
-                       substitute=found if found.result.converged else None)
+        return Attempt(result=failed, substitute=found if found.result.converged else None)
 
     def _substitute(self, price: float, point: CollocationSolution) -> Substitute:
         """Return the motion of a task with a price, solved exactly."""
@@ -136,9 +146,9 @@ class _Walk:
     def _with(self, price: float, stiffness: float = 1.0) -> MotionProblem:
         """Return the problem with a price in units, and links so many times as stiff."""
         given = self._problem.parameters
-        return MotionProblem(self._problem.model, self._problem.task, replace(
-            given, rigidity=stiffness * given.rigidity,
-            velocity_weights=given.velocity_weights + price * self._unit * self._masses))
+        return with_parameters(
+            self._problem, rigidity=stiffness * given.rigidity,
+            velocity_weights=given.velocity_weights + price * self._unit * self._masses)
 
     def _mesh(self, problem: MotionProblem) -> Array:
         """Return the mesh on which the vibrations of a problem are resolved."""
@@ -159,9 +169,8 @@ class _Walk:
 
 def _price_unit(problem: MotionProblem) -> float:
     """Return the price at which the speeds of a motion count about as much as its torques."""
-    n, weights = problem.model.arm.n_joints, problem.parameters.effort_weights
-    mass = problem.model.mass_and_energy(problem.start[None], problem.parameters.physical)[0][0]
-    return float((weights * np.diag(mass)[:n]).max() / problem.task.duration**2)
+    inertias = coordinate_masses(problem)[:problem.model.arm.n_joints]
+    return float((problem.parameters.effort_weights * inertias).max() / problem.task.duration**2)
 
 
 def _failed(outcome: NewtonOutcome) -> CollocationResult:

@@ -98,8 +98,7 @@ def lower_speed_price(problem: MotionProblem, solver: Solver) -> Attempt:
     Motions that swing, through the hanging posture for example, are dear while it is high.
 
     """
-    mass = np.diag(problem.model.mass_and_energy(
-        problem.start[None], problem.parameters.physical)[0][0])
+    mass = coordinate_masses(problem)
     n, duration = problem.model.arm.n_joints, problem.task.duration
     speeds = (problem.goal - problem.start)[:n] / duration
     effort = float(problem.parameters.effort_weights @ problem.holding_torque**2) + (
@@ -109,7 +108,7 @@ def lower_speed_price(problem: MotionProblem, solver: Solver) -> Attempt:
     def at(share: float) -> MotionProblem:
         price = first * 10.0 ** (-_SPEED_DECADES * share) if share < 1 else 0.0
         weights = problem.parameters.velocity_weights + price * mass
-        return _with(problem, velocity_weights=weights)
+        return with_parameters(problem, velocity_weights=weights)
 
     return _follow_from_line(at, solver, first_step=1 / _SPEED_DECADES)
 
@@ -122,7 +121,7 @@ def soften_links(problem: MotionProblem, solver: Solver) -> Attempt | None:
 
     def soften(share: float) -> MotionProblem:
         stiffer = _STIFFER ** (1 - share)
-        return _with(calmed, rigidity=stiffer * problem.parameters.rigidity)
+        return with_parameters(calmed, rigidity=stiffer * problem.parameters.rigidity)
 
     soft = _follow_from_line(soften, solver.loose(), first_step=0.25)
     if not soft.result.converged:
@@ -131,13 +130,17 @@ def soften_links(problem: MotionProblem, solver: Solver) -> Attempt | None:
                                           first_step=1 / _DECADES))
 
 
-def bending_masses(problem: MotionProblem) -> Array:
-    """Return the masses that move with the bending at the start, shape (n_t,); 0 for joints."""
-    n = problem.model.arm.n_joints
+def coordinate_masses(problem: MotionProblem) -> Array:
+    """Return what moves with each coordinate at the start, shape (n_t,) [kg], [kg m^2]."""
     masses: Array = np.diag(problem.model.mass_and_energy(
-        problem.start[None], problem.parameters.physical)[0][0]).copy()
-    masses[:n] = 0.0
+        problem.start[None], problem.parameters.physical)[0][0])
     return masses
+
+
+def bending_masses(problem: MotionProblem) -> Array:
+    """Return what moves with the bending, see `coordinate_masses`; 0 for joints."""
+    bends = np.arange(problem.model.arm.n_coordinates) >= problem.model.arm.n_joints
+    return np.where(bends, coordinate_masses(problem), 0.0)
 
 
 def _calm(problem: MotionProblem) -> Callable[[float], MotionProblem]:
@@ -147,12 +150,12 @@ def _calm(problem: MotionProblem) -> Callable[[float], MotionProblem]:
     def at(share: float) -> MotionProblem:
         price = _CALM * 10.0 ** (-_DECADES * share) if share < 1 else 0.0
         weights = problem.parameters.velocity_weights + price * added
-        return _with(problem, velocity_weights=weights)
+        return with_parameters(problem, velocity_weights=weights)
 
     return at
 
 
-def _with(problem: MotionProblem, **changes: Any) -> MotionProblem:
+def with_parameters(problem: MotionProblem, **changes: Any) -> MotionProblem:
     """Return a problem with other parameters."""
     return MotionProblem(problem.model, problem.task, replace(problem.parameters, **changes))
 

@@ -7,6 +7,10 @@ from typing import Any
 
 from flex_planner import Arm, load_arm, Plan, plan_path, Task
 from flex_planner.arms.arm import Motor
+from flex_planner.collocation import Solver
+from flex_planner.collocation.newton_outcome import NewtonOutcome
+from flex_planner.optimal_control.arm_model import ArmModel
+from flex_planner.optimal_control.motion_problem import MotionProblem, task_parameters
 from flex_planner.optimal_control.path_constraints import JointSpeed
 from flex_planner.planning.plan import PlanStatus
 from flex_planner.planning.strategies import calm_links as strategy
@@ -14,6 +18,7 @@ from flex_planner.planning.strategies.catalogue import CALM
 from flex_planner.planning.warnings import bends_at_once, WarningKind
 import numpy as np
 import pytest
+from scipy_backend import solve_by_scipy
 
 # one link of the paper, clamped, that is lifted by 0.6 rad in 2 s with 1 kg: by homotopy in
 # stiffness on 2000 intervals, which took 22 s of CPU time
@@ -48,6 +53,47 @@ def test_price_falls_to_nothing(modes: int, cost: float) -> None:
     assert plan.cost == pytest.approx(cost, rel=1e-7)
     assert not plan.task.velocity_weights.any()
     assert WarningKind.PRICE_ON_BENDING not in {one.kind for one in plan.warnings}
+
+
+def test_links_are_softened_where_the_rigid_motion_is_not_near(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    walked: list[float] = []
+    solve = strategy._Walk._solve
+
+    def watched(walk: strategy._Walk, problem: MotionProblem, *rest: Any) -> NewtonOutcome:
+        walked.append(float(problem.parameters.rigidity[0]))
+        outcome = solve(walk, problem, *rest)
+        # from the rigid motion, and from links that are much stiffer
+        return replace(outcome, converged=outcome.converged and len(walked) not in {1, 3})
+
+    monkeypatch.setattr(strategy._Walk, '_solve', watched)
+    plan = calmly(lifting(1))
+    stiff, half = 500.0, 500 / 3.2
+    softened = walked[:walked.index(50.0, 1) + 1]
+    assert softened[:3] == pytest.approx([50.0, stiff, half])
+    assert half < softened[3] < stiff
+    assert softened[3:] == sorted(softened[3:], reverse=True)
+    assert plan.cost == pytest.approx(WITH_ONE_MODE, rel=1e-7)
+
+
+def test_nothing_is_softened_that_does_not_begin(monkeypatch: pytest.MonkeyPatch) -> None:
+    solve, walked = strategy._Walk._solve, []
+
+    def failing(walk: strategy._Walk, *rest: Any) -> NewtonOutcome:
+        walked.append(rest)
+        return replace(solve(walk, *rest), converged=False, message='made to fail')
+
+    monkeypatch.setattr(strategy._Walk, '_solve', failing)
+    plan = calmly(lifting(1))
+    assert plan.status is PlanStatus.NOT_CONVERGED
+    assert 'made to fail' in plan.message
+    assert len(walked) == 2  # as they are, and stiffer
+
+
+def test_other_methods_do_not_walk() -> None:
+    task = lifting(1)
+    problem = MotionProblem(ArmModel.of(task.arm), task, task_parameters(task))
+    assert strategy.calm_links(problem, Solver(backend=solve_by_scipy)) is None
 
 
 @pytest.mark.usefixtures('impatient')
