@@ -147,7 +147,7 @@ def clamped_table(rows: list[Growth]) -> str:
              '| gravity: time [s] | CPU [s] | strategy |', '|' + '---|' * 8]
     found = {(row.links, row.modes, row.setting): row for row in rows}
     for links, modes in dict.fromkeys((links, modes) for links, modes, _ in CLAMPED):
-        cells = ['- | - | not run' if row is None else
+        cells = ['- | - | refused' if row is None else
                  f'{row.seconds:.3g} | {row.cpu:.3g} | '
                  f'{row.strategy if row.solved else "not solved"}'
                  for setting in ('horizontal', 'gravity')

@@ -85,7 +85,8 @@ The same motion with clamped links, lying and under gravity, of at most 12 coord
 solved* is within {limit:.0f} s of CPU time, without helper processes; other work on the machine
 makes the time longer. Links have no rotors at their joints: the torque of a motor drives the
 bending of its own link alone, and where a price on bending *is left* the plan is that of a task
-with such a price, see [links that ring](solver.md#links-that-ring-at-no-cost).
+with such a price, see [links that ring](solver.md#links-that-ring-at-no-cost). Four links with two
+modes each are *refused* under gravity: bent so far, they find no equilibrium.
 
 {table}
 """
