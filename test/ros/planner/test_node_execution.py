@@ -63,6 +63,12 @@ class Arena(Planner):
         self.events.clear()
         self.published.clear()
 
+    def meet(self) -> None:
+        """Wait until the planner knows the controller, which it may discover after this client."""
+        self.behave('refuse')
+        self.wait('the planner to discover the controller', lambda: self.report(
+            publish=True).error_code == PlanReport.EXECUTION_REFUSED, STARTING)
+
     def heard(self, text: str) -> None:
         """Wait until the controller says something."""
         self.wait(text, lambda: any(text in event.data for event in self.events))
@@ -84,6 +90,7 @@ def arena(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Arena]:
         patch.setenv('PYTHONPATH', os.pathsep.join([str(SUPPORT), os.environ['PYTHONPATH']]))
         with Arena(folder) as arena:
             try:
+                arena.meet()
                 yield arena
                 assert 'Traceback' not in arena.log()
             finally:
